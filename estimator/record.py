@@ -1,0 +1,44 @@
+"""A measured record as the estimators see it: arrays in the FMU's units, and what is odd about them."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something about the data that does not forbid its use but must reach the report."""
+
+    kind: Literal["jitter", "gap", "constant", "clipped", "unit"]
+    column: str  # the data column, empty where it concerns the time
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """One uninterrupted stretch of data, simulated freely from its start."""
+
+    t: Array  # (N,) s, increasing, begins at the record's own time
+    u: Array  # (N, n_u) inputs in the FMU's units
+    y: Array  # (N, n_y) measured outputs in the FMU's units
+    fit: BoolArray  # (N,) samples used to identify
+    test: BoolArray  # (N,) samples held out
+
+
+@dataclass(frozen=True)
+class Record:
+    """All runs of an experiment.
+
+    One file gives one run with both masks; two files give run 0 (all fit) and run 1 (all test).
+    """
+
+    runs: tuple[Run, ...]
+    inputs: tuple[str, ...]  # the columns of u
+    outputs: tuple[str, ...]  # the columns of y
+    noise_std: Array  # (n_y,) in the FMU's units, nan where not declared
+    notes: tuple[Note, ...] = ()

@@ -1,0 +1,1 @@
+"""One-degree-of-freedom electromechanical drive."""

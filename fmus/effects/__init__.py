@@ -1,0 +1,19 @@
+"""Effects by kind. Each file of this folder that defines an Effect is one; there is no other list."""
+
+import sys
+
+from fmus.effects.effect import Effect
+from fmus.errors import BadInput, did_you_mean
+from fmus.registry import classes_in
+
+EFFECTS: dict[str, type[Effect]] = {c.kind: c for c in classes_in(sys.modules[__name__], Effect)}
+
+
+def parse_effect(text: str) -> tuple[type[Effect], str]:
+    """Read "kind@location"; BadInput where the kind is not known or the location is missing."""
+    kind, at, location = text.partition("@")
+    if not at or not location:
+        raise BadInput(f"effect '{text}': write KIND@LOCATION, for example viscous_damping@roller")
+    if kind not in EFFECTS:
+        raise BadInput(f"effect '{text}': kind '{kind}' is not known; {did_you_mean(kind, EFFECTS)}")
+    return EFFECTS[kind], location

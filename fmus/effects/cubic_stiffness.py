@@ -1,0 +1,20 @@
+"""Cubic stiffness: a spring that hardens or softens with its deflection.
+
+In data: higher harmonics that grow with amplitude, a natural frequency that moves with it.
+"""
+
+from fmus.effects.effect import Effect
+from fmus.variables import Expr, Parameter
+
+
+class CubicStiffness(Effect):
+    """F = -k_3 q^3."""
+
+    kind = "cubic_stiffness"
+    amplitudes = ("k_3",)
+    restoring = True
+    k_3 = Parameter("{F}/{q}3", doc="cubic stiffness, negative where the spring softens")
+
+    def force(self, q: Expr, v: Expr) -> Expr:
+        """See Effect.force."""
+        return -self.k_3 * q**3

@@ -1,0 +1,117 @@
+"""Open an FMU file safely: checked zip, model description, folder of its own that goes with it."""
+
+import shutil
+import tempfile
+import zipfile
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Any, Self
+
+import fmpy
+from fmpy.model_description import read_model_description
+
+from fmus.errors import BadInput
+from fmus.host.description import FmuDescription, FmuVariable
+
+
+class Archive:
+    """An unpacked FMU; several instances can run from one. BadInput where it cannot be used here."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        names = _checked_names(self.path)
+        self.folder = Path(tempfile.mkdtemp(prefix="railfmi_fmu_"))
+        try:
+            with zipfile.ZipFile(self.path) as packed:
+                packed.extractall(self.folder)
+            self.description = _description(self.path, self.folder)
+            _check_platform(self.path, self.description, names)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Delete the folder."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def describe(path: str | Path) -> FmuDescription:
+    """The description of an FMU file."""
+    with Archive(path) as archive:
+        return archive.description
+
+
+def _checked_names(path: Path) -> list[str]:
+    if not path.is_file():
+        raise BadInput(f"{path}: no such FMU file; build one with 'railfmi build' or mend the path")
+    try:
+        with zipfile.ZipFile(path) as packed:
+            names = packed.namelist()
+            broken = packed.testzip()
+    except (zipfile.BadZipFile, OSError) as error:
+        raise BadInput(f"{path}: not a readable zip file, so no FMU ({error}); get it again") from error
+    if broken:
+        raise BadInput(f"{path}: '{broken}' in it is damaged; get the FMU again")
+    for name in names:
+        parts = PurePosixPath(name.replace("\\", "/")).parts
+        if ".." in parts or name.startswith(("/", "\\")) or ":" in name:
+            raise BadInput(f"{path}: holds the path '{name}', which leads outside; do not use this file")
+    if "modelDescription.xml" not in names:
+        raise BadInput(f"{path}: has no modelDescription.xml, so it is no FMU")
+    return names
+
+
+def _description(path: Path, folder: Path) -> FmuDescription:
+    try:
+        model = read_model_description(str(folder), validate=False)
+    except Exception as error:
+        line = " ".join(str(error).split())
+        raise BadInput(f"{path}: its modelDescription.xml cannot be read ({line[:200]})") from error
+    if model.coSimulation is None:
+        raise BadInput(f"{path}: is not for co-simulation; export it again as a co-simulation FMU")
+    variables = {v.name: _variable(v) for v in model.modelVariables if v.type in ("Real", "Float64")}
+    return FmuDescription(
+        name=model.modelName,
+        fmi_version=model.fmiVersion,
+        identifier=model.coSimulation.modelIdentifier,
+        guid=model.guid or model.instantiationToken,
+        variables=variables,
+    )
+
+
+def _variable(v: Any) -> FmuVariable:
+    kind = v.declaredType
+    return FmuVariable(
+        name=v.name,
+        reference=int(v.valueReference),
+        causality=v.causality or "local",
+        variability=v.variability or "continuous",
+        initial=v.initial,
+        unit=v.unit or (kind.unit if kind else None),
+        start=_number(v.start),
+        min=_number(v.min),
+        max=_number(v.max),
+        nominal=_number(v.nominal),
+        description=v.description or "",
+    )
+
+
+def _number(text: Any) -> float | None:
+    return None if text in (None, "") else float(text)
+
+
+def _check_platform(path: Path, description: FmuDescription, names: list[str]) -> None:
+    here = fmpy.platform_tuple if description.fmi_version.startswith("3") else fmpy.platform
+    held = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") >= 2})
+    library = f"binaries/{here}/{description.identifier}{fmpy.sharedLibraryExtension}"
+    if library not in names:
+        has = ", ".join(held) or "none"
+        raise BadInput(f"{path}: has no binary for this platform ({here}); it holds {has}")

@@ -1,0 +1,58 @@
+"""What an FMU says of itself, reduced to what its users here need."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Causality = Literal["parameter", "calculatedParameter", "input", "output", "local", "independent"]
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """One Real variable of an FMU; numbers are in `unit`, None where the FMU says nothing."""
+
+    name: str
+    reference: int
+    causality: Causality
+    variability: str
+    initial: str | None
+    unit: str | None
+    start: float | None
+    min: float | None
+    max: float | None
+    nominal: float | None
+    description: str
+
+
+@dataclass(frozen=True)
+class FmuDescription:
+    """Name, FMI version and Real variables of an FMU, in the order of its model description."""
+
+    name: str
+    fmi_version: str
+    identifier: str
+    guid: str
+    variables: dict[str, FmuVariable]
+
+    def of(self, *causalities: Causality) -> list[str]:
+        """Names of the variables of the given causalities."""
+        return [v.name for v in self.variables.values() if v.causality in causalities]
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the inputs."""
+        return self.of("input")
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the outputs."""
+        return self.of("output")
+
+    @property
+    def parameters(self) -> list[str]:
+        """Names of the parameters that can be set."""
+        return self.of("parameter")
+
+    @property
+    def states(self) -> list[str]:
+        """Names of the outputs whose start value sets a state (`initial="exact"`)."""
+        return [v.name for v in self.variables.values() if v.causality == "output" and v.initial == "exact"]

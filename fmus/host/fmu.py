@@ -1,0 +1,132 @@
+"""One FMU by the names of its variables: restart from any state, step, read, run."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.archive import Archive
+from fmus.host.description import FmuDescription
+from fmus.host.fmi2 import Array, CallFailed, Fmi2Instance
+
+
+class FmuError(RuntimeError):
+    """An FMU refused a call; the sentence says which and what it gave as the reason."""
+
+
+class Fmu:
+    """An instance of a co-simulation FMU.
+
+    source: an FMU file, or an Archive that stays open while its instances live.
+    BadInput where the file cannot be used, FmuError where the running FMU refuses a call.
+    """
+
+    def __init__(self, source: str | Path | Archive) -> None:
+        self._own = None if isinstance(source, Archive) else Archive(source)
+        archive = source if isinstance(source, Archive) else self._own
+        if archive is None:
+            raise BadInput("no FMU given")
+        self.description: FmuDescription = archive.description
+        self.name = archive.path.name
+        self.time = 0.0
+        try:
+            if not self.description.fmi_version.startswith("2."):
+                raise BadInput(
+                    f"{archive.path}: is FMI {self.description.fmi_version}; FMI 2.0 is read here"
+                )
+            self._instance = self._safely(Fmi2Instance, archive, self.description.name)
+        except BaseException:
+            if self._own:
+                self._own.close()
+            raise
+
+    def restart(self, t0: float = 0.0, **start: float) -> None:
+        """Reset, set states, parameters and inputs, initialise at time t0, s."""
+        self._safely(self._instance.initialise, self.references(start), list(start.values()), t0)
+        self.time = t0
+
+    def step(self, dt: float, **inputs: float) -> None:
+        """Set inputs (or tunable parameters) and advance by dt, s."""
+        self.set(**inputs)
+        self._safely(self._instance.step, self.time, dt)
+        self.time += dt
+
+    def set(self, **values: float) -> None:
+        """Set variables by name."""
+        self._safely(self._instance.set, self.references(values), list(values.values()))
+
+    def __getitem__(self, name: str) -> float:
+        return self.read([name])[0]
+
+    def read(self, names: Sequence[str]) -> list[float]:
+        """Values of variables by name."""
+        values: list[float] = self._safely(self._instance.get, self.references(names))
+        return values
+
+    def simulate(
+        self, t: Array, inputs: Mapping[str, Array], outputs: Sequence[str], start: Mapping[str, float]
+    ) -> Array:
+        """Restart at t[0] and run freely through t; outputs (N, n_y), the first row at t[0].
+
+        t: (N,) s, increasing. inputs: (N-1,) each, the value held over each step.
+        """
+        u = np.column_stack([*inputs.values()]) if inputs else np.empty((len(t) - 1, 0))
+        first = {n: float(v[0]) for n, v in inputs.items()}
+        self.restart(float(t[0]), **{**start, **first})
+        y0 = self.read(outputs)
+        run = self._instance.run
+        y = self._safely(run, t, u, self.references(inputs), self.references(outputs))
+        self.time = float(t[-1])
+        return np.vstack([y0, y])
+
+    def save(self) -> Any:
+        """The FMU's state, for `restore` and then `forget`."""
+        return self._safely(self._instance.state)
+
+    def restore(self, state: Any) -> None:
+        """Go back to a saved state; the caller keeps the time."""
+        self._safely(self._instance.restore, state)
+
+    def serialised(self, state: Any) -> bytes:
+        """A saved state as bytes."""
+        data: bytes = self._safely(self._instance.serialised, state)
+        return data
+
+    def deserialised(self, data: bytes) -> Any:
+        """A saved state from bytes."""
+        return self._safely(self._instance.deserialised, data)
+
+    def forget(self, state: Any) -> None:
+        """Free a saved state."""
+        self._safely(self._instance.forget, state)
+
+    def references(self, names: Sequence[str] | Mapping[str, Any]) -> list[int]:
+        """Value references of names; BadInput with the nearest name where one is not in the FMU."""
+        variables = self.description.variables
+        for name in names:
+            if name not in variables:
+                raise BadInput(f"{self.name}: has no variable '{name}'; {did_you_mean(name, variables)}")
+        return [variables[name].reference for name in names]
+
+    def close(self) -> None:
+        """Free the instance, and the unpacked file where it is this one's own."""
+        self._instance.close()
+        if self._own:
+            self._own.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _safely(self, call: Any, *args: Any) -> Any:
+        try:
+            return call(*args)
+        except CallFailed as error:
+            raise FmuError(f"{self.name}: {error}") from error

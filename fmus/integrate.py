@@ -1,0 +1,46 @@
+"""Fixed-step integrators as CasADi functions: step(x, u, p, dt) -> x, inputs held over the step."""
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import casadi as cs
+
+Method: TypeAlias = Callable[[cs.Function], cs.Function]
+
+
+def rk4(f: cs.Function) -> cs.Function:
+    """Classical Runge-Kutta method of order 4, for models without stiff parts."""
+    x, u, p, dt = _symbols(f)
+    k1 = f(x, u, p)
+    k2 = f(x + dt / 2 * k1, u, p)
+    k3 = f(x + dt / 2 * k2, u, p)
+    k4 = f(x + dt * k3, u, p)
+    return _step(x, u, p, dt, x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+
+
+def rodas3(f: cs.Function) -> cs.Function:
+    """Rosenbrock method of order 3, four stages, L-stable and stiffly accurate, with an exact Jacobian.
+
+    Sandu et al., "Benchmarking stiff ODE solvers for atmospheric chemistry problems II:
+    Rosenbrock solvers", Atmospheric Environment 31 (1997), 3459-3472; gamma = 1/2.
+    """
+    x, u, p, dt = _symbols(f)
+    w = 2 / dt * cs.SX.eye(x.numel()) - cs.jacobian(f(x, u, p), x)
+
+    def solve(rhs: cs.SX) -> cs.SX:
+        return cs.solve(w, rhs)
+
+    k1 = solve(f(x, u, p))
+    k2 = solve(f(x, u, p) + 4 / dt * k1)
+    k3 = solve(f(x + 2 * k1, u, p) + (k1 - k2) / dt)
+    k4 = solve(f(x + 2 * k1 + k3, u, p) + (k1 - k2 - 8 / 3 * k3) / dt)
+    return _step(x, u, p, dt, x + 2 * k1 + k3 + k4)
+
+
+def _symbols(f: cs.Function) -> tuple[cs.SX, cs.SX, cs.SX, cs.SX]:
+    x, u, p = (cs.SX.sym(f.name_in(i), f.size1_in(i)) for i in range(3))
+    return x, u, p, cs.SX.sym("dt")
+
+
+def _step(x: cs.SX, u: cs.SX, p: cs.SX, dt: cs.SX, x1: cs.SX) -> cs.Function:
+    return cs.Function("step", [x, u, p, dt], [cs.cse(x1)], ["x", "u", "p", "dt"], ["x1"])

@@ -1,0 +1,134 @@
+"""The seam: a model is a table of variables and CasADi expressions.
+
+A model class declares its variables as class attributes and gives `derivatives` and `outputs` as
+expressions of the symbols that the same names stand for on an instance. From that one declaration
+come every FMU, the model description, the parameter tables and the Jacobians.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import casadi as cs
+
+from fmus.errors import BadInput, did_you_mean
+from fmus.integrate import Method, rk4
+from fmus.variables import Expr, Input, Output, Parameter, Rate, State, Variable
+
+if TYPE_CHECKING:
+    from fmus.effects.effect import Effect
+
+
+@dataclass(frozen=True)
+class Port:
+    """A place where a generalised force acts: its conjugate motion, and how it enters the inputs.
+
+    forces: gain of the force on each `*_ext` input (virtual work: d(displacement)/d(coordinate)).
+    `turns` says that the displacement is an angle or way that grows without bound, so that a
+    restoring force from it makes no sense.
+    """
+
+    displacement: Expr
+    velocity: Expr
+    forces: Mapping[str, float | Expr]
+    motion: Literal["rotation", "translation"] = "translation"
+    turns: bool = False
+
+
+class Model(ABC):
+    """A dynamic model x' = f(x, u, p), y = h(x, u, p), with effects built in at its ports."""
+
+    name: ClassVar[str]
+    step_size: ClassVar[float]  # s, the longest internal step
+    method: ClassVar[Method] = rk4
+
+    def __init__(self, effects: Iterable[tuple[type[Effect], str]] = ()) -> None:
+        self.variables: dict[str, Variable] = declared(type(self))
+        self.symbols: dict[str, Expr] = {
+            n: cs.SX.sym(n) for n, v in self.variables.items() if not _computed(v)
+        }
+        self.effects = tuple(effects)
+        self.free_symbols = dict(self.symbols)
+        added: dict[str, list[Expr]] = {}
+        for effect, location in self.effects:
+            for name, force in self._build_in(effect, location).items():
+                added.setdefault(name, []).append(force)
+        for name, forces in added.items():
+            self.symbols[name] = self.symbols[name] + sum(forces)
+
+    @abstractmethod
+    def derivatives(self) -> dict[str, Expr]:
+        """Time derivative of each state, by name."""
+
+    def outputs(self) -> dict[str, Expr]:
+        """Expression of each output, by name; rates of states are filled in from `derivatives`."""
+        return {}
+
+    def ports(self) -> dict[str, Port]:
+        """Locations at which an effect can act, by the contract's names."""
+        return {}
+
+    def of(self, *kinds: type[Variable]) -> list[Variable]:
+        """Variables of the given kinds, in the order of declaration."""
+        return [v for v in self.variables.values() if isinstance(v, kinds)]
+
+    def _build_in(self, effect: type[Effect], location: str) -> dict[str, Expr]:
+        port = self.ports().get(location)
+        if port is None:
+            raise BadInput(f"{self.name} has no location '{location}'; {did_you_mean(location, self.ports())}")
+        if not effect.fits(port):
+            raise BadInput(f"{effect.kind} makes no sense at '{location}' of {self.name}: it turns freely")
+        symbols = {}
+        for parameter in effect.parameters(port.motion):
+            name = effect.name_at(location, parameter.name)
+            self.variables[name] = replace(parameter, name=name)
+            symbols[parameter.name] = self.symbols[name] = self.free_symbols[name] = cs.SX.sym(name)
+        force = effect(symbols).force(port.displacement, port.velocity)
+        return {name: gain * force for name, gain in port.forces.items()}
+
+
+def declared(model: type[Model]) -> dict[str, Variable]:
+    """Variables of a model class by name, states first, then inputs, parameters, outputs."""
+    found = {n: v for c in reversed(model.__mro__) for n, v in vars(c).items() if isinstance(v, Variable)}
+    order = (State, Input, Parameter, Output)
+    return {n: v for kind in order for n, v in found.items() if isinstance(v, kind)}
+
+
+def _computed(variable: Variable) -> bool:
+    return isinstance(variable, Output)
+
+
+@dataclass(frozen=True)
+class Equations:
+    """A model as CasADi functions of column vectors: x, u, p in the order of `model.of(...)`.
+
+    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> x after dt of one internal step.
+    """
+
+    f: cs.Function
+    h: cs.Function
+    step: cs.Function
+
+
+def equations(model: Model) -> Equations:
+    """Compile a model; ValueError where an expression is missing, left over or depends on nothing known."""
+    x, u, p = (
+        cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
+    )
+    dot = _complete(model, "derivatives", model.derivatives(), [v.name for v in model.of(State)])
+    given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)} | model.outputs()
+    y = _complete(model, "outputs", given, [v.name for v in model.of(Output)])
+    names = ["x", "u", "p"]
+    f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])
+    h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
+    return Equations(f, h, type(model).method(f))
+
+
+def _complete(model: Model, what: str, given: dict[str, Expr], names: list[str]) -> dict[str, Expr]:
+    wrong = set(given) ^ set(names)
+    if wrong:
+        raise ValueError(f"{model.name}.{what}: {', '.join(sorted(wrong))} declared or given, but not both")
+    return {n: given[n] for n in names}

@@ -1,0 +1,1 @@
+"""Torsional tram-wheel test rig with two motors."""

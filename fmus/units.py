@@ -1,0 +1,144 @@
+"""Unit strings such as 'kg.m2', 'N.m.s/rad' or 'km/h': what they are in SI, and how to convert.
+
+The radian counts as a dimension of its own, so that turns and angles cannot be mixed up.
+"""
+
+import re
+from functools import cache
+from tokenize import TokenError
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import pint
+from numpy.typing import ArrayLike, NDArray
+
+from fmus.errors import BadInput, did_you_mean
+
+# offered when a unit is not known
+COMMON = (
+    "1 % rad deg rad/s rpm 1/min Hz s m mm m/s km/h m/s2 g_0 kg kg.m2 N kN N.s/m N.m N.m.s/rad V A Ohm degC"
+)
+
+# pint knows far more names ('Nm' is a yarn, 'rads' a dose): only these may stand in a unit
+_ATOM = re.compile(
+    "[nuµmcdkMG]?(m|s|g|A|K|mol|cd|rad|Hz|N|Pa|J|W|V|F|Ohm|Ω|S|Wb|T|H|bar)"
+    "|deg|°|turn|rpm|min|h|t|degC|g_0|L|in|ft|mph|lb|lbf|psi|degF"
+)
+
+# pint's base units by the attribute that FMI gives them in <BaseUnit>
+_FMI_BASE = MappingProxyType(
+    {
+        "kilogram": "kg",
+        "meter": "m",
+        "second": "s",
+        "ampere": "A",
+        "kelvin": "K",
+        "mole": "mol",
+        "candela": "cd",
+        "radian": "rad",
+    }
+)
+_GRAMMAR = re.compile(r"[\w%°²³./*^()-]+")
+_WORD = re.compile(r"°|(?:[^\W\d²³]|_)\w*")
+_NOT_PARSED = (pint.PintError, TokenError, ValueError, TypeError, AssertionError, ArithmeticError)
+
+
+class BaseUnit(NamedTuple):
+    """A unit in SI: `exponents` by FMI's names (kg m s A K mol cd rad), value in SI = factor * v + offset."""
+
+    exponents: dict[str, int]
+    factor: float
+    offset: float
+
+
+@cache
+def _registry() -> pint.UnitRegistry[float]:
+    """The one registry; made at first use because reading its definitions takes 0.1 s."""
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry()
+    registry.define("@alias ohm = Ohm")
+    return registry
+
+
+def _pint_text(unit: str) -> str:
+    """The unit in pint's grammar: 'kg.m2' -> 'kg*m**2', 's-1' -> 's**-1'."""
+    text = re.sub(r"\s*([./*^·])\s*", r"\1", unit.strip()).replace("·", "*")
+    text = re.sub(r"(?<!\d)\.|\.(?!\d)", "*", text)
+    return re.sub(r"([^\W\d_])(-?\d+)", r"\1**\2", text)
+
+
+def _words(text: str) -> list[str]:
+    """The names in a unit, without their powers: 'kg*m**2' -> ['kg', 'm']."""
+    return [word.rstrip("²³") for word in _WORD.findall(text)]
+
+
+def base_exponents(unit: str) -> BaseUnit:
+    """SI base exponents (only those that are not 0), factor and offset of a unit; BadInput if unknown."""
+    text = _pint_text(unit)
+    try:
+        if not (_GRAMMAR.fullmatch(text) and all(_ATOM.fullmatch(w) for w in _words(text))):
+            raise ValueError(text)
+        registry = _registry()
+        parsed = registry.parse_units(text)
+        zero, one = (registry.Quantity(v, parsed).to_base_units() for v in (0.0, 1.0))
+        exponents = {_FMI_BASE[name]: float(power.real) for name, power in one.unit_items()}
+    except (*_NOT_PARSED, KeyError) as error:
+        raise BadInput(f"unit '{unit}' is not known; {did_you_mean(unit, COMMON.split())}") from error
+    if not all(power.is_integer() for power in exponents.values()):
+        raise BadInput(f"unit '{unit}' has a fractional power; FMI knows whole powers only")
+    offset = float(zero.magnitude)
+    whole = {name: int(power) for name, power in exponents.items() if power}
+    return BaseUnit(whole, float(one.magnitude) - offset, offset)
+
+
+def conversion(unit: str, target_unit: str, where: str) -> tuple[float, float]:
+    """Factor and offset with value in `target_unit` = factor * value in `unit` + offset.
+
+    `where` (file and key) begins the message of the BadInput for unknown or incompatible units.
+    The same name on both sides passes even if it is nobody's unit, as 'ticks'.
+    """
+    if unit == target_unit:
+        return 1.0, 0.0
+    try:
+        source = base_exponents(unit)
+    except BadInput as error:
+        raise BadInput(f"{where}: {error}") from error
+    try:
+        target = base_exponents(target_unit)
+    except BadInput as error:
+        raise BadInput(
+            f"{where}: unit '{unit}' cannot be compared with the FMU's unit '{target_unit}', which is not "
+            f'known; convert the column and write unit = "{target_unit}"'
+        ) from error
+    clash = _clash(unit, source, target_unit, target)
+    if clash:
+        raise BadInput(f"{where}: unit '{unit}' does not fit '{target_unit}'; {clash}")
+    return source.factor / target.factor, (source.offset - target.offset) / target.factor
+
+
+def to_si(values: ArrayLike, unit: str, target_unit: str, where: str) -> NDArray[np.float64]:
+    """Values in `unit` -> values in `target_unit`, the unit of the FMU's variable (SI for our own).
+
+    values: (n,) or any shape, kept; `where` begins the message of the BadInput for units that do not fit.
+    """
+    factor, offset = conversion(unit, target_unit, where)
+    return np.asarray(values, dtype=np.float64) * factor + offset
+
+
+def _clash(unit: str, source: BaseUnit, target_unit: str, target: BaseUnit) -> str:
+    """Why the two cannot be converted, with the way out; empty if they can."""
+    rads = [b.exponents.get("rad", 0) for b in (source, target)]
+    rest = [{k: v for k, v in b.exponents.items() if k != "rad"} for b in (source, target)]
+    if rest[0] != rest[1]:
+        hint = "; an acceleration in g is 'g_0'" if unit == "g" else ""
+        return f"give the column in a unit of the same kind{hint}"
+    if rads[0] == rads[1]:
+        return ""
+    # without rad is sloppy but clear ("1/s" for "rad/s"), unless it may count turns (Hz, 1/min)
+    if 0 not in rads:
+        return "the radian stands on the other side of the fraction; write the unit the column really has"
+    bare, base, other = (unit, source, target_unit) if rads[0] == 0 else (target_unit, target, unit)
+    counts = "Hz" in bare or (set(base.exponents) == {"s"} and base.factor != 1.0)
+    if counts or "rpm" in other or "turn" in other:
+        return "a turn is 2 pi rad: write 'rpm' or 'rad/s' if that is meant, or multiply the column by 2 pi"
+    return ""
