@@ -22,20 +22,25 @@ if TYPE_CHECKING:
     from fmus.effects.effect import Effect
 
 
+UNITS = {  # of generalised force and displacement, by kind of motion
+    "rotation": {"F": "N.m", "q": "rad"},
+    "translation": {"F": "N", "q": "m"},
+}
+
+
 @dataclass(frozen=True)
 class Port:
     """A place where a generalised force acts: its conjugate motion, and how it enters the inputs.
 
     forces: gain of the force on each `*_ext` input (virtual work: d(displacement)/d(coordinate)).
-    `turns` says that the displacement is an angle or way that grows without bound, so that a
-    restoring force from it makes no sense.
+    place: whether the displacement keeps to a rest position, turns on, or is only slip added up.
     """
 
     displacement: Expr
     velocity: Expr
     forces: Mapping[str, float | Expr]
     motion: Literal["rotation", "translation"] = "translation"
-    turns: bool = False
+    place: Literal["rests", "turns", "slips"] = "rests"
 
 
 class Model(ABC):
@@ -45,19 +50,21 @@ class Model(ABC):
     step_size: ClassVar[float]  # s, the longest internal step
     method: ClassVar[Method] = rk4
 
-    def __init__(self, effects: Iterable[tuple[type[Effect], str]] = ()) -> None:
+    def __init__(self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False) -> None:
+        """effects: laws and their locations; probes: open every location by a force input and its motion."""
         self.variables: dict[str, Variable] = declared(type(self))
         self.symbols: dict[str, Expr] = {
             n: cs.SX.sym(n) for n, v in self.variables.items() if not _computed(v)
         }
         self.effects = tuple(effects)
         self.free_symbols = dict(self.symbols)
-        added: dict[str, list[Expr]] = {}
-        for effect, location in self.effects:
-            for name, force in self._build_in(effect, location).items():
-                added.setdefault(name, []).append(force)
-        for name, forces in added.items():
-            self.symbols[name] = self.symbols[name] + sum(forces)
+        self.motions: dict[str, Expr] = {}  # outputs of the probes
+        at = self.ports()
+        forces = [self._build_in(effect, location, at) for effect, location in self.effects]
+        forces += [self._probe(location, port) for location, port in at.items()] if probes else []
+        for acting in forces:
+            for name, force in acting.items():
+                self.symbols[name] = self.symbols[name] + force
 
     @abstractmethod
     def derivatives(self) -> dict[str, Expr]:
@@ -75,19 +82,36 @@ class Model(ABC):
         """Variables of the given kinds, in the order of declaration."""
         return [v for v in self.variables.values() if isinstance(v, kinds)]
 
-    def _build_in(self, effect: type[Effect], location: str) -> dict[str, Expr]:
-        port = self.ports().get(location)
+    def _build_in(self, effect: type[Effect], location: str, at: dict[str, Port]) -> dict[str, Expr]:
+        port = at.get(location)
         if port is None:
-            raise BadInput(f"{self.name} has no location '{location}'; {did_you_mean(location, self.ports())}")
+            raise BadInput(f"{self.name} has no location '{location}'; {did_you_mean(location, at)}")
         if not effect.fits(port):
-            raise BadInput(f"{effect.kind} makes no sense at '{location}' of {self.name}: it turns freely")
-        symbols = {}
-        for parameter in effect.parameters(port.motion):
-            name = effect.name_at(location, parameter.name)
-            self.variables[name] = replace(parameter, name=name)
-            symbols[parameter.name] = self.symbols[name] = self.free_symbols[name] = cs.SX.sym(name)
+            raise BadInput(f"{effect.kind} makes no sense at '{location}' of {self.name}, which {port.place}")
+        symbols = {
+            parameter.name: self._add(replace(parameter, name=effect.name_at(location, parameter.name)))
+            for parameter in effect.parameters(port.motion)
+        }
         force = effect(symbols).force(port.displacement, port.velocity)
         return {name: gain * force for name, gain in port.forces.items()}
+
+    def _probe(self, location: str, port: Port) -> dict[str, Expr]:
+        unit = UNITS[port.motion]
+        force = self._add(Input(unit["F"], doc=f"probe: force at {location}", name=f"{location}_force"))
+        for name, expression, u in (
+            (f"{location}_velocity", port.velocity, f"{unit['q']}/s"),
+            (f"{location}_displacement", port.displacement, unit["q"]),
+        ):
+            self.variables[name] = Output(u, doc=f"probe: motion at {location}", name=name)
+            self.motions[name] = expression
+        return {name: gain * force for name, gain in port.forces.items()}
+
+    def _add(self, variable: Variable) -> Expr:
+        if variable.name in self.variables:
+            raise BadInput(f"{self.name}: '{variable.name}' is built in twice; name each effect once")
+        self.variables[variable.name] = variable
+        self.symbols[variable.name] = self.free_symbols[variable.name] = cs.SX.sym(variable.name)
+        return self.symbols[variable.name]
 
 
 def declared(model: type[Model]) -> dict[str, Variable]:
@@ -119,7 +143,8 @@ def equations(model: Model) -> Equations:
         cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
     )
     dot = _complete(model, "derivatives", model.derivatives(), [v.name for v in model.of(State)])
-    given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)} | model.outputs()
+    given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)}
+    given |= model.outputs() | model.motions
     y = _complete(model, "outputs", given, [v.name for v in model.of(Output)])
     names = ["x", "u", "p"]
     f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])

@@ -5,7 +5,7 @@ from fmus.errors import BadInput, did_you_mean
 from fmus.model import Model
 from fmus.registry import classes_in
 
-MODELS: dict[str, type[Model]] = {c.name.lower(): c for c in classes_in(fmus, Model)}
+MODELS: dict[str, type[Model]] = {c.name.lower(): c for c in classes_in(fmus, Model, "fmus.*.model")}
 
 
 def model_class(name: str) -> type[Model]:

@@ -20,11 +20,13 @@ COMMON = (
     "1 % rad deg rad/s rpm 1/min Hz s m mm m/s km/h m/s2 g_0 kg kg.m2 N kN N.s/m N.m N.m.s/rad V A Ohm degC"
 )
 
-# pint knows far more names ('Nm' is a yarn, 'rads' a dose): only these may stand in a unit
-_ATOM = re.compile(
-    "[nuµmcdkMG]?(m|s|g|A|K|mol|cd|rad|Hz|N|Pa|J|W|V|F|Ohm|Ω|S|Wb|T|H|bar)"
-    "|deg|°|turn|rpm|min|h|t|degC|g_0|L|in|ft|mph|lb|lbf|psi|degF"
+# pint knows far more names ('Nm' is a yarn, 'rads' a dose), and works out any power: only these may stand
+_NAME = (
+    "[nuµmcdkMG]?(?:m|s|g|A|K|mol|cd|rad|Hz|N|Pa|J|W|V|F|Ohm|Ω|S|Wb|T|H|bar)"
+    "|%|deg|°|turn|rpm|min|h|t|degC|g_0|L|in|ft|mph|lb|lbf|psi|degF"
 )
+_POWER = r"(?:\*\*|\^)-?[0-9]|[²³]"
+_GRAMMAR = re.compile(rf"(?:[()*/]|(?<!\w)(?:1|(?:{_NAME})(?:{_POWER})?)(?!\w))+")
 
 # pint's base units by the attribute that FMI gives them in <BaseUnit>
 _FMI_BASE = MappingProxyType(
@@ -39,8 +41,6 @@ _FMI_BASE = MappingProxyType(
         "radian": "rad",
     }
 )
-_GRAMMAR = re.compile(r"[\w%°²³./*^()-]+")
-_WORD = re.compile(r"°|(?:[^\W\d²³]|_)\w*")
 _NOT_PARSED = (pint.PintError, TokenError, ValueError, TypeError, AssertionError, ArithmeticError)
 
 
@@ -62,33 +62,24 @@ def _registry() -> pint.UnitRegistry[float]:
 
 def _pint_text(unit: str) -> str:
     """The unit in pint's grammar: 'kg.m2' -> 'kg*m**2', 's-1' -> 's**-1'."""
-    text = re.sub(r"\s*([./*^·])\s*", r"\1", unit.strip()).replace("·", "*")
-    text = re.sub(r"(?<!\d)\.|\.(?!\d)", "*", text)
-    return re.sub(r"([^\W\d_])(-?\d+)", r"\1**\2", text)
-
-
-def _words(text: str) -> list[str]:
-    """The names in a unit, without their powers: 'kg*m**2' -> ['kg', 'm']."""
-    return [word.rstrip("²³") for word in _WORD.findall(text)]
+    text = re.sub(r"\s*([./*^·])\s*", r"\1", unit.strip())
+    return re.sub(r"([^\W\d_])(-?[0-9]+)", r"\1**\2", re.sub("[.·]", "*", text))
 
 
 def base_exponents(unit: str) -> BaseUnit:
     """SI base exponents (only those that are not 0), factor and offset of a unit; BadInput if unknown."""
     text = _pint_text(unit)
     try:
-        if not (_GRAMMAR.fullmatch(text) and all(_ATOM.fullmatch(w) for w in _words(text))):
+        if not _GRAMMAR.fullmatch(text):
             raise ValueError(text)
         registry = _registry()
         parsed = registry.parse_units(text)
         zero, one = (registry.Quantity(v, parsed).to_base_units() for v in (0.0, 1.0))
-        exponents = {_FMI_BASE[name]: float(power.real) for name, power in one.unit_items()}
+        exponents = {_FMI_BASE[name]: int(power.real) for name, power in one.unit_items() if power}
     except (*_NOT_PARSED, KeyError) as error:
         raise BadInput(f"unit '{unit}' is not known; {did_you_mean(unit, COMMON.split())}") from error
-    if not all(power.is_integer() for power in exponents.values()):
-        raise BadInput(f"unit '{unit}' has a fractional power; FMI knows whole powers only")
     offset = float(zero.magnitude)
-    whole = {name: int(power) for name, power in exponents.items() if power}
-    return BaseUnit(whole, float(one.magnitude) - offset, offset)
+    return BaseUnit(exponents, float(one.magnitude) - offset, offset)
 
 
 def conversion(unit: str, target_unit: str, where: str) -> tuple[float, float]:

@@ -1,153 +1,21 @@
 """An experiment: measured data and what is declared about it, read from its experiment.toml.
 
-The keys are those of the classes below; `load_experiment` turns a file into an Experiment, `check_names`
-holds it against the FMU. All that is wrong with a file is a BadInput of one line.
+`load_experiment` turns a file into an Experiment, `check_names` holds it against the FMU. All that is
+wrong with a file is a BadInput of one line.
 """
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError, model_validator
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from fmus.errors import BadInput, did_you_mean
-from fmus.host.description import Causality, FmuDescription, FmuVariable
-from fmus.models import model_class
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < float("inf")
-
-
-def _interval(value: object) -> tuple[float, float]:
-    if not (isinstance(value, list | tuple) and len(value) == 2 and all(map(_is_number, value))):
-        raise ValueError(f"must be two numbers [lower, upper], not {value!r}")
-    if not value[0] < value[1]:
-        raise ValueError(f"must increase, [lower, upper], not {list(value)}")
-    return float(value[0]), float(value[1])
-
-
-def _column_or_number(value: object) -> str | float:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int | float) and _is_number(value):
-        return float(value)
-    raise ValueError(f"must be a column name in quotes or a number, not {value!r}")
-
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-Interval = Annotated[tuple[float, float], PlainValidator(_interval)]
-Channel = Annotated[str | float, PlainValidator(_column_or_number)]
-
-
-class Table(BaseModel):
-    """A table of the file: its keys are the fields, no others."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys_only(cls, table: Any) -> Any:
-        for key in table if isinstance(table, dict) else ():
-            if key not in cls.model_fields:
-                raise ValueError(f"key '{key}' is not known; {did_you_mean(key, cls.model_fields)}")
-        return table
-
-
-class Split(Table):
-    """Which data identify and which are held out: two windows [s] of one file, or two files."""
-
-    identify: Interval | None = None
-    test: Interval | None = None
-    identify_data: str | None = None
-    test_data: str | None = None
-
-    @model_validator(mode="after")
-    def _windows_or_files(self) -> Self:
-        given = self.model_fields_set
-        if given not in ({"identify", "test"}, {"identify_data", "test_data"}):
-            raise ValueError("needs either 'identify' and 'test', or 'identify_data' and 'test_data'")
-        if self.identify and self.test:
-            first, second = sorted((self.identify, self.test))
-            if second[0] < first[1]:
-                raise ValueError(f"'identify' and 'test' overlap from {second[0]:g} s to {first[1]:g} s")
-        return self
-
-
-class Output(Table):
-    """A measured output: its column, the column's unit, and the standard deviation of its noise in it."""
-
-    column: str
-    unit: str
-    noise_std: Positive | None = None
-
-
-class Derived(Table):
-    """A column made from another one: its time derivative by central differences."""
-
-    derivative: str
-
-
-class Port(Table):
-    """A location on a foreign FMU: a force input and the outputs conjugate to it."""
-
-    name: str
-    force: str
-    velocity: str
-    displacement: str | None = None
-
-
-class EstimatedParameter(Table):
-    """A parameter the filter estimates; start and bounds default to the declared and the FMU's."""
-
-    start: Number | None = None
-    std: Positive | None = None
-    bounds: Interval | None = None
-
-
-class EstimatedInput(Table):
-    """An unknown input: a random process of that standard deviation about that frequency [Hz]."""
-
-    std: Positive
-    frequency: Positive
-    rate_input: str | None = None
-
-
-class Estimate(Table):
-    """What the filter estimates beside the states it needs anyway; `rate` in Hz."""
-
-    parameters: dict[str, EstimatedParameter] = {}
-    states: tuple[str, ...] = ()
-    rate: Positive | None = None
-    inputs: dict[str, EstimatedInput] = {}
-
-
-class Declaration(Table):
-    """The keys of experiment.toml."""
-
-    id: str
-    model: str | None = None
-    fmu: str | None = None
-    data: str | None = None
-    time: str
-    split: Split | None = None
-    parameters: dict[str, Number] = {}
-    calibrate: dict[str, Interval] = {}
-    initial: dict[str, Number] = {}
-    inputs: dict[str, Channel] = {}
-    outputs: Annotated[dict[str, Output], Field(min_length=1)]
-    derived: dict[str, Derived] = {}
-    ports: tuple[Port, ...] = ()
-    estimate: Estimate | None = None
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        for problem in _contradictions(self):
-            raise ValueError(problem)
-        return self
+from fmus.host.description import FmuDescription, FmuVariable
+from scenarios.declaration import Declaration, Table
 
 
 class Experiment(Declaration):
@@ -174,30 +42,6 @@ class Experiment(Declaration):
         return (self.data_dir / (self.data or ""),)
 
 
-def _contradictions(d: Declaration) -> Iterator[str]:
-    """What each key for itself does not show."""
-    if (d.model is None) == (d.fmu is None):
-        yield "needs exactly one of the keys 'model' and 'fmu'"
-    if d.ports and d.model:
-        yield "[[ports]] are for a foreign 'fmu' only; our own models have theirs"
-    files = {d.split.identify_data, d.split.test_data} - {None} if d.split else set()
-    if not files and d.data is None:
-        yield "key 'data' is missing"
-    if files and d.data is not None and d.data not in files:
-        yield "key 'data' beside [split] identify_data and test_data; leave one of the two out"
-    made: set[str] = set()
-    for name, derived in d.derived.items():
-        if derived.derivative in d.derived and derived.derivative not in made:
-            yield f"[derived.{name}] derivative '{derived.derivative}' must be declared above it"
-        made.add(name)
-    names = [port.name for port in d.ports]
-    for name in sorted({n for n in names if names.count(n) > 1}):
-        yield f"[[ports]] name '{name}' is used twice"
-    unknown = d.estimate.inputs if d.estimate else {}
-    for name in unknown.keys() & d.inputs.keys():
-        yield f"input '{name}' stands in [inputs] and in [estimate.inputs]; it is either known or estimated"
-
-
 def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
     """The experiment in a file; data are read from `data_dir`, by default the file's own folder.
 
@@ -205,46 +49,156 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
     """
     file = Path(path)
     try:
-        with file.open("rb") as stream:
-            raw = tomllib.load(stream)
-        declared = Declaration.model_validate(raw)
-        if declared.model is not None:
-            model_class(declared.model)
+        declared = Declaration.model_validate(_read_toml(file))
+    except ValidationError as error:
+        raise BadInput(f"{file}: {_one_line(error)}") from None
+    if declared.model is not None:
+        _check_model(file, declared.model)
+    place: dict[str, Any] = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
+    return Experiment.model_construct(**dict(declared), **place)
+
+
+def _check_model(file: Path, name: str) -> None:
+    from fmus.models import model_class  # here because it loads CasADi, which a foreign FMU does without
+
+    try:
+        model_class(name)
+    except BadInput as error:
+        raise BadInput(f"{file}: key 'model': {error}") from error
+
+
+def _read_toml(file: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise BadInput(
             f"{file}: cannot be read ({error.strerror}); give the path of an experiment.toml"
         ) from error
     except UnicodeDecodeError as error:
         raise BadInput(f"{file}: is not UTF-8 text; save it as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{file}: is not valid TOML: {str(error).lower()}") from error
-    except ValidationError as error:
-        raise BadInput(f"{file}: {_one_line(error)}") from None
-    except BadInput as error:
-        raise BadInput(f"{file}: key 'model': {error}") from error
-    place = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
-    return Experiment.model_construct(**dict(declared), **place)
+    except ValueError as error:  # TOMLDecodeError, or a number too long for Python
+        raise BadInput(f"{file}: is not valid TOML: {error}") from error
 
 
 def _one_line(error: ValidationError) -> str:
-    """The first problem of a validation in one sentence, and how many more there are."""
-    problems = error.errors()
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return _sentence(problems[0]) + more
+    """The first problem of a validation in one sentence, and how many more there are.
+
+    Unknown keys go first: a misspelt key is also a missing one.
+    """
+    problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+    return " ".join(_sentence(problems[0]).split()) + _and_more(len(problems))
+
+
+def _and_more(problems: int) -> str:
+    return f" (and {problems - 1} more)" if problems > 1 else ""
 
 
 def _sentence(problem: ErrorDetails) -> str:
-    key = ".".join(str(part) for part in problem["loc"])
-    kind, value, message = problem["type"], problem["input"], problem["msg"]
-    if kind == "value_error":
-        ours = str(problem["ctx"]["error"])
-        table = isinstance(value, dict | Table)
-        return ours if not key else f"[{key}] {ours}" if table else f"key '{key}' {ours}"
+    """One problem found by pydantic, in the words of the file."""
+    loc, kind, value = problem["loc"], problem["type"], problem["input"]
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc).lstrip(".")
+    if kind == "extra_forbidden":
+        return f"key '{key}' is not known; {did_you_mean(str(loc[-1]), _table_at(loc).model_fields)}"
     if kind == "missing":
         return f"key '{key}' is missing"
+    if kind == "value_error":
+        ours = str(problem["ctx"]["error"])
+        if isinstance(value, dict):
+            return f"[{key}] {ours}" if key else ours
+        return f"key '{key}' {ours}"
+    said = problem["msg"].replace("Input should", "must").replace("a valid ", "a ")
     if kind in ("dict_type", "model_type"):
-        return f"key '{key}' must be a table, not {value!r}"
-    if key == "outputs":
-        return "needs at least one table [outputs.NAME]"
-    said = message.replace("Input should", "must").replace("a valid ", "a ")
-    return f"key '{key}' {said}, not {value!r}"
+        said = "must be a table"
+    if kind == "too_short":
+        said = "must hold at least one entry"
+    return f"key '{key}' {said}, not {str(value)[:60]!r}"
+
+
+def _table_at(loc: tuple[int | str, ...]) -> type[Table]:
+    """The table of a declaration in which the key at that place stands."""
+    table: type[Table] = Declaration
+    for part in loc:
+        if isinstance(part, str) and part in table.model_fields:
+            table = next(_tables_in(table.model_fields[part].annotation), table)
+    return table
+
+
+def _tables_in(annotation: Any) -> Iterator[type[Table]]:
+    """The classes of tables within a field's type, as Output in dict[str, Output]."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        yield annotation
+    yield from chain.from_iterable(_tables_in(argument) for argument in get_args(annotation))
+
+
+def check_names(experiment: Experiment, description: FmuDescription) -> None:
+    """Hold the names and values of an experiment against the FMU's own; BadInput for the first that fails."""
+    names, values = [*_wrong_names(experiment, description)], [*_wrong_values(experiment, description)]
+    problems = names + values
+    if problems:
+        raise BadInput(f"{experiment.file}: {problems[0]}{_and_more(len(problems))}")
+
+
+def _wrong_names(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
+    """Names that are not in the FMU or play another part there."""
+    for where, names, known, part in _parts(e, fmu):
+        for name in names:
+            if name in fmu.variables and name not in known:
+                causality = fmu.variables[name].causality
+                yield f"{where} '{name}' of {fmu.name} is not {part} (it is of causality {causality})"
+            elif name not in known:
+                yield f"{where} '{name}' is not {part} of {fmu.name}; {did_you_mean(name, known)}"
+
+
+Part = tuple[str, Iterable[str], list[str], str]
+
+
+def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
+    """Where names stand, these names, those valid there, and the part these play in the FMU."""
+    states = [v.name for v in fmu.variables.values() if _start_can_be_set(v)]
+    yield "[parameters]", e.parameters, fmu.parameters, "a parameter"
+    yield "[calibrate]", e.calibrate, fmu.parameters, "a parameter"
+    yield "[initial]", e.initial, states, "a state whose start can be set"
+    yield "[inputs]", e.inputs, fmu.inputs, "an input"
+    yield "[outputs]", e.outputs, fmu.outputs, "an output"
+    for port in e.ports:
+        yield f"[[ports]] '{port.name}' force", [port.force], fmu.inputs, "an input"
+        yield f"[[ports]] '{port.name}'", [port.velocity, port.displacement], fmu.outputs, "an output"
+    if e.estimate:
+        yield "[estimate] states", e.estimate.states, states, "a state whose start can be set"
+        yield "[estimate.parameters]", e.estimate.parameters, fmu.parameters, "a parameter"
+        yield "[estimate.inputs]", e.estimate.inputs, fmu.inputs, "an input"
+        rates = [i.rate_input for i in e.estimate.inputs.values() if i.rate_input]
+        yield "[estimate.inputs] rate_input", rates, fmu.inputs, "an input"
+
+
+def _start_can_be_set(v: FmuVariable) -> bool:
+    return v.causality in ("output", "local") and v.initial in ("exact", "approx", None)
+
+
+def _wrong_values(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
+    """Declared numbers and bounds outside the FMU's limits, and declared numbers outside their bounds."""
+    constants = {name: c for name, c in e.inputs.items() if not isinstance(c, str)}
+    for where, table in (("parameters", e.parameters), ("initial", e.initial), ("inputs", constants)):
+        for name, value in table.items():
+            yield from _outside(f"[{where}] {name} = {value:g}", (value, value), fmu.variables.get(name))
+    for name, (low, high) in e.calibrate.items():
+        variable = fmu.variables.get(name)
+        where = f"[calibrate] {name} = [{low:g}, {high:g}]"
+        yield from _outside(where, (low, high), variable)
+        declared = e.parameters.get(name, variable.start if variable else None)
+        if declared is not None and not low <= declared <= high:
+            yield f"{where} leaves out the declared value {declared:g}; widen the bounds or correct the value"
+    for name, unknown in (e.estimate.parameters if e.estimate else {}).items():
+        if unknown.bounds:
+            where = "[estimate.parameters] {} bounds = [{:g}, {:g}]".format(name, *unknown.bounds)
+            yield from _outside(where, unknown.bounds, fmu.variables.get(name))
+
+
+def _outside(where: str, interval: tuple[float, float], variable: FmuVariable | None) -> Iterator[str]:
+    """The sentence about an interval that exceeds the limits of its variable, if it does."""
+    if variable is None:
+        return
+    low = float("-inf") if variable.min is None else variable.min
+    high = float("inf") if variable.max is None else variable.max
+    if interval[0] < low or interval[1] > high:
+        yield f"{where} is outside the FMU's limits {low:g} to {high:g}; keep it within them"

@@ -12,7 +12,7 @@ class CubicStiffness(Effect):
 
     kind = "cubic_stiffness"
     amplitudes = ("k_3",)
-    restoring = True
+    places = ("rests",)
     k_3 = Parameter("{F}/{q}3", doc="cubic stiffness, negative where the spring softens")
 
     def force(self, q: Expr, v: Expr) -> Expr:

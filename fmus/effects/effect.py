@@ -7,13 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-from fmus.model import Port
+from fmus.model import UNITS, Port
 from fmus.variables import Expr, Parameter
-
-UNITS = {  # generalised force and displacement of each kind of motion
-    "rotation": {"F": "N.m", "q": "rad"},
-    "translation": {"F": "N", "q": "m"},
-}
 
 
 class Effect(ABC):
@@ -26,7 +21,7 @@ class Effect(ABC):
 
     kind: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
-    restoring: ClassVar[bool] = False  # needs a displacement with a rest position
+    places: ClassVar[tuple[str, ...]] = ("rests", "turns", "slips")  # where the law makes sense
 
     def __init__(self, symbols: Mapping[str, Expr]) -> None:
         self.symbols = symbols
@@ -44,7 +39,7 @@ class Effect(ABC):
     @classmethod
     def fits(cls, port: Port) -> bool:
         """Whether the law makes physical sense at a port."""
-        return not (cls.restoring and port.turns)
+        return port.place in cls.places
 
     @classmethod
     def name_at(cls, location: str, parameter: str) -> str:

@@ -14,6 +14,7 @@ class PeriodicForce(Effect):
 
     kind = "periodic_force"
     amplitudes = ("F_sin", "F_cos")
+    places = ("rests", "turns")
     F_sin = Parameter("{F}", doc="part in phase with sin(order q)")
     F_cos = Parameter("{F}", doc="part in phase with cos(order q)")
     order = Parameter("rad/{q}", 1.0, min=0.0, doc="cycles per turn; rad per metre of way on a line")

@@ -132,6 +132,4 @@ def _repack(source: Path, target: Path) -> None:
     """Copy a zip with sorted names and no dates."""
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
         for name in sorted(old.namelist()):
-            new.writestr(
-                zipfile.ZipInfo(name, ZIP_DATE), old.read(name), compress_type=zipfile.ZIP_DEFLATED
-            )
+            new.writestr(zipfile.ZipInfo(name, ZIP_DATE), old.read(name), compress_type=zipfile.ZIP_DEFLATED)

@@ -20,7 +20,9 @@ from pythonfmu.enums import Fmi2Initial, Fmi2Status, Fmi2Variability
 
 HERE = Path(__file__).parent
 MODEL: dict[str, Any] = json.loads((HERE / "model.json").read_text())
-STEP, OUTPUTS = (cs.Function.deserialize((HERE / f"{name}.casadi").read_text()) for name in ("step", "outputs"))
+STEP, OUTPUTS = (
+    cs.Function.deserialize((HERE / f"{name}.casadi").read_text()) for name in ("step", "outputs")
+)
 VARIABLES: list[dict[str, Any]] = MODEL["variables"]
 SIZES: list[int] = MODEL["sizes"]  # how many states, inputs, parameters, outputs, in this order
 SETTABLE = sum(SIZES[:3])
@@ -55,18 +57,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.guid, self.version = MODEL["guid"], MODEL["version"]
         self.values = array("d", [v["start"] for v in VARIABLES])
         self.failure = ""
-        for v in VARIABLES:
-            self.register_variable(
-                Real(
-                    v["name"],
-                    causality=Fmi2Causality[v["causality"]],
-                    variability=Fmi2Variability[v["variability"]],
-                    initial=None if v["initial"] is None else Fmi2Initial[v["initial"]],
-                    description=v["description"],
-                    getter=lambda: 0.0,
-                ),
-                nested=False,
-            )
         self._connect()
 
     def _connect(self) -> None:
@@ -147,6 +137,18 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description, completed by what PythonFMU leaves out."""
+        for v in VARIABLES:
+            self.register_variable(
+                Real(
+                    v["name"],
+                    causality=Fmi2Causality[v["causality"]],
+                    variability=Fmi2Variability[v["variability"]],
+                    initial=None if v["initial"] is None else Fmi2Initial[v["initial"]],
+                    description=v["description"],
+                    getter=lambda: 0.0,
+                ),
+                nested=False,
+            )
         root = super().to_xml(model_options or {})
         root.set("guid", str(self.guid))
         del root.attrib["generationDateAndTime"]  # the same source gives the same bytes

@@ -1,5 +1,6 @@
 """The calls of one FMI 2.0 co-simulation instance, through FMPy's low-level interface."""
 
+import sys
 from collections import defaultdict, deque
 from collections.abc import Sequence
 from ctypes import POINTER, byref, c_double, c_size_t, c_uint, c_void_p
@@ -7,6 +8,7 @@ from itertools import count
 from typing import Any
 
 import numpy as np
+import pythonfmu  # noqa: F401  the installed one first: FMUs bring copies of it that cannot build
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -44,7 +46,9 @@ class Fmi2Instance:
             modelIdentifier=archive.description.identifier,
             instanceName=unique,
         )
+        path = sys.path.copy()
         self._slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
+        sys.path[:] = path  # an FMU in Python puts its own folder in front
         self._raw = {n: getattr(self._slave.dll, n) for n in ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")}
         self._raw["fmi2DoStep"].argtypes = [c_void_p, c_double, c_double, c_uint]
         for n in ("fmi2SetReal", "fmi2GetReal"):

@@ -34,9 +34,7 @@ class Fmu:
         self.time = 0.0
         try:
             if not self.description.fmi_version.startswith("2."):
-                raise BadInput(
-                    f"{archive.path}: is FMI {self.description.fmi_version}; FMI 2.0 is read here"
-                )
+                raise BadInput(f"{archive.path}: is FMI {self.description.fmi_version}; FMI 2.0 is read here")
             self._instance = self._safely(Fmi2Instance, archive, self.description.name)
         except BaseException:
             if self._own:

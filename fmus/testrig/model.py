@@ -21,7 +21,7 @@ class Testrig(Model):
 
     __test__ = False  # not a test class, whatever its name begins with
     name = "Testrig"
-    step_size = 1e-3
+    step_size = 2.5e-3
     method = rodas3
 
     omega_w = State("rad/s", doc="wheel speed", nominal=10.0)
@@ -48,7 +48,9 @@ class Testrig(Model):
     k_S = Parameter("1", 0.4, min=0.0, doc="Polach factor in the area of slip", source="thesis Table 4.1")
     G = Parameter("Pa", 80e9, min=1e6, doc="shear modulus of steel", source="Kalker 1990")
     nu = Parameter("1", 0.28, min=0.0, max=0.5, doc="Poisson's ratio of steel", source="Kalker 1990")
-    V_Th = Parameter("V", 212.3438, min=0.0, doc="Thevenin voltage per phase at f_nom", source="thesis Fig. 3.17")
+    V_Th = Parameter(
+        "V", 212.3438, min=0.0, doc="Thevenin voltage per phase at f_nom", source="thesis Fig. 3.17"
+    )
     R_Th = Parameter("Ohm", 0.0226, min=0.0, doc="Thevenin resistance per phase", source="thesis Fig. 3.17")
     X_Th = Parameter("Ohm", 0.2007, min=0.0, doc="Thevenin reactance at f_nom", source="thesis Fig. 3.17")
     X_2 = Parameter("Ohm", 0.3010, min=0.0, doc="rotor reactance at f_nom", source="thesis Fig. 3.17")
@@ -81,13 +83,13 @@ class Testrig(Model):
     def ports(m) -> dict[str, Port]:
         """Shafts of wheel and roller, and the contact (slip of the wheel's surface over the roller's)."""
         return {
-            "wheel": Port(m.theta_w, m.omega_w, {"T_w_ext": 1.0}, "rotation", turns=True),
-            "roller": Port(m.theta_r, m.omega_r, {"T_r_ext": 1.0}, "rotation", turns=True),
+            "wheel": Port(m.theta_w, m.omega_w, {"T_w_ext": 1.0}, "rotation", "turns"),
+            "roller": Port(m.theta_r, m.omega_r, {"T_r_ext": 1.0}, "rotation", "turns"),
             "contact": Port(
                 m.r_w * m.theta_w - m.r_r * m.theta_r,
                 m.r_w * m.omega_w - m.r_r * m.omega_r,
                 {"T_w_ext": m.r_w, "T_r_ext": -m.r_r},
-                turns=True,
+                place="slips",
             ),
         }
 

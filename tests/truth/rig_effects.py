@@ -113,7 +113,7 @@ TYPICAL: Mapping[str, Mapping[str, float]] = {
     "actuator_lag": {"lag": 0.2},
     "actuator_saturation": {"limit": 300.0},
     "input_delay": {"delay": 0.1},
-    "parameter_step": {"mu0_step": -0.08, "mu0_step_time": 20.0},
+    "parameter_step": {"mu0_step": -0.12, "mu0_step_time": 20.0},
     "sensor_bias": {"bias": 0.05},
     "sensor_gain": {"gain": 1.01},
     "sensor_delay": {"delay": 0.1},

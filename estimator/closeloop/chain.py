@@ -1,0 +1,79 @@
+"""The chain: calibrate, detect, nominate, fit jointly, compare on held-out data, judge."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.closeloop.calibrate import calibrate
+from estimator.closeloop.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.compare import Hypothesis, hypotheses, ranked
+from estimator.closeloop.detect import Detection, detect
+from estimator.closeloop.missing_force import MissingForce, missing_forces
+from estimator.closeloop.noise import noise_floor
+from estimator.closeloop.pairs import try_pairs
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.screen import Promise, changes, screen
+from estimator.closeloop.verdict import Judgement, explains, judge
+from estimator.record import Array
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that the chain found; hypotheses and promises best first.
+
+    noise: (n_y,) floor; size: (n_y,) size of a residual that counts as one in fits and scores.
+    """
+
+    declared: Hypothesis
+    base: Hypothesis
+    noise: Array
+    size: Array
+    detection: Detection
+    forces: tuple[MissingForce, ...]
+    promises: tuple[Promise, ...]
+    singles: tuple[Hypothesis, ...]
+    pairs: tuple[Hypothesis, ...]
+    judgement: Judgement
+
+    @property
+    def chosen(self) -> Hypothesis | None:
+        """The best member of the verdict's class: what the augmented FMU holds."""
+        return self.judgement.members[0] if self.judgement.members else None
+
+
+def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: int = 0) -> Outcome:
+    """Run the whole chain on a problem; `tell` hears what is being done."""
+    noise = noise_floor(problem.record)
+    tell("calibrating the declared parameters")
+    declared, base, size = calibrate(problem)
+    tell("inferring the missing force at each port")
+    forces = missing_forces(problem, base.fit.theta, noise)
+    candidates = physical_candidates(problem.builder.offers, forces) + fault_candidates(problem.record, noise)
+    tell(f"screening {len(candidates)} candidates by simulated sensitivity")
+    change = list(zip(candidates, changes(problem, base.fit, candidates, size, jobs), strict=True))
+    promises = screen(base.fit, [((c,), g) for c, g in change])
+    tell("testing for a discrepancy against simulated records without one")
+    detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
+    found = (declared, base, noise, size, detection, tuple(forces), tuple(promises))
+    if not (detection.detected and detection.material):
+        return Outcome(*found, (), (), Judgement("no_discrepancy", (), _nothing(detection)))
+    tell("fitting each candidate inside the FMU, jointly with the declared parameters")
+    singles = hypotheses(problem, base, promises, size, jobs)
+    pairs: list[Hypothesis] = []
+    floor_known = not np.isnan(problem.record.noise_std).any()
+    if not (floor_known and any(explains(problem, h, base, noise, size) for h in singles)):
+        tell("trying pairs of effects")
+        pairs, freed = try_pairs(problem, base, singles, change, size, jobs)
+        singles += freed
+    singles, pairs = (ranked(problem, h, size) for h in (singles, pairs))
+    judgement = judge(problem, base, singles, pairs, noise, size)
+    return Outcome(*found, tuple(singles), tuple(pairs), judgement)
+
+
+def _nothing(detection: Detection) -> str:
+    if not detection.detected:
+        return f"the residual is what noise would leave (p = {detection.p_value:.2g})"
+    return "the residual is more than noise, but too small to matter"

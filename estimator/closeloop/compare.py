@@ -1,0 +1,119 @@
+"""Joint fits of hypotheses and their comparison on data that no fit has seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.fit import BLOCKS, Fit, fit
+from estimator.closeloop.problem import Problem, Unknown
+from estimator.closeloop.screen import Promise, built, label
+from estimator.record import Array
+
+BRIEF, LONG = 4, 15  # evaluations of a fit to rank it, and to finish it
+FINALISTS = 8
+WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
+TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of candidates fitted jointly with the calibrated parameters.
+
+    residuals: measured minus simulated of each run (N, n_y), whole record, free run.
+    """
+
+    candidates: tuple[Candidate, ...]
+    fit: Fit
+    residuals: tuple[Array, ...]
+
+    @property
+    def label(self) -> str:
+        """Its candidates' labels joined; "none" for the base."""
+        return label(self.candidates) or "none"
+
+    def rms(self, problem: Problem) -> Array:
+        """Root mean square of the residual on the held-out part, (n_y,)."""
+        held_out: Array = np.sqrt(np.mean(self.held_out(problem) ** 2, axis=0))
+        return held_out
+
+    def held_out(self, problem: Problem) -> Array:
+        """Residual on the held-out part, (m, n_y)."""
+        runs = zip(self.residuals, problem.record.runs, strict=True)
+        return np.concatenate([r[run.test] for r, run in runs])
+
+    def scores(self, problem: Problem, size: Array) -> Array:
+        """Log score of each block of the held-out part, up to a constant, (BLOCKS,)."""
+        squares = np.sum((self.held_out(problem) / size) ** 2, axis=1)
+        return np.array([-0.5 * b.sum() for b in np.array_split(squares, BLOCKS)])
+
+    def significance(self) -> list[float]:
+        """Size of each candidate's amplitudes over their standard error."""
+        names = [u.name for u in self.fit.unknowns]
+        found = []
+        for c in self.candidates:
+            i = [names.index(u.name) for u in c.amplitudes]
+            value, covariance = self.fit.values[i], self.fit.covariance[np.ix_(i, i)]
+            found.append(float(np.sqrt(value @ np.linalg.pinv(covariance) @ value)))
+        return found
+
+
+def hypothesis(
+    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, evaluations: int
+) -> Hypothesis:
+    """Fit a set of candidates jointly with the base unknowns, from where the screening left them."""
+    here = built(problem, promise.candidates)
+    own = [u for c in promise.candidates for u in c.unknowns]
+    found = fit(here, [*unknowns, *own], size, promise.start, evaluations=evaluations)
+    return Hypothesis(promise.candidates, found, tuple(here.residuals(found.theta)))
+
+
+def hypotheses(
+    problem: Problem, base: Hypothesis, promises: Sequence[Promise], size: Array, jobs: int
+) -> list[Hypothesis]:
+    """Fit each promise briefly, and to the end the best of those that better the base.
+
+    Best first on the identify part; of several with the same label the one that fits better is kept.
+    """
+    unknowns = base.fit.unknowns
+    brief = fitted(problem, unknowns, promises, size, BRIEF, jobs)
+    hopeful = [h for h in brief if cost(h) < WORTH * cost(base)][:FINALISTS]
+    again = [Promise(h.candidates, 0.0, h.fit.theta) for h in hopeful]
+    return fitted(problem, unknowns, again, size, LONG, jobs) + [h for h in brief if h not in hopeful]
+
+
+def fitted(
+    problem: Problem, unknowns: Sequence[Unknown], promises: Sequence[Promise], size: Array, evaluations: int,
+    jobs: int,
+) -> list[Hypothesis]:  # fmt: skip
+    """Fit each promise with so many evaluations; one hypothesis a label, best first on the identify part."""
+    tasks = (delayed(hypothesis)(problem, unknowns, p, size, evaluations) for p in promises)
+    best: dict[str, Hypothesis] = {}
+    for h in Parallel(n_jobs=jobs)(tasks):
+        if h.label not in best or cost(h) < cost(best[h.label]):
+            best[h.label] = h
+    return sorted(best.values(), key=cost)
+
+
+def cost(h: Hypothesis) -> float:
+    """Sum of squares on the identify part."""
+    return float(h.fit.residual @ h.fit.residual)
+
+
+def ranked(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
+    """Best first, by log score on the held-out part."""
+    return sorted(found, key=lambda h: -float(h.scores(problem, size).sum()))
+
+
+def lead(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array) -> tuple[float, float]:
+    """Sum over blocks of the log score of a over b, and its standard error."""
+    difference = a.scores(problem, size) - b.scores(problem, size)
+    return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(len(difference)))
+
+
+def beats(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array) -> bool:
+    """Whether a is better than b by more than TELLING standard errors."""
+    mean, error = lead(problem, a, b, size)
+    return mean > TELLING * error

@@ -1,0 +1,102 @@
+"""Is there a discrepancy, and does it matter? Tested against records simulated without any effect.
+
+The reference distribution is a parametric bootstrap: free runs of the calibrated FMU with noise
+added, calibrated again (through the FMU's sensitivities, to first order) and judged on the same
+held-out part by the same figures.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.fit import STEP
+from estimator.closeloop.problem import Problem
+from estimator.record import Array
+
+REPLICATES = 499
+LEVEL = 0.01  # probability of calling noise a discrepancy
+SLOW_BLOCKS = 40  # pieces of the held-out part whose means show slow residuals
+SHARE = 0.02  # of an output's rms, and
+NOISES = 2.0  # times its noise: a smaller residual does not matter
+
+
+@dataclass(frozen=True)
+class Detection:
+    """p_value: of the most telling figure, corrected for their number; figures: observed over the
+    bootstrap's 95 % point; material: whether the residual is large enough to matter."""
+
+    p_value: float
+    figures: Mapping[str, float]
+    material: bool
+
+    @property
+    def detected(self) -> bool:
+        """More than noise."""
+        return self.p_value < LEVEL
+
+
+def detect(
+    problem: Problem, base: Hypothesis, noise: Array, regressors: Sequence[Array], rng: np.random.Generator
+) -> Detection:
+    """Test the base hypothesis' residual; regressors: (m, k) changes of the fit-part residual."""
+    runs = problem.record.runs
+    fit_mask, test_mask = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "test"))
+    residual = np.concatenate(base.residuals) / noise
+    slopes = _sensitivities(problem, base, noise)
+    g = _directions(base.fit.jacobian, regressors) if regressors else None
+    observed = _figures(residual, fit_mask, test_mask, g)
+    back = np.linalg.pinv(slopes[fit_mask].reshape(-1, slopes.shape[2]))
+    copies = []
+    for _ in range(REPLICATES):
+        e = rng.standard_normal(residual.shape)
+        e -= slopes @ (back @ e[fit_mask].ravel())
+        copies.append(_figures(e, fit_mask, test_mask, g))
+    p_values, figures = [], {}
+    for name, value in observed.items():
+        reference = np.array([c[name] for c in copies])
+        p_values.append((1 + np.sum(reference >= value)) / (REPLICATES + 1))
+        figures[name] = float(value / np.quantile(reference, 0.95))
+    return Detection(min(1.0, len(p_values) * float(min(p_values))), figures, matters(problem, base, noise))
+
+
+def matters(problem: Problem, base: Hypothesis, noise: Array) -> bool:
+    """Whether a held-out residual is too large to be left alone, in any output."""
+    rms = base.rms(problem)
+    measured = np.concatenate([run.y[run.test] for run in problem.record.runs])
+    signal = np.sqrt(np.mean(measured**2, axis=0))
+    return bool(np.any((rms >= SHARE * signal) | (rms >= NOISES * noise)))
+
+
+def _sensitivities(problem: Problem, base: Hypothesis, noise: Array) -> Array:
+    """Derivatives of the whole residual by the unknowns, (N, n_y, n)."""
+    columns = []
+    for u in base.fit.unknowns:
+        h = STEP * u.scale
+        moved = problem.residuals({**base.fit.theta, u.name: base.fit.theta[u.name] + h})
+        change = np.concatenate(moved) - np.concatenate(base.residuals)
+        columns.append(change / noise / h)
+    shape = np.concatenate(base.residuals).shape
+    return np.stack(columns, axis=2) if columns else np.zeros((*shape, 0))
+
+
+def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
+    """Changes of the residual that the calibration cannot take over, of length 1, (m, k)."""
+    g = np.hstack(regressors)
+    if jacobian.shape[1]:
+        q = np.linalg.qr(jacobian)[0]
+        g = g - q @ (q.T @ g)
+    return g / (np.linalg.norm(g, axis=0) + 1e-300)
+
+
+def _figures(residual: Array, fit: Array, test: Array, regressors: Array | None) -> dict[str, float]:
+    held_out = residual[test]
+    means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(held_out, SLOW_BLOCKS)])
+    figures = {
+        "size of the held-out residual": float(np.max(np.mean(held_out**2, axis=0))),
+        "slow part of the held-out residual": float(np.max(np.mean(means**2, axis=0))),
+    }
+    if regressors is not None:
+        figures["likeness to an effect"] = float(np.max((regressors.T @ residual[fit].ravel()) ** 2))
+    return figures

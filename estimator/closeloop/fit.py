@@ -1,0 +1,109 @@
+"""Fit unknowns by simulation error on the identify part, with bounds and standard errors."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import pinvh
+from scipy.optimize import least_squares
+
+from estimator.closeloop.problem import Problem, Unknown
+from estimator.record import Array
+from fmus.host.fmu import FmuError
+
+STEP = 1e-3  # of an unknown's scale, for differences
+REFUSED = 1e6  # size of a residual where the FMU could not be run
+BLOCKS = 30  # pieces of the record between which residuals count as independent
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Values found, their standard errors, and the local picture around them.
+
+    residual: (m,) weighted, on the identify part; jacobian: (m, n) its derivatives by the unknowns;
+    covariance: (n, n), from blocks of the record where residuals are not white.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    values: Array
+    covariance: Array
+    residual: Array
+    jacobian: Array
+
+    @property
+    def theta(self) -> dict[str, float]:
+        """Values by name."""
+        return {u.name: float(v) for u, v in zip(self.unknowns, self.values, strict=True)}
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard errors by name."""
+        deviation = np.sqrt(np.maximum(np.diag(self.covariance), 0))
+        return {u.name: float(s) for u, s in zip(self.unknowns, deviation, strict=True)}
+
+
+def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
+    """Residual on the identify part over `size` (n_y,), sample after sample, (m,)."""
+    try:
+        residuals = problem.residuals(theta)
+    except FmuError:
+        residuals = [np.full_like(run.y, np.nan) for run in problem.record.runs]
+    runs = zip(residuals, problem.record.runs, strict=True)
+    flat = np.concatenate([(r[run.fit] / size).ravel() for r, run in runs])
+    return np.nan_to_num(np.clip(flat, -REFUSED, REFUSED), nan=REFUSED)
+
+
+def fit(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    size: Array,
+    start: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    evaluations: int = 15,
+) -> Fit:
+    """Least squares of the simulation error over the unknowns, from `start` or their own start values."""
+    held = dict(fixed or {})
+    low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
+    scale = np.array([u.scale for u in unknowns])
+    x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
+
+    last: dict[bytes, Array] = {}
+
+    def residual(x: Array) -> Array:
+        named = {u.name: float(v) for u, v in zip(unknowns, x, strict=True)}
+        last.clear()
+        last[x.tobytes()] = weighted(problem, {**held, **named}, size)
+        return last[x.tobytes()]
+
+    def jacobian(x: Array) -> Array:
+        r, columns = last[x.tobytes()] if x.tobytes() in last else residual(x), []
+        for i in range(len(x)):
+            h = STEP * scale[i] * (1 if x[i] + STEP * scale[i] <= high[i] else -1)
+            columns.append((residual(x + h * np.eye(len(x))[i]) - r) / h)
+        return np.column_stack(columns)
+
+    if not unknowns:
+        alone = residual(x0)
+        return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
+    inside = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
+    found = least_squares(
+        residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-6, ftol=1e-7, max_nfev=evaluations
+    )
+    covariance = sandwich(found.fun, found.jac, scale)
+    return Fit(tuple(unknowns), found.x, covariance, found.fun, found.jac)
+
+
+def sandwich(residual: Array, jacobian: Array, scale: Array) -> Array:
+    """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
+
+    Never below the covariance for white residuals of variance 1.
+    """
+    j = jacobian * scale
+    inverse = pinvh(j.T @ j)
+    scores = np.array(
+        [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
+    )
+    robust = inverse @ (scores.T @ scores) @ inverse
+    grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(inverse), 1e-300), 1.0))
+    covariance: Array = inverse * np.outer(grown, grown) * np.outer(scale, scale)
+    return covariance

@@ -1,0 +1,69 @@
+"""Pairs of effects: a wrong single effect can hide the right one until its partner is there."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import LONG, Hypothesis, fitted, hypotheses
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.screen import Promise, built, changes, screen
+from estimator.record import Array
+
+PARTNERS = 12  # leading candidates among which pairs are screened
+PROMISES = 6  # pairs from each of the two screenings that are fitted
+SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
+
+Changes = Sequence[tuple[Candidate, Array]]
+
+
+def idle(h: Hypothesis) -> list[Candidate]:
+    """Members whose amplitude is not clear of zero."""
+    return [c for c, z in zip(h.candidates, h.significance(), strict=True) if z < SIGNIFICANT]
+
+
+def try_pairs(
+    problem: Problem, base: Hypothesis, singles: Sequence[Hypothesis], change: Changes, size: Array, jobs: int
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
+
+    Pairs are nominated twice: by regression from the base, and as partners of the best single effect.
+    """
+    physical = [(c, g) for c, g in change if not c.is_fault]
+    alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
+    promises = _from_base(base, physical)
+    if alone:
+        best = next(iter(alone.values()))
+        promises += _partners(problem, best, [c for c, _ in physical], size, jobs)
+    found = hypotheses(problem, base, promises, size, jobs)
+    kept = [h for h in found if not idle(h)]
+    left = {h.label: h for h in found if len(idle(h)) == 1}
+    freed = [
+        Promise(tuple(c for c in h.candidates if c not in idle(h)), 0.0, h.fit.theta) for h in left.values()
+    ]
+    return kept, fitted(problem, base.fit.unknowns, freed, size, LONG, jobs)
+
+
+def _from_base(base: Hypothesis, physical: Changes) -> list[Promise]:
+    order = screen(base.fit, [((c,), g) for c, g in physical])
+    by_candidate = dict(physical)
+    leading = [p.candidates[0] for p in order[:PARTNERS]]
+    sets = [
+        ((a, b), np.hstack([by_candidate[a], by_candidate[b]]))
+        for a, b in combinations(leading, 2)
+        if a.label != b.label
+    ]
+    return screen(base.fit, sets)[:PROMISES]
+
+
+def _partners(
+    problem: Problem, best: Hypothesis, candidates: Sequence[Candidate], size: Array, jobs: int
+) -> list[Promise]:
+    others = [c for c in candidates if c.label != best.label]
+    here = built(problem, best.candidates)
+    change = changes(here, best.fit, others, size, jobs)
+    promises = screen(best.fit, [((c,), g) for c, g in zip(others, change, strict=True)])[:PROMISES]
+    return [
+        Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in promises
+    ]

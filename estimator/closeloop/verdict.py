@@ -1,0 +1,130 @@
+"""From fitted hypotheses to a verdict: what may be said, and what would tell the rest apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from estimator.closeloop.compare import Hypothesis, beats, lead
+from estimator.closeloop.detect import NOISES
+from estimator.closeloop.pairs import idle
+from estimator.closeloop.problem import Problem
+from estimator.record import Array
+
+Verdict = Literal[
+    "no_discrepancy",
+    "sensor_fault",
+    "traced",
+    "ambiguous",
+    "several",
+    "unexplained",
+    "insufficient_excitation",
+]
+GAP = 0.95  # share of the gap to the noise that an effect must close where noise is declared
+EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
+SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The verdict, the hypotheses that it rests on (the class, best first) and the way to split them."""
+
+    verdict: Verdict
+    members: tuple[Hypothesis, ...]
+    reason: str
+    next_experiment: str = ""
+
+
+def gap_closed(before: Array, after: Array, noise: Array) -> Array:
+    """Share of the distance from an error to the noise floor that an effect closes, per output (n_y,)."""
+    gap = before - noise
+    return np.where(gap > 0, (before - after) / np.where(gap > 0, gap, 1.0), 1.0)
+
+
+def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> bool:
+    """Whether a hypothesis accounts for the discrepancy on the held-out part.
+
+    Outputs with declared noise must come down to it; the others must lose most of their variance.
+    Every amplitude must be clear of zero.
+    """
+    if idle(h):
+        return False
+    before, after = base.rms(problem), h.rms(problem)
+    declared = ~np.isnan(problem.record.noise_std)
+    reached = (after < NOISES * noise) | (gap_closed(before, after, noise) >= GAP)
+    squares = [
+        np.mean((x.held_out(problem) / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
+        for x in (h, base)
+    ]
+    enough = squares[0] <= (1 - EXPLAINED) * squares[1] if (~declared).any() else True
+    return bool(np.all(reached[declared]) and enough)
+
+
+def equivalent(
+    problem: Problem, best: Hypothesis, others: Sequence[Hypothesis], size: Array
+) -> list[Hypothesis]:
+    """The class of the best hypothesis: those that the held-out data do not tell from it."""
+    members = [best]
+    for h in others:
+        if h is best:
+            continue
+        mean, _ = lead(problem, best, h, size)
+        close = mean < SAME * -float(best.scores(problem, size).sum())
+        if close or not beats(problem, best, h, size):
+            members.append(h)
+    return members
+
+
+def judge(
+    problem: Problem, base: Hypothesis, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
+    noise: Array, size: Array,
+) -> Judgement:  # fmt: skip
+    """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy."""
+    good = [h for h in singles if explains(problem, h, base, noise, size)]
+    better = [
+        h for h in pairs if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
+    ]
+    if better and (not good or beats(problem, better[0], good[0], size)):
+        members = equivalent(problem, better[0], better, size)
+        return _named(members, "several")
+    if good:
+        members = equivalent(problem, good[0], good, size)
+        return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
+    best = singles[0].label if singles else "none"
+    return Judgement(
+        "unexplained", (), f"no effect of the library accounts for the residual; nearest was {best}"
+    )
+
+
+def needed(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis], size: Array) -> bool:
+    """Whether a pair is better than the best single hypothesis, so that neither member is idle."""
+    return not singles or beats(problem, pair, singles[0], size)
+
+
+def _named(members: Sequence[Hypothesis], verdict: Verdict) -> Judgement:
+    if len(members) == 1:
+        return Judgement(verdict, tuple(members), f"{members[0].label} accounts for the residual")
+    names = ", ".join(m.label for m in members)
+    return Judgement(
+        "ambiguous", tuple(members), f"this record cannot tell apart {names}", splitting(members)
+    )
+
+
+def splitting(members: Sequence[Hypothesis]) -> str:
+    """The experiment that would tell the members of a class apart."""
+    kinds = {c.kind for m in members for c in m.candidates}
+    places = {c.location for m in members for c in m.candidates}
+    where = " and ".join(sorted(places))
+    advice = []
+    if {"constant_force", "coulomb_friction"} <= kinds:
+        advice.append(f"a run in which the velocity at {where} changes its sign")
+    if len(kinds & {"constant_force", "coulomb_friction", "viscous_damping", "quadratic_damping"}) > 1:
+        advice.append(f"runs at two or more clearly different speeds of {where}")
+    if any(k.startswith("sensor_") for k in kinds):
+        advice.append("a second sensor for the same quantity, or a calibration of this one at rest")
+    if len(places) > 1:
+        advice.append(
+            f"a run that excites {where} by different amounts, for example at another load or torque"
+        )
+    return "; ".join(advice) or f"a run with a wider range of speed and displacement at {where}"

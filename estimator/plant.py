@@ -1,0 +1,41 @@
+"""Any FMU as a black box x+ = f(x, u, theta), y = h(x, u, theta), by restart from a state."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from estimator.record import Array, Run
+from fmus.host.fmu import Fmu
+
+
+class Plant:
+    """An FMU instance with chosen inputs and outputs, by the names in its description."""
+
+    def __init__(self, fmu: Fmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
+        self.states = tuple(fmu.description.states)
+
+    def simulate(self, run: Run, start: Mapping[str, float], more: Sequence[str] = ()) -> Array:
+        """Free run through a record from its first sample: outputs, then `more`, (N, n_y + n_more).
+
+        start: states and parameters by name. An input acts with the mean of its samples at both ends
+        of a step, which is exact to second order for signals sampled from continuous ones.
+        """
+        u = held(run.u)
+        inputs = {name: u[:, j] for j, name in enumerate(self.inputs)}
+        return self.fmu.simulate(run.t, inputs, (*self.outputs, *more), start)
+
+    def transition(
+        self, x: Array, u: Mapping[str, float], theta: Mapping[str, float], dt: float
+    ) -> tuple[Array, Array]:
+        """One restart and step: the next state (n,) and the outputs (n_y,) there."""
+        states = dict(zip(self.states, x.tolist(), strict=True))
+        self.fmu.restart(0.0, **{**theta, **u, **states})
+        self.fmu.step(dt)
+        values = np.array(self.fmu.read((*self.states, *self.outputs)))
+        return values[: len(x)], values[len(x) :]
+
+
+def held(u: Array) -> Array:
+    """Inputs (N, n_u) as held over the N - 1 steps: the mean of both ends."""
+    return (u[1:] + u[:-1]) / 2

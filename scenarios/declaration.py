@@ -1,0 +1,161 @@
+"""What an experiment.toml may say: one class a table, one field a key."""
+
+from collections.abc import Iterator
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+def _interval(value: object) -> tuple[float, float]:
+    if not (isinstance(value, list | tuple) and len(value) == 2 and all(map(_is_number, value))):
+        raise ValueError(f"must be two numbers [lower, upper], not {value!r}")
+    if not value[0] < value[1]:
+        raise ValueError(f"must increase, [lower, upper], not {list(value)}")
+    return float(value[0]), float(value[1])
+
+
+def _column_or_number(value: object) -> str | float:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | float) and _is_number(value):
+        return float(value)
+    raise ValueError(f"must be a column name in quotes or a number, not {value!r}")
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+Interval = Annotated[tuple[float, float], PlainValidator(_interval)]
+Channel = Annotated[str | float, PlainValidator(_column_or_number)]
+
+
+class Table(BaseModel):
+    """A table of the file: its keys are the fields, no others."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Split(Table):
+    """Which data identify and which are held out: two windows [s] of one file, or two files."""
+
+    identify: Interval | None = None
+    test: Interval | None = None
+    identify_data: str | None = None
+    test_data: str | None = None
+
+    @model_validator(mode="after")
+    def _windows_or_files(self) -> Self:
+        given = self.model_fields_set
+        if given not in ({"identify", "test"}, {"identify_data", "test_data"}):
+            raise ValueError("needs either 'identify' and 'test', or 'identify_data' and 'test_data'")
+        if self.identify and self.test:
+            first, second = sorted((self.identify, self.test))
+            if second[0] < first[1]:
+                raise ValueError(f"'identify' and 'test' overlap from {second[0]:g} s to {first[1]:g} s")
+        return self
+
+
+class Output(Table):
+    """A measured output: its column, the column's unit, and the standard deviation of its noise in it."""
+
+    column: str
+    unit: str
+    noise_std: Positive | None = None
+
+
+class Derived(Table):
+    """A column made from another one: its time derivative by central differences."""
+
+    derivative: str
+
+
+class Port(Table):
+    """A location on a foreign FMU: a force input and the outputs conjugate to it."""
+
+    name: str
+    force: str
+    velocity: str
+    displacement: str
+
+
+class EstimatedParameter(Table):
+    """A parameter the filter estimates; start and bounds default to the declared and the FMU's."""
+
+    start: Number | None = None
+    std: Positive | None = None
+    bounds: Interval | None = None
+
+    @model_validator(mode="after")
+    def _start_within_bounds(self) -> Self:
+        if self.start is not None and self.bounds and not self.bounds[0] <= self.start <= self.bounds[1]:
+            raise ValueError(f"start {self.start:g} is outside its bounds {list(self.bounds)}")
+        return self
+
+
+class EstimatedInput(Table):
+    """An unknown input: a random process of that standard deviation about that frequency [Hz]."""
+
+    std: Positive
+    frequency: Positive
+    rate_input: str | None = None
+
+
+class Estimate(Table):
+    """What the filter estimates beside the states it needs anyway; `rate` in Hz."""
+
+    parameters: dict[str, EstimatedParameter] = {}
+    states: tuple[str, ...] = ()
+    rate: Positive | None = None
+    inputs: dict[str, EstimatedInput] = {}
+
+
+class Declaration(Table):
+    """The keys of experiment.toml."""
+
+    id: str
+    model: str | None = None
+    fmu: str | None = None
+    data: str | None = None
+    time: str
+    split: Split | None = None
+    parameters: dict[str, Number] = {}
+    calibrate: dict[str, Interval] = {}
+    initial: dict[str, Number] = {}
+    inputs: dict[str, Channel] = {}
+    outputs: Annotated[dict[str, Output], Field(min_length=1)]
+    derived: dict[str, Derived] = {}
+    ports: tuple[Port, ...] = ()
+    estimate: Estimate | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for problem in _contradictions(self):
+            raise ValueError(problem)
+        return self
+
+
+def _contradictions(d: Declaration) -> Iterator[str]:
+    """What each key for itself does not show."""
+    if (d.model is None) == (d.fmu is None):
+        yield "needs exactly one of the keys 'model' and 'fmu'"
+    if d.ports and d.model:
+        yield "[[ports]] are for a foreign 'fmu' only; our own models have theirs"
+    files = {d.split.identify_data, d.split.test_data} - {None} if d.split else set()
+    if not files and d.data is None:
+        yield "key 'data' is missing"
+    if files and d.data is not None and d.data not in files:
+        yield "key 'data' beside [split] identify_data and test_data; leave one of the two out"
+    made: set[str] = set()
+    for name, derived in d.derived.items():
+        if derived.derivative in d.derived and derived.derivative not in made:
+            yield f"[derived.{name}] derivative '{derived.derivative}' must be declared above it"
+        made.add(name)
+    names = [port.name for port in d.ports]
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        yield f"[[ports]] name '{name}' is used twice"
+    unknown = d.estimate.inputs if d.estimate else {}
+    for name in sorted(unknown.keys() & d.inputs.keys()):
+        yield f"input '{name}' stands in [inputs] and in [estimate.inputs]; it is either known or estimated"
