@@ -1,26 +1,31 @@
-"""Fixed-step integrators as CasADi functions: step(x, u, p, dt) -> x, inputs held over the step."""
+"""Integrators as CasADi functions step(x, u, p, dt) -> (x after dt, error), inputs held over the step.
 
-from collections.abc import Callable
+error: of the step over what is tolerated; above 1 the step is to be made again with a shorter one
+(`fmus.export.inside.stepping`). 0 where the method does not know.
+"""
+
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import casadi as cs
 
-Method: TypeAlias = Callable[[cs.Function], cs.Function]
+Method: TypeAlias = Callable[[cs.Function, Sequence[float]], cs.Function]
 
 
-def rk4(f: cs.Function) -> cs.Function:
-    """Classical Runge-Kutta method of order 4, for models without stiff parts."""
+def rk4(f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
+    """Classical Runge-Kutta method of order 4 with fixed steps, for models without stiff parts."""
     x, u, p, dt = _symbols(f)
     k1 = f(x, u, p)
     k2 = f(x + dt / 2 * k1, u, p)
     k3 = f(x + dt / 2 * k2, u, p)
     k4 = f(x + dt * k3, u, p)
-    return _step(x, u, p, dt, x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+    return _step(x, u, p, dt, x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4), cs.SX(0))
 
 
-def rodas3(f: cs.Function) -> cs.Function:
+def rodas3(f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
     """Rosenbrock method of order 3, four stages, L-stable and stiffly accurate, with an exact Jacobian.
 
+    The error is the difference from the embedded method of order 2, over `tolerated` for each state.
     Sandu et al., "Benchmarking stiff ODE solvers for atmospheric chemistry problems II:
     Rosenbrock solvers", Atmospheric Environment 31 (1997), 3459-3472; gamma = 1/2.
     """
@@ -34,7 +39,7 @@ def rodas3(f: cs.Function) -> cs.Function:
     k2 = solve(f(x, u, p) + 4 / dt * k1)
     k3 = solve(f(x + 2 * k1, u, p) + (k1 - k2) / dt)
     k4 = solve(f(x + 2 * k1 + k3, u, p) + (k1 - k2 - 8 / 3 * k3) / dt)
-    return _step(x, u, p, dt, x + 2 * k1 + k3 + k4)
+    return _step(x, u, p, dt, x + 2 * k1 + k3 + k4, cs.norm_inf(k4 / cs.DM(tolerated)))
 
 
 def _symbols(f: cs.Function) -> tuple[cs.SX, cs.SX, cs.SX, cs.SX]:
@@ -42,5 +47,7 @@ def _symbols(f: cs.Function) -> tuple[cs.SX, cs.SX, cs.SX, cs.SX]:
     return x, u, p, cs.SX.sym("dt")
 
 
-def _step(x: cs.SX, u: cs.SX, p: cs.SX, dt: cs.SX, x1: cs.SX) -> cs.Function:
-    return cs.Function("step", [x, u, p, dt], [cs.cse(x1)], ["x", "u", "p", "dt"], ["x1"])
+def _step(x: cs.SX, u: cs.SX, p: cs.SX, dt: cs.SX, x1: cs.SX, error: cs.SX) -> cs.Function:
+    both = cs.cse(cs.vertcat(x1, error))
+    results = [both[:-1], both[-1]]
+    return cs.Function("step", [x, u, p, dt], results, ["x", "u", "p", "dt"], ["x1", "error"])

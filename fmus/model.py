@@ -48,6 +48,7 @@ class Model(ABC):
 
     name: ClassVar[str]
     step_size: ClassVar[float]  # s, the longest internal step
+    tolerance: ClassVar[float] = 1e-6  # of a state's nominal, error of an internal step where it is known
     method: ClassVar[Method] = rk4
 
     def __init__(self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False) -> None:
@@ -129,7 +130,7 @@ def _computed(variable: Variable) -> bool:
 class Equations:
     """A model as CasADi functions of column vectors: x, u, p in the order of `model.of(...)`.
 
-    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> x after dt of one internal step.
+    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> (x after one internal step, its error).
     """
 
     f: cs.Function
@@ -149,7 +150,8 @@ def equations(model: Model) -> Equations:
     names = ["x", "u", "p"]
     f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])
     h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
-    return Equations(f, h, type(model).method(f))
+    tolerated = [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
+    return Equations(f, h, type(model).method(f, tolerated))
 
 
 def _complete(model: Model, what: str, given: dict[str, Expr], names: list[str]) -> dict[str, Expr]:

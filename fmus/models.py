@@ -5,7 +5,10 @@ from fmus.errors import BadInput, did_you_mean
 from fmus.model import Model
 from fmus.registry import classes_in
 
-MODELS: dict[str, type[Model]] = {c.name.lower(): c for c in classes_in(fmus, Model, "fmus.*.model")}
+MODELS: dict[str, type[Model]] = {
+    c.name.lower(): c
+    for c in classes_in(fmus, Model, "fmus.*.model")  # type: ignore[type-abstract]  # what is found is concrete
+}
 
 
 def model_class(name: str) -> type[Model]:

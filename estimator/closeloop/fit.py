@@ -11,7 +11,7 @@ from estimator.closeloop.problem import Problem, Unknown
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-STEP = 1e-3  # of an unknown's scale, for differences
+STEP = 1e-2  # of an unknown's scale, for differences
 REFUSED = 1e6  # size of a residual where the FMU could not be run
 BLOCKS = 30  # pieces of the record between which residuals count as independent
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.closeloop.problem import PortNames, Problem
+from estimator.closeloop.problem import Problem
 from estimator.record import Array
+from fmus.host.description import PortNames
 
 SAMPLES = 4000  # at most this many are smoothed
 POINTS = 200  # at most this many linearisations along the run
@@ -66,7 +67,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
 def _linearise(problem: Problem, theta: Mapping[str, float], x: Array, keep: Array) -> Linearised:
     plant, run = problem.plant, problem.record.runs[0]
     index = np.unique(np.linspace(0, len(keep) - 2, min(POINTS, len(keep) - 1)).astype(int))
-    start = {**problem.declared, **problem.constants}
+    start = {**problem.declared}
     start |= {k: v for k, v in theta.items() if k in plant.fmu.description.variables}
     scale = 1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9)
     a, b, c = [], [], []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +15,7 @@ from estimator.closeloop.sensors import faulty
 from estimator.plant import Plant
 from estimator.record import Array, Record, Run
 from fmus.host.archive import Archive
+from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 
 START_SAMPLES = 20  # from which the start state of a held-out file is found
@@ -29,16 +30,6 @@ class Unknown:
     low: float
     high: float
     scale: float
-
-
-@dataclass(frozen=True)
-class PortNames:
-    """A location by the FMU's variables: the force input and the motion conjugate to it."""
-
-    name: str
-    force: str
-    velocity: str
-    displacement: str
 
 
 class Builder(Protocol):
@@ -66,7 +57,6 @@ class Problem:
     calibrate: Mapping[str, tuple[float, float]]
     free_states: tuple[str, ...] = ()
     ports: tuple[PortNames, ...] = ()
-    constants: Mapping[str, float] = field(default_factory=dict)  # inputs that do not change
     effects: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -105,7 +95,7 @@ class Problem:
         return replace(self, effects=tuple(effects))
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
-        start = {**self.declared, **self.constants, **self._own(theta)}
+        start = {**self.declared, **self._own(theta)}
         if self.free_states and not run.fit.any():
             start |= self._settle(run, start)
         y = self.plant.simulate(run, start, more)

@@ -6,7 +6,10 @@ from fmus.effects.effect import Effect
 from fmus.errors import BadInput, did_you_mean
 from fmus.registry import classes_in
 
-EFFECTS: dict[str, type[Effect]] = {c.kind: c for c in classes_in(sys.modules[__name__], Effect)}
+EFFECTS: dict[str, type[Effect]] = {
+    c.kind: c
+    for c in classes_in(sys.modules[__name__], Effect)  # type: ignore[type-abstract]  # what is found is concrete
+}
 
 
 def parse_effect(text: str) -> tuple[type[Effect], str]:

@@ -1,12 +1,18 @@
 """FMUs with effects built in, made when first asked for: one model or foreign FMU, many hypotheses."""
 
 import os
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fmus.effects import EFFECTS
+from fmus.export.coupled import build_coupled
 from fmus.export.pythonfmu import build_python
+from fmus.host.description import PortNames
+from fmus.model import Model
 from fmus.models import model_class
+
+Effects = tuple[tuple[str, str], ...]  # (kind, location)
 
 
 @dataclass(frozen=True)
@@ -17,17 +23,61 @@ class ModelBuilder:
     folder: Path
 
     @property
-    def offers(self) -> tuple[tuple[str, str], ...]:
-        """(kind, location) of every effect that makes sense in the model."""
+    def offers(self) -> Effects:
+        """Every effect at every location where it makes sense."""
         ports = model_class(self.model)().ports()
         return tuple((k, at) for at, port in ports.items() for k, e in EFFECTS.items() if e.fits(port))
 
-    def __call__(self, effects: tuple[tuple[str, str], ...]) -> Path:
+    @property
+    def ports(self) -> tuple[PortNames, ...]:
+        """The model's locations by the names of their probes."""
+        names = model_class(self.model)().ports()
+        return tuple(PortNames(n, f"{n}_force", f"{n}_velocity", f"{n}_displacement") for n in names)
+
+    def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values."""
-        target = self.folder / "+".join(["base", *(f"{k}@{at}" for k, at in effects)]) / "model.fmu"
-        if not target.exists():
-            model = model_class(self.model)([(EFFECTS[k], at) for k, at in effects], probes=True)
-            part = target.with_name(f"{os.getpid()}.fmu")
-            build_python(model, part)
-            part.replace(target)
-        return target
+        return _once(self.folder, effects, lambda path: build_python(self._model(effects, probes=True), path))
+
+    def final(self, effects: Effects, starts: Mapping[str, float], out: Path) -> Path:
+        """Write the FMU with effects and start values that were found, for use elsewhere."""
+        model = self._model(effects, probes=False)
+        for name in starts.keys() & model.variables.keys():
+            model.variables[name] = replace(model.variables[name], start=starts[name])
+        return build_python(model, out / f"{model.name}_augmented.fmu")
+
+    def _model(self, effects: Effects, probes: bool) -> Model:
+        return model_class(self.model)([(EFFECTS[k], at) for k, at in effects], probes)
+
+
+@dataclass(frozen=True)
+class ForeignBuilder:
+    """A foreign FMU with effects coupled to its ports; kept in a folder."""
+
+    fmu: Path
+    ports: tuple[PortNames, ...]
+    folder: Path
+
+    @property
+    def offers(self) -> Effects:
+        """Every effect at every port: only its owner knows what makes sense there."""
+        return tuple((k, port.name) for port in self.ports for k in EFFECTS)
+
+    def __call__(self, effects: Effects) -> Path:
+        """Path of the FMU with these effects, all off at their start values; the FMU itself without any."""
+        if not effects:
+            return self.fmu
+        return _once(self.folder, effects, lambda path: build_coupled(self.fmu, self.ports, effects, path))
+
+    def final(self, effects: Effects, starts: Mapping[str, float], out: Path) -> Path:
+        """Write the FMU with effects and start values that were found, for use elsewhere."""
+        target = out / f"{self.fmu.stem}_augmented.fmu"
+        return build_coupled(self.fmu, self.ports, effects, target, starts=dict(starts))
+
+
+def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:
+    target = folder / "+".join(["base", *(f"{k}@{at}" for k, at in effects)]) / "model.fmu"
+    if not target.exists():
+        part = target.with_name(f"{os.getpid()}.fmu")
+        build(part)
+        part.replace(target)  # workers may build the same at once
+    return target

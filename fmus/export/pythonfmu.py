@@ -10,18 +10,19 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
-import casadi as cs
 from jinja2 import Environment, FileSystemLoader
 from pythonfmu.builder import FmuBuilder
 
 from fmus.errors import BadInput
 from fmus.export.table import sizes, unit_table, variable_table
-from fmus.model import Equations, Model, equations
+from fmus.model import Model, equations
 
 HERE = Path(__file__).parent
 ENTRY = '''"""Entry of the FMU {name}: one class with a method of its own, defined anew for each instance."""
@@ -38,82 +39,92 @@ class {name}(Slave):
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 
+@dataclass(frozen=True)
+class Content:
+    """What a build holds: its name and card, the slave that runs in it, and the files that this reads."""
+
+    name: str
+    card: dict[str, Any]
+    modules: tuple[str, ...]  # of `inside`; the first one defines the slave
+    files: dict[str, bytes]
+    page: str  # documentation/index.html
+    saves_state: bool = True
+
+
 def build_python(model: Model, out: Path) -> Path:
     """Write `out`/NAME.fmu, or `out` itself where it ends in .fmu, and return its path.
 
     The same source gives the same bytes. BadInput where PythonFMU has no binary for this platform.
     """
+    made = equations(model)
+    card = {
+        "description": first_line(model),
+        "step_size": model.step_size,
+        "sizes": sizes(model),
+        "units": unit_table(v.unit for v in model.variables.values()),
+        "variables": variable_table(model),
+    }
+    files = {f"{n}.casadi": f.serialize().encode() for n, f in (("step", made.step), ("outputs", made.h))}
+    effects = [f"{e.kind}@{location}" for e, location in model.effects]
+    return pack(Content(model.name, card, ("solved", "stepping"), files, documentation(model.name, card, effects)), out)
+
+
+def pack(content: Content, out: Path) -> Path:
+    """Write an FMU of any content with PythonFMU; see build_python."""
     if not FmuBuilder.has_binary():
         raise BadInput(f"PythonFMU has no binary for {sys.platform}; it builds on Linux and Windows x86-64")
-    target = out if out.suffix == ".fmu" else out / f"{model.name}.fmu"
+    target = out if out.suffix == ".fmu" else out / f"{content.name}.fmu"
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
-        entry, package = _write_sources(model, equations(model), Path(folder))
+        entry, package = _write_sources(content, Path(folder))
         documents = Path(folder) / "documentation"
         documents.mkdir()
-        (documents / "index.html").write_text(_documentation(model), encoding="utf-8")
-        with _clean_imports(entry.stem, package.name):
+        (documents / "index.html").write_text(content.page, encoding="utf-8")
+        bundled = [f"{package.name}.{f}" for f in ("common", *content.modules)]
+        with _clean_imports(entry.stem, package.name, *bundled):
             packed = FmuBuilder.build_FMU(
                 entry,
                 Path(folder) / "packed.fmu",
                 project_files=[package],
                 documentation_folder=documents,
                 needsExecutionTool=True,
-                canGetAndSetFMUstate=True,
-                canSerializeFMUstate=True,
+                canGetAndSetFMUstate=content.saves_state,
+                canSerializeFMUstate=content.saves_state,
             )
-        _repack(packed, Path(folder) / "final.fmu")
-        target.write_bytes((Path(folder) / "final.fmu").read_bytes())
+        final = Path(folder) / "final.fmu"
+        _repack(packed, final)
+        target.write_bytes(final.read_bytes())
     return target
 
 
-def _write_sources(model: Model, made: Equations, folder: Path) -> tuple[Path, Path]:
+def _write_sources(content: Content, folder: Path) -> tuple[Path, Path]:
     """Write the entry file and its package; both are named by a hash of all that they hold."""
-    runtime = (HERE / "runtime.py").read_bytes()
-    functions = {"step": _serialised(made.step), "outputs": _serialised(made.h)}
-    card = {
-        "description": _first_line(model),
-        "version": version("railfmi"),
-        "step_size": model.step_size,
-        "sizes": sizes(model),
-        "units": unit_table(model),
-        "variables": variable_table(model),
-    }
-    content = [json.dumps(card, sort_keys=True).encode(), runtime, *functions.values()]
-    content.append(version("pythonfmu").encode())
-    digest = hashlib.sha256(b"\0".join(content)).hexdigest()
+    inside = {f"{n}.py": (HERE / "inside" / f"{n}.py").read_bytes() for n in ("common", *content.modules)}
+    files = {**inside, "__init__.py": f"from .{content.modules[0]} import Slave\n".encode(), **content.files}
+    card = {**content.card, "version": version("railfmi"), "pythonfmu": version("pythonfmu")}
+    parts = [json.dumps(card, sort_keys=True).encode(), *(files[name] for name in sorted(files))]
+    digest = hashlib.sha256(b"\0".join(parts)).hexdigest()
     card["guid"] = str(uuid.UUID(digest[:32]))
-    package = folder / f"{model.name}_{digest[:12]}"
+    files["model.json"] = json.dumps(card, indent=1, sort_keys=True).encode()
+    package = folder / f"{content.name}_{digest[:12]}"
     package.mkdir()
-    (package / "__init__.py").write_bytes(runtime)
-    (package / "model.json").write_text(json.dumps(card, indent=1, sort_keys=True), encoding="utf-8")
-    for name, data in functions.items():
-        (package / f"{name}.casadi").write_bytes(data)
+    for name, data in files.items():
+        (package / name).write_bytes(data)
     entry = folder / f"{package.name}_entry.py"
-    entry.write_text(
-        ENTRY.format(name=model.name, package=package.name, description=card["description"]), encoding="utf-8"
-    )
+    text = ENTRY.format(name=content.name, package=package.name, description=card["description"])
+    entry.write_text(text, encoding="utf-8")
     return entry, package
 
 
-def _serialised(function: cs.Function) -> bytes:
-    data: str = function.serialize()
-    return data.encode()
-
-
-def _first_line(model: Model) -> str:
+def first_line(model: Model) -> str:
+    """What a model's class says of it, in one line."""
     return (type(model).__doc__ or model.name).strip().splitlines()[0]
 
 
-def _documentation(model: Model) -> str:
+def documentation(name: str, card: dict[str, Any], effects: Sequence[str], extra: str = "") -> str:
+    """The page that goes into the FMU."""
     page = Environment(loader=FileSystemLoader(HERE), autoescape=True).get_template("documentation.html.j2")
-    return page.render(
-        model=model,
-        description=_first_line(model),
-        effects=[f"{e.kind}@{location}" for e, location in model.effects],
-        variables=variable_table(model),
-        casadi=version("casadi"),
-    )
+    return page.render(name=name, card=card, effects=effects, extra=extra, casadi=version("casadi"))
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """A model's variables as the plain table that a build carries, in value-reference order."""
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 from fmus.model import Model
@@ -11,7 +12,7 @@ KINDS = (State, Input, Parameter, Output)
 
 def variable_table(model: Model) -> list[dict[str, Any]]:
     """Rows of name, unit, causality, variability, initial, start, limits, nominal, description, source."""
-    return [_row(v) for kind in KINDS for v in model.of(kind)]
+    return [row(v) for kind in KINDS for v in model.of(kind)]
 
 
 def sizes(model: Model) -> list[int]:
@@ -19,10 +20,10 @@ def sizes(model: Model) -> list[int]:
     return [len(model.of(kind)) for kind in KINDS]
 
 
-def unit_table(model: Model) -> dict[str, dict[str, str]]:
-    """FMI's <BaseUnit> attributes of every unit in use, by unit name."""
+def unit_table(units: Iterable[str]) -> dict[str, dict[str, str]]:
+    """FMI's <BaseUnit> attributes of units, by unit name."""
     found = {}
-    for unit in sorted({v.unit for v in model.variables.values()}):
+    for unit in sorted(set(units)):
         exponents, factor, offset = base_exponents(unit)
         numbers = {"factor": factor} | ({"offset": offset} if offset else {})
         found[unit] = {k: str(e) for k, e in exponents.items() if e} | {
@@ -31,7 +32,8 @@ def unit_table(model: Model) -> dict[str, dict[str, str]]:
     return found
 
 
-def _row(v: Variable) -> dict[str, Any]:
+def row(v: Variable) -> dict[str, Any]:
+    """One variable's row of the table."""
     initial: Literal["exact", "calculated"] | None = "exact"
     if isinstance(v, Input):
         initial = None

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import fmpy
 from fmpy.model_description import read_model_description
+from fmpy.validation import validate_fmu
 
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable
@@ -49,6 +50,11 @@ def describe(path: str | Path) -> FmuDescription:
         return archive.description
 
 
+def problems(path: str | Path) -> list[str]:
+    """What the FMI standard objects to in an FMU file's model description; empty where all is well."""
+    return [" ".join(str(problem).split()) for problem in validate_fmu(str(path))]
+
+
 def _checked_names(path: Path) -> list[str]:
     if not path.is_file():
         raise BadInput(f"{path}: no such FMU file; build one with 'railfmi build' or mend the path")
@@ -78,12 +84,17 @@ def _description(path: Path, folder: Path) -> FmuDescription:
     if model.coSimulation is None:
         raise BadInput(f"{path}: is not for co-simulation; export it again as a co-simulation FMU")
     variables = {v.name: _variable(v) for v in model.modelVariables if v.type in ("Real", "Float64")}
+    kind, usual = model.coSimulation, model.defaultExperiment
     return FmuDescription(
         name=model.modelName,
         fmi_version=model.fmiVersion,
-        identifier=model.coSimulation.modelIdentifier,
+        identifier=kind.modelIdentifier,
         guid=model.guid or model.instantiationToken,
         variables=variables,
+        step_size=_number(usual.stepSize) if usual else None,
+        saves_state=kind.canGetAndSetFMUstate,
+        serialises_state=kind.canSerializeFMUstate,
+        once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,
     )
 
 

@@ -24,6 +24,16 @@ class FmuVariable:
 
 
 @dataclass(frozen=True)
+class PortNames:
+    """A location by an FMU's variables: its name, force input, and the outputs conjugate to it."""
+
+    name: str
+    force: str
+    velocity: str
+    displacement: str
+
+
+@dataclass(frozen=True)
 class FmuDescription:
     """Name, FMI version and Real variables of an FMU, in the order of its model description."""
 
@@ -32,6 +42,10 @@ class FmuDescription:
     identifier: str
     guid: str
     variables: dict[str, FmuVariable]
+    step_size: float | None = None  # s, of its default experiment
+    saves_state: bool = False  # fmi2GetFMUstate and fmi2SetFMUstate
+    serialises_state: bool = False
+    once_per_process: bool = False  # no second instance
 
     def of(self, *causalities: Causality) -> list[str]:
         """Names of the variables of the given causalities."""

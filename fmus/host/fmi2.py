@@ -1,10 +1,12 @@
 """The calls of one FMI 2.0 co-simulation instance, through FMPy's low-level interface."""
 
+import os
 import sys
 from collections import defaultdict, deque
 from collections.abc import Sequence
 from ctypes import POINTER, byref, c_double, c_size_t, c_uint, c_void_p
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +27,7 @@ from numpy.typing import NDArray
 from fmus.host.archive import Archive
 
 Array = NDArray[np.float64]
-OK, WARNING = 0, 1
+OK, WARNING, FATAL = 0, 1, 4
 NUMBERS = count()
 MESSAGES: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=20))  # by instance name
 
@@ -40,15 +42,22 @@ class Fmi2Instance:
     def __init__(self, archive: Archive, name: str) -> None:
         unique = f"{name}_{next(NUMBERS)}"
         self._name, self.messages = unique, MESSAGES[unique]
-        self._slave = FMU2Slave(
-            guid=archive.description.guid,
-            unzipDirectory=str(archive.folder),
-            modelIdentifier=archive.description.identifier,
-            instanceName=unique,
-        )
-        path = sys.path.copy()
-        self._slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
-        sys.path[:] = path  # an FMU in Python puts its own folder in front
+        self._fatal = ""  # why no call may be made any more, not even to free it
+        path, here = sys.path.copy(), Path.cwd()
+        try:
+            self._slave = FMU2Slave(
+                guid=archive.description.guid,
+                unzipDirectory=str(archive.folder),
+                modelIdentifier=archive.description.identifier,
+                instanceName=unique,
+            )
+            self._slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
+        except Exception as error:  # FMPy has no class of its own for these
+            MESSAGES.pop(unique, None)
+            raise CallFailed(self._reason(" ".join(str(error).split()).rstrip("."))) from error
+        finally:
+            sys.path[:] = path  # an FMU in Python puts its own folder in front
+            os.chdir(here)  # FMPy stays in the library's folder where it cannot load it
         self._raw = {n: getattr(self._slave.dll, n) for n in ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")}
         self._raw["fmi2DoStep"].argtypes = [c_void_p, c_double, c_double, c_uint]
         for n in ("fmi2SetReal", "fmi2GetReal"):
@@ -56,6 +65,7 @@ class Fmi2Instance:
 
     def initialise(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
         """Reset, set the values, go through initialisation at t0."""
+        self.messages.clear()
         self._call(self._slave.reset)
         self.set(references, values)
         self._call(self._slave.setupExperiment, startTime=t0)
@@ -109,27 +119,45 @@ class Fmi2Instance:
         u_now, y_now = (c_double * n_u)(), (c_double * n_y)()
         y = np.empty((len(t) - 1, n_y))
         times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
-        into, out = np.frombuffer(u_now) if n_u else np.empty(0), np.frombuffer(y_now)
+        into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
+        self._refuse_after_fatal()
         for k, dt in enumerate(steps):
             into[:] = rows[k]
             status = set_real(component, u_refs, n_u, u_now) if n_u else OK
-            status = max(status, do_step(component, times[k], dt, 1))
+            if status <= WARNING:
+                status = do_step(component, times[k], dt, 1)
+            if status <= WARNING:
+                status = get_real(component, y_refs, n_y, y_now)
             if status > WARNING:
-                raise CallFailed(self._reason(f"step at t = {times[k]:g} s"))
-            get_real(component, y_refs, n_y, y_now)
+                raise CallFailed(self._failed(f"step at t = {times[k]:g} s", status))
             y[k] = out
         return y
 
     def close(self) -> None:
-        """Free the instance and unload the library."""
-        self._slave.freeInstance()
+        """Free the instance and unload the library; one that failed fatally stays where it is."""
+        if not self._fatal:
+            self._slave.freeInstance()
         MESSAGES.pop(self._name, None)
 
     def _call(self, function: Any, *args: Any, **kwargs: Any) -> Any:
+        self._refuse_after_fatal()
         try:
             return function(*args, **kwargs)
-        except (FMICallException, OSError) as error:
+        except FMICallException as error:
+            raise CallFailed(self._failed(str(error).rstrip("."), error.status)) from error
+        except OSError as error:
             raise CallFailed(self._reason(str(error).rstrip("."))) from error
+
+    def _refuse_after_fatal(self) -> None:
+        """A call after fmi2Fatal can end the process, so none is made."""
+        if self._fatal:
+            raise CallFailed(f"cannot be used any more after a fatal failure ({self._fatal})")
+
+    def _failed(self, what: str, status: int) -> str:
+        reason = self._reason(what)
+        if status == FATAL:
+            self._fatal = reason
+        return reason
 
     def _reason(self, what: str) -> str:
         said = f": {self.messages[-1]}" if self.messages else ""
@@ -138,7 +166,7 @@ class Fmi2Instance:
 
 def _log(_environment: int, instance: bytes, status: int, _category: bytes, message: bytes) -> None:
     if status > OK:
-        MESSAGES[instance.decode()].append(message.decode("utf-8", "replace").strip())
+        MESSAGES[instance.decode()].append(" ".join(message.decode("utf-8", "replace").split()))
 
 
 def _callbacks() -> fmi2CallbackFunctions:

@@ -21,7 +21,7 @@ class Testrig(Model):
 
     __test__ = False  # not a test class, whatever its name begins with
     name = "Testrig"
-    step_size = 2.5e-3
+    step_size = 5e-3
     method = rodas3
 
     omega_w = State("rad/s", doc="wheel speed", nominal=10.0)

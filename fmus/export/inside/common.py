@@ -1,7 +1,7 @@
-"""What runs inside a PythonFMU build: copied into the FMU as a package, beside model.casadi and model.json.
+"""The part of a slave that all builds share: variables, refusals, saved state, model description.
 
-It imports nothing of this repository. All that an instance knows is in one flat array of its
-variables, so that there is no hidden state; no exception leaves it, since a host could not survive one.
+All that an instance knows is in one flat array of its variables, so that there is no hidden state;
+no exception leaves it, since a host could not survive one.
 """
 
 from __future__ import annotations
@@ -14,15 +14,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-import casadi as cs
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 from pythonfmu.enums import Fmi2Initial, Fmi2Status, Fmi2Variability
 
 HERE = Path(__file__).parent
-MODEL: dict[str, Any] = json.loads((HERE / "model.json").read_text())
-STEP, OUTPUTS = (
-    cs.Function.deserialize((HERE / f"{name}.casadi").read_text()) for name in ("step", "outputs")
-)
+MODEL: dict[str, Any] = json.loads((HERE / "model.json").read_text(encoding="utf-8"))
 VARIABLES: list[dict[str, Any]] = MODEL["variables"]
 SIZES: list[int] = MODEL["sizes"]  # how many states, inputs, parameters, outputs, in this order
 SETTABLE = sum(SIZES[:3])
@@ -31,7 +27,6 @@ LIMITS = {
     for i, v in enumerate(VARIABLES)
     if v["causality"] in ("parameter", "input") and (v["min"], v["max"]) != (None, None)
 }
-TIME_TOLERANCE = 1e-9  # of a step, so that a whole number of internal steps is seen as one
 
 
 def caught(method: Any) -> Any:
@@ -48,7 +43,7 @@ def caught(method: Any) -> Any:
     return safe
 
 
-class Slave(Fmi2Slave):  # type: ignore[misc]
+class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     """One instance: values of all variables in the order of the model description."""
 
     def __init__(self, **kwargs: Any) -> None:
@@ -56,23 +51,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.description, self.author = MODEL["description"], None
         self.guid, self.version = MODEL["guid"], MODEL["version"]
         self.values = array("d", [v["start"] for v in VARIABLES])
-        self.failure = ""
-        self._connect()
+        self.failure, self.stale = "", True
 
-    def _connect(self) -> None:
-        """Point the compiled functions at the array's memory; their buffers hold no value of their own."""
-        memory, ends = memoryview(self.values), [0, *(sum(SIZES[: i + 1]) for i in range(4))]
-        x, u, p, y = (memory[a:b] for a, b in zip(ends, ends[1:], strict=False))
-        dt, x1 = array("d", [0.0]), array("d", bytes(8 * SIZES[0]))
-        step, self._step = STEP.buffer()
-        out, self._out = OUTPUTS.buffer()
-        for i, part in enumerate((x, u, p, memoryview(dt))):
-            step.set_arg(i, part)
-        for i, part in enumerate((x, u, p)):
-            out.set_arg(i, part)
-        step.set_res(0, memoryview(x1))
-        out.set_res(0, y)
-        self._dt, self._x1, self._buffers, self.stale = dt, x1, (step, out), True
+    def refresh(self) -> None:
+        """Compute the outputs from states, inputs and parameters."""
+        raise RuntimeError("a build defines this")
+
+    def advance(self, current_time: float, step_size: float) -> bool:
+        """Make the step, or leave the state as it was and answer False."""
+        raise RuntimeError("a build defines this")
 
     def fail(self, reason: str) -> None:
         """Log a reason; the instance refuses to step until it is reset or restored."""
@@ -81,11 +68,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def get_real(self, vrs: list[int]) -> list[float]:
         """Values by reference; outputs are computed when first asked for after a change."""
-        if self.stale:
-            self._out()
-            self.stale = False
         values = self.values
         try:
+            if self.stale:
+                self.refresh()
+                self.stale = False
             return [values[i] for i in vrs]
         except Exception as error:
             self.fail(f"get_real: {error}")
@@ -93,7 +80,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @caught
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set states, inputs and parameters; outputs cannot be set, limits and NaN stop the next step."""
+        """Set states, inputs and parameters; what cannot be set stops the next step."""
         for i, value in zip(vrs, values, strict=True):
             if i >= SETTABLE:
                 raise ValueError(f"{VARIABLES[i]['name']} is computed and cannot be set")
@@ -107,25 +94,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     @caught
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Advance by a communication step in equal internal steps; False leaves the state as it was."""
+        """Advance by a communication step; False where it could not be made."""
         if self.failure:
             self.log(self.failure, Fmi2Status.discard)
             return False
         if not step_size > 0:
             raise ValueError(f"step size {step_size} s is not positive")
-        n, values, x1 = SIZES[0], self.values, self._x1
-        steps = max(1, math.ceil(step_size / MODEL["step_size"] - TIME_TOLERANCE))
-        self._dt[0] = step_size / steps
-        before = values[:n]
-        for _ in range(steps):
-            self._step()
-            values[:n] = x1
         self.stale = True
-        if not all(map(math.isfinite, values[:n])):
-            values[:n] = before
-            self.log(f"the state is no longer finite after t = {current_time:g} s", Fmi2Status.discard)
-            return False
-        return True
+        return self.advance(current_time, step_size)
 
     def _get_fmu_state(self) -> dict[str, Any]:
         return {"values": self.values.tolist(), "failure": self.failure}
@@ -149,21 +125,28 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                 ),
                 nested=False,
             )
-        root = super().to_xml(model_options or {})
+        root: Element = super().to_xml(model_options or {})
         root.set("guid", str(self.guid))
         del root.attrib["generationDateAndTime"]  # the same source gives the same bytes
         root.set("variableNamingConvention", "flat")
-        root.insert(list(root).index(root.find("LogCategories")), units_xml())
+        place = [node.tag for node in root].index("LogCategories")
+        root.insert(place, units_xml())
         for node, v in zip(root.iter("ScalarVariable"), VARIABLES, strict=True):
-            real = node.find("Real")
-            keys = ("unit", "min", "max", "nominal", "start")
-            given = {k: v[k] for k in keys if v[k] is not None and (k != "start" or v["starts"])}
-            for k, value in given.items():
-                real.set(k, value if k == "unit" else repr(float(value)))
-        unknowns = SubElement(root.find("ModelStructure"), "InitialUnknowns")
+            complete(node, v)
+        unknowns = SubElement(root.findall("ModelStructure")[0], "InitialUnknowns")
         for i in range(SETTABLE, len(VARIABLES)):
             SubElement(unknowns, "Unknown", index=str(i + 1))
         return root
+
+
+def complete(node: Element, v: dict[str, Any]) -> None:
+    """Unit, limits, nominal and start of one <ScalarVariable>."""
+    real = node.findall("Real")[0]
+    if v["unit"]:
+        real.set("unit", v["unit"])
+    for key in ("min", "max", "nominal", "start"):
+        if v[key] is not None and (key != "start" or v["starts"]):
+            real.set(key, repr(float(v[key])))
 
 
 def units_xml() -> Element:

@@ -1,0 +1,39 @@
+"""A slave that solves a model's equations: compiled CasADi functions on the array of its values."""
+
+from __future__ import annotations
+
+import math
+from itertools import accumulate, pairwise
+from typing import Any
+
+import casadi as cs
+from pythonfmu.enums import Fmi2Status
+
+from . import common
+from .stepping import Stepper
+
+STEP, OUTPUTS = (
+    cs.Function.deserialize((common.HERE / f"{name}.casadi").read_text()) for name in ("step", "outputs")
+)
+
+
+class Slave(common.Slave):
+    """One instance of a model."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        # the functions work on the array's memory and hold no value of their own
+        memory = memoryview(self.values)
+        x, u, p, y = (memory[a:b] for a, b in pairwise(accumulate(common.SIZES, initial=0)))
+        self.stepper = Stepper(STEP, x, u, p, common.MODEL["step_size"])
+        self.buffer, self.refresh = OUTPUTS.buffer()
+        for i, part in enumerate((x, u, p)):
+            self.buffer.set_arg(i, part)
+        self.buffer.set_res(0, y)
+
+    def advance(self, current_time: float, step_size: float) -> bool:
+        """Internal steps as the method asks for, none longer than the model's."""
+        if self.stepper.advance(step_size) and all(map(math.isfinite, self.values[: common.SIZES[0]])):
+            return True
+        self.log(f"no step is short enough after t = {current_time:g} s", Fmi2Status.discard)
+        return False

@@ -1,0 +1,48 @@
+"""Advance a compiled step function over a communication step, with shorter steps where it asks for them."""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any
+
+SHORTEST = 1e-7  # of the communication step; below this a step has failed
+TIME_TOLERANCE = 1e-9  # of the communication step
+SAFETY, GROWTH, CUT, ORDER = 0.9, 4.0, 0.1, 3
+
+
+class Stepper:
+    """Steps of a function step(x, u, p, dt) -> (x1, error) on memory that its owner holds.
+
+    Every communication step begins afresh: how the last one was divided is forgotten, so that a
+    restart from the same values repeats a run to the last bit.
+    """
+
+    def __init__(self, step: Any, x: memoryview, u: memoryview, p: memoryview, longest: float) -> None:
+        self.x, self.longest = x, longest
+        self.x1, self.error, self.h = array("d", bytes(8 * len(x))), array("d", [0.0]), array("d", [0.0])
+        self.buffer, self.evaluate = step.buffer()
+        for i, part in enumerate((x, u, p, memoryview(self.h))):
+            self.buffer.set_arg(i, part)
+        self.buffer.set_res(0, memoryview(self.x1))
+        self.buffer.set_res(1, memoryview(self.error))
+
+    def advance(self, duration: float) -> bool:
+        """Advance x by a duration, s; False, with x as it was, where no step is short enough."""
+        before, done = self.x.tolist(), 0.0
+        parts = max(1.0, -(-duration * (1 - TIME_TOLERANCE) // self.longest))
+        h = duration / parts
+        while duration - done > TIME_TOLERANCE * duration:
+            h = min(h, self.longest, duration - done)
+            self.h[0] = h
+            self.evaluate()
+            error = self.error[0]
+            if error <= 1.0:  # false for NaN
+                self.x[:] = self.x1
+                done += h
+                h *= min(GROWTH, SAFETY * error ** (-1 / ORDER)) if error > 0 else 1.0
+            else:
+                h *= max(CUT, SAFETY * error ** (-1 / ORDER)) if error < 1e300 else CUT
+                if h < SHORTEST * duration:
+                    self.x[:] = array("d", before)
+                    return False
+        return True

@@ -1,0 +1,88 @@
+"""Close the loop on an experiment: find the residual, trace it, add the effect, report."""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from estimator.closeloop.chain import Outcome, trace
+from estimator.closeloop.problem import Problem
+from fmus.errors import BadInput
+from fmus.export.hypotheses import ForeignBuilder, ModelBuilder
+from fmus.host.archive import describe
+from fmus.host.description import FmuDescription, PortNames
+from scenarios.experiment import Experiment, load_experiment
+from scenarios.record import load_record
+from scenarios.report import write_report
+from scenarios.result import Result, result_of
+
+Tell = Callable[[str], None]
+Builder = ModelBuilder | ForeignBuilder
+
+
+def close_loop(
+    experiment: str | Path,
+    out: str | Path | None = None,
+    data_dir: str | Path | None = None,
+    tell: Tell = lambda _: None,
+    jobs: int | None = None,
+    seed: int = 0,
+) -> Result:
+    """What `railfmi close-loop` does; returns the result that is written as result.json.
+
+    experiment: path of an experiment.toml, or its folder; out: folder for result.json, report.html, the
+    figures and the augmented FMU (nothing is written without); data_dir: where the data files lie, by
+    default beside the experiment; jobs: processes, by default one a core; seed: of the bootstrap.
+    Raises BadInput for a wrong experiment.
+    """
+    begun = time.monotonic()
+    path = Path(experiment)
+    declared = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
+    if declared.split is None:
+        raise BadInput(f"{declared.file}: key 'split' is missing; close-loop tests on data held out by it")
+    with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
+        builder = builder_for(declared, Path(work))
+        problem = pose(declared, builder)
+        found = trace(problem, tell, jobs or os.cpu_count() or 1, seed)
+        if out is None:
+            return result_of(declared.id, problem, found, time.monotonic() - begun, None)
+        tell("building the augmented FMU and writing the report")
+        folder = Path(out)
+        folder.mkdir(parents=True, exist_ok=True)
+        augmented = augment(builder, found, folder)
+        result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented)
+        write_report(folder, problem, found, result)
+        result.write(folder / "result.json")
+        return result
+
+
+def builder_for(e: Experiment, work: Path) -> Builder:
+    """What builds the FMUs of an experiment: our model, or the foreign FMU that it names."""
+    if e.model is not None:
+        return ModelBuilder(e.model, work)
+    if e.fmu_path is None:
+        raise BadInput(f"{e.file}: names neither a model nor an FMU")
+    ports = tuple(PortNames(p.name, p.force, p.velocity, p.displacement) for p in e.ports)
+    return ForeignBuilder(e.fmu_path, ports, work)
+
+
+def pose(e: Experiment, builder: Builder) -> Problem:
+    """The question that an experiment asks of its FMU."""
+    description = describe(builder(()))
+    record = load_record(e, description)
+    declared = {**_starts(description, e), **e.parameters, **e.initial}
+    free = tuple(n for n in description.states if n not in e.initial)
+    return Problem(builder, record, declared, dict(e.calibrate), free, builder.ports)
+
+
+def _starts(description: FmuDescription, e: Experiment) -> dict[str, float]:
+    """The FMU's own values of parameters to calibrate that the experiment does not declare."""
+    return {n: description.variables[n].start or 0.0 for n in e.calibrate}
+
+
+def augment(builder: Builder, found: Outcome, folder: Path) -> Path:
+    """Write the FMU with the effects found and the calibrated values as start values."""
+    best = found.chosen or found.base
+    effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
+    return builder.final(effects, best.fit.theta, folder)

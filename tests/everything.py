@@ -1,0 +1,45 @@
+"""All models, effects and the places where they fit: what the contract tests go through."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.effects import EFFECTS
+from fmus.effects.effect import Effect
+from fmus.model import Model
+from fmus.models import MODELS
+from fmus.variables import Input, Parameter, State
+
+Array = NDArray[np.float64]
+Place = tuple[str, str, str]  # model, kind of effect, location
+
+EVERY_MODEL = sorted(MODELS)
+EVERY_EFFECT = sorted(EFFECTS)
+EVERY_PLACE: list[Place] = [
+    (name, kind, location)
+    for name in EVERY_MODEL
+    for location, port in MODELS[name]().ports().items()
+    for kind in EVERY_EFFECT
+    if EFFECTS[kind].fits(port)
+]
+
+
+def fitting(model: str) -> list[tuple[type[Effect], str]]:
+    """Every effect at every place of a model."""
+    return [(EFFECTS[kind], location) for name, kind, location in EVERY_PLACE if name == model]
+
+
+def start(model: Model, kind: type[Any]) -> Array:
+    """Start values of the variables of a kind, (n,)."""
+    return np.array([v.start for v in model.of(kind)])
+
+
+def near_start(model: Model, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """States, inputs and parameters about the start values: x, u by their nominal, p as declared."""
+    x, u = (
+        np.array([v.start + (v.nominal or 1.0) * rng.uniform(-1, 1) for v in model.of(kind)])
+        for kind in (State, Input)
+    )
+    low = np.array([-np.inf if v.min is None else v.min for v in model.of(Input)])
+    return x, np.maximum(u, low), start(model, Parameter)
