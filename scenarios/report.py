@@ -1,11 +1,126 @@
-"""Placeholder until the page exists."""
+"""The report of close-loop: one self-contained page, and its figures as files."""
 
+import base64
+from collections.abc import Iterable
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.sensors import KINDS
+from fmus.host.archive import describe
+from scenarios import sections
+from scenarios.figures.channels import record_plots, residual_plots, spectrum_plots
+from scenarios.figures.errors import error_plot
+from scenarios.figures.forces import OTHERS, force_plots, laws_found
+from scenarios.figures.headline import headline_plot
+from scenarios.figures.sheet import Plot
+from scenarios.glossary import effect_words, glossary, hypothesis_words
+from scenarios.rejected import best_wrong, detection_words, rejected, tried
 from scenarios.result import Result
+from scenarios.typography import number, unit
+from scenarios.wording import Case, missed_words, story
+
+HERE = Path(__file__).parent
+ROWS = 15  # of the table of rejected hypotheses
+Values = dict[str, Any]
 
 
 def write_report(folder: Path, problem: Problem, found: Outcome, result: Result) -> None:
-    """Write report.html and the figures into a folder."""
+    """Write report.html and the figures into a folder.
+
+    The page holds its figures and its style and asks for nothing else.
+    """
+    case = Case(problem, found, result, glossary(problem, found.judgement.members))
+    env = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    parts = {
+        **_figures(case, folder),
+        **_measured(case),
+        **_law(case),
+        **_rejection(case),
+        **_use(case, folder),
+    }
+    page = env.get_template("report.html.j2").render(result=result, story=story(case), **parts)
+    part = folder / "report.part"
+    part.write_text(page, encoding="utf-8")
+    part.replace(folder / "report.html")
+
+
+def _figures(case: Case, folder: Path) -> Values:
+    """Draw all figures, write them, and embed them."""
+    problem, found, words = case.problem, case.found, case.words
+
+    def embed(plots: Iterable[Plot]) -> list[Values]:
+        data = [(p.caption, base64.b64encode(p.write(folder)).decode()) for p in plots]
+        return [{"caption": c, "source": f"data:image/png;base64,{d}"} for c, d in data]
+
+    return {
+        "headline_figure": embed([headline_plot(problem, found, words)]),
+        "record_figures": embed(record_plots(problem, words)),
+        "force_figures": embed(force_plots(found, words)),
+        "error_figures": embed([error_plot(sections.error_values(case), words)]),
+        "residual_figures": embed(residual_plots(problem, found, words)),
+        "spectrum_figures": embed(spectrum_plots(problem, found, words)),
+    }
+
+
+def _measured(case: Case) -> Values:
+    return {
+        "cards": sections.gap_cards(case),
+        "channels": list(sections.channels(case)),
+        "runs": sections.runs(case),
+        "free_states": case.problem.free_states,
+    }
+
+
+def _law(case: Case) -> Values:
+    shown = len(laws_found(case.found)) + OTHERS
+    return {
+        "missed": missed_words(case),
+        "ports_left_out": [m.port.name for m in case.found.forces[shown:]],
+        "laws": list(sections.laws(case)),
+        "calibrated": list(sections.calibrated(case)),
+        "has_effect": case.found.chosen is not None,
+    }
+
+
+def _rejection(case: Case) -> Values:
+    rows, wrong = rejected(case.problem, case.found), best_wrong(case.found)
+    return {
+        "errors": sections.error_rows(case),
+        "wrong": hypothesis_words(wrong) if wrong else "",
+        "rejected": rows[:ROWS],
+        "more_rejected": max(0, len(rows) - ROWS),
+        "best": hypothesis_words(case.found.chosen or case.found.base),
+        "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
+        "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
+        "detection": detection_words(case.found),
+        "tried": [(at, ", ".join(map(effect_words, kinds))) for at, kinds in tried(case.problem).items()],
+        "faults": ", ".join(map(effect_words, KINDS)),
+        "known_noise": not any(c["noise"].endswith("(estimated)") for c in sections.channels(case)),
+    }
+
+
+def _use(case: Case, folder: Path) -> Values:
+    """How to run the augmented FMU and how to repeat the run."""
+    chosen, fmu = case.found.chosen, folder / case.result.augmented_fmu
+    effects = [c for c in (chosen.candidates if chosen else ()) if not c.is_fault]
+    theta = chosen.fit.theta if chosen else {}
+    known = describe(fmu).variables if fmu.is_file() else {}
+    others = {
+        n: v
+        for n, v in case.problem.declared.items()
+        if n in known and known[n].start != v and n not in theta
+    }
+    return {
+        "effect_values": {u.name: f"{theta[u.name]:.6g}" for c in effects for u in c.unknowns},
+        "switches": [u.name for c in effects for u in c.amplitudes],
+        "settings": {n: float(f"{v:.9g}") for n, v in others.items()},
+        "stop_time": f"{case.problem.record.runs[0].t[-1]:g}",
+        "version": version("railfmi"),
+    }

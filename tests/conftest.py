@@ -1,14 +1,19 @@
-"""FMUs built once for all tests."""
+"""FMUs built once for all tests, and examples without a time limit."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from fmus.effects import parse_effect
 from fmus.export.pythonfmu import build_python
 from fmus.models import model_class
 from tests.everything import fitting
+from tests.foreign import foreign_builder
+
+settings.register_profile("railfmi", deadline=None)  # a busy machine is no failure
+settings.load_profile("railfmi")
 
 Built = Callable[..., Path]
 
@@ -27,3 +32,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
         return made[key]
 
     return build
+
+
+@pytest.fixture(scope="session")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """foreign(body of do_step, more of the class) is the path of an FMU made with PythonFMU alone."""
+    return foreign_builder(tmp_path_factory.mktemp("foreign"))

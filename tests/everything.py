@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +34,13 @@ def fitting(model: str) -> list[tuple[type[Effect], str]]:
 def start(model: Model, kind: type[Any]) -> Array:
     """Start values of the variables of a kind, (n,)."""
     return np.array([v.start for v in model.of(kind)])
+
+
+def values(function: cs.Function, *arguments: Array) -> Array:
+    """First result of a CasADi function, (n,)."""
+    result = function(*arguments)
+    flat: Array = (result[0] if isinstance(result, tuple) else result).full().ravel()
+    return flat
 
 
 def near_start(model: Model, rng: np.random.Generator) -> tuple[Array, Array, Array]:

@@ -24,7 +24,7 @@ def compiled(rates, n, method=rodas3, tolerated=1e-6):
 
 
 def pendulum(x, u, p):
-    return x[1], -cs.sin(x[0]) - p * x[1] * cs.fabs(x[1]) + u
+    return x[1], -cs.sin(x[0]) - p * x[1] ** 3 + u
 
 
 def march(step, x, u, p, duration, steps):
@@ -36,7 +36,7 @@ def march(step, x, u, p, duration, steps):
 @pytest.mark.parametrize(("method", "order"), METHODS)
 def test_order_of_convergence(method, order):
     def rates(_, x):
-        return [x[1], -np.sin(x[0]) - 0.3 * x[1] * abs(x[1]) + 0.2]
+        return [x[1], -np.sin(x[0]) - 0.3 * x[1] ** 3 + 0.2]
 
     exact = solve_ivp(rates, (0, 2), [1.0, 0.5], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
     step = compiled(pendulum, 2, method)
@@ -79,9 +79,10 @@ def test_prothero_robinson_follows_the_slow_solution():
         return -p * (x[0] - cs.cos(x[1])) - cs.sin(x[1]), 1.0
 
     step = compiled(rates, 2)
-    errors = [abs(march(step, [1.0, 0.0], 0.0, 1e6, 2.0, n)[0] - np.cos(2.0)) for n in (10, 20)]
-    assert errors[0] < 1e-4
-    assert errors[1] < errors[0] / 3  # the order may fall to 2 where a problem is stiff, not further
+    for rate in (1e2, 1e4, 1e6):
+        errors = [abs(march(step, [1.0, 0.0], 0.0, rate, 2.0, n)[0] - np.cos(2.0)) for n in (10, 20, 40)]
+        assert errors[0] < 0.02 / rate  # a stiffly accurate method: the stiffer, the better
+        assert errors[2] < errors[1] < errors[0]
 
 
 def test_short_steps_follow_stiff_van_der_pol():
@@ -95,7 +96,7 @@ def test_short_steps_follow_stiff_van_der_pol():
 
     x, u, p = (memoryview(array("d", v)) for v in ([2.0, 0.0], [0.0], [mu]))
     stepper = Stepper(compiled(rates, 2, tolerated=1e-6), x, u, p, 10.0)
-    assert all(stepper.advance(100.0) for _ in range(9))  # past the first jump, at 807 s
+    assert all(stepper.advance(1.0) for _ in range(900))  # past the first jump, at 807 s
     exact = solve_ivp(by_scipy, (0, 900), [2.0, 0.0], method="Radau", rtol=1e-10, atol=1e-12).y[:, -1]
     assert_allclose(x.tolist(), exact, rtol=1e-4)
 
@@ -134,8 +135,9 @@ def test_no_step_is_longer_than_asked_and_equal_ones_are_equal():
     assert_allclose(seen, 0.025 / 3, rtol=1e-12)
 
 
-def test_a_step_that_never_succeeds_leaves_the_state():
-    x, u, p = (memoryview(array("d", v)) for v in ([1.0], [0.0], [1.0]))
-    stepper = Stepper(compiled(lambda x, u, p: (cs.sqrt(-1 - x[0] ** 2),), 1), x, u, p, 0.1)
+@pytest.mark.parametrize(("method", "_order"), METHODS)
+def test_a_step_that_never_succeeds_leaves_the_state(method, _order):
+    x, u, p = (memoryview(array("d", v)) for v in ([1.0, 1.0], [0.0], [1.0]))
+    stepper = Stepper(compiled(lambda x, u, p: (cs.sqrt(-1 - x[0] ** 2), x[1]), 2, method), x, u, p, 0.1)
     assert not stepper.advance(0.1)
-    assert x.tolist() == [1.0]
+    assert x.tolist() == [1.0, 1.0]

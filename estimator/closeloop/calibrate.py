@@ -8,7 +8,7 @@ from estimator.closeloop.noise import noise_floor, weights
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.record import Array
 
-IDLE = 1e-6  # rms change of the outputs over their spread, below which a start state does nothing
+SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is left alone
 
 
 def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
@@ -17,8 +17,8 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
     Where noise is not declared that size depends on the residual, so the calibration is repeated with it.
     """
     record = problem.record
+    states = _start_unknowns(problem)
     spread = np.std(np.vstack([run.y for run in record.runs]), axis=0) + noise_floor(record)
-    states = _start_unknowns(problem, spread)
     start = fit(problem, states, spread)
     declared = Hypothesis((), start, tuple(problem.residuals(start.theta)))
     parameters = [
@@ -33,19 +33,19 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
     return declared, base, size
 
 
-def _start_unknowns(problem: Problem, spread: Array) -> list[Unknown]:
-    """Start states to be found: those that are free and change what is measured."""
-    run = problem.record.runs[0]
-    guess = problem.start_states(run)
+def _start_unknowns(problem: Problem) -> list[Unknown]:
+    """Start states to be found: those that are free, and whose error could be seen in the residual."""
+    guess = problem.start_states(problem.record.runs[0])
     if not guess:
         return []
     known = problem.plant.fmu.description.variables
-    as_guessed = problem.residuals(guess)[0]
+    start = {name: value for name, (value, _) in guess.items()}
+    as_guessed = problem.residuals(start)
+    size = weights(problem.record, as_guessed)
     found = []
-    for name, value in guess.items():
-        column = problem.measured_state.get(name)
-        scale = 0.01 * (spread[column] if column is not None else known[name].nominal or 1.0)
-        moved = problem.residuals({**guess, name: value + scale})[0] - as_guessed
-        if np.sqrt(np.mean((moved / spread) ** 2)) > IDLE:
-            found.append(Unknown(name, value, -np.inf, np.inf, float(scale)))
+    for name, (value, error) in guess.items():
+        scale = error if np.isfinite(error) else 0.01 * (known[name].nominal or 1.0)
+        moved = problem.residuals({**start, name: value + scale})[0] - as_guessed[0]
+        if np.sum((moved / size) ** 2) > SEEN:
+            found.append(Unknown(name, value, value - error, value + error, float(scale)))
     return found

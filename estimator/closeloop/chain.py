@@ -7,7 +7,7 @@ import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import fault_candidates, physical_candidates
-from estimator.closeloop.compare import Hypothesis, hypotheses, ranked
+from estimator.closeloop.compare import Hypothesis, best_by_label, hypotheses, ranked
 from estimator.closeloop.detect import Detection, detect
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.noise import noise_floor
@@ -67,7 +67,7 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     if not (floor_known and any(explains(problem, h, base, noise, size) for h in singles)):
         tell("trying pairs of effects")
         pairs, freed = try_pairs(problem, base, singles, change, size, jobs)
-        singles += freed
+        singles = best_by_label([*singles, *freed])
     singles, pairs = (ranked(problem, h, size) for h in (singles, pairs))
     judgement = judge(problem, base, singles, pairs, noise, size)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement)

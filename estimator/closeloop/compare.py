@@ -1,6 +1,6 @@
 """Joint fits of hypotheses and their comparison on data that no fit has seen."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,11 @@ from estimator.closeloop.fit import BLOCKS, Fit, fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built, label
 from estimator.record import Array
+from fmus.host.fmu import FmuError
 
 BRIEF, LONG = 4, 15  # evaluations of a fit to rank it, and to finish it
-FINALISTS = 8
+FINALISTS = 6
+HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
 
@@ -62,12 +64,19 @@ class Hypothesis:
 
 def hypothesis(
     problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, evaluations: int
-) -> Hypothesis:
-    """Fit a set of candidates jointly with the base unknowns, from where the screening left them."""
+) -> Hypothesis | None:
+    """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
+
+    None where the FMU does not run with them.
+    """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
     found = fit(here, [*unknowns, *own], size, promise.start, evaluations=evaluations)
-    return Hypothesis(promise.candidates, found, tuple(here.residuals(found.theta)))
+    try:
+        residuals = here.residuals(found.theta)
+    except FmuError:
+        return None
+    return Hypothesis(promise.candidates, found, tuple(residuals))
 
 
 def hypotheses(
@@ -79,7 +88,8 @@ def hypotheses(
     """
     unknowns = base.fit.unknowns
     brief = fitted(problem, unknowns, promises, size, BRIEF, jobs)
-    hopeful = [h for h in brief if cost(h) < WORTH * cost(base)][:FINALISTS]
+    limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
+    hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
     again = [Promise(h.candidates, 0.0, h.fit.theta) for h in hopeful]
     return fitted(problem, unknowns, again, size, LONG, jobs) + [h for h in brief if h not in hopeful]
 
@@ -90,8 +100,13 @@ def fitted(
 ) -> list[Hypothesis]:  # fmt: skip
     """Fit each promise with so many evaluations; one hypothesis a label, best first on the identify part."""
     tasks = (delayed(hypothesis)(problem, unknowns, p, size, evaluations) for p in promises)
+    return best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
+
+
+def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """Of several hypotheses with the same label the one that fits better; best first."""
     best: dict[str, Hypothesis] = {}
-    for h in Parallel(n_jobs=jobs)(tasks):
+    for h in found:
         if h.label not in best or cost(h) < cost(best[h.label]):
             best[h.label] = h
     return sorted(best.values(), key=cost)

@@ -87,7 +87,8 @@ def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
     if jacobian.shape[1]:
         q = np.linalg.qr(jacobian)[0]
         g = g - q @ (q.T @ g)
-    return g / (np.linalg.norm(g, axis=0) + 1e-300)
+    directions: Array = g / (np.linalg.norm(g, axis=0) + 1e-300)
+    return directions
 
 
 def _figures(residual: Array, fit: Array, test: Array, regressors: Array | None) -> dict[str, float]:

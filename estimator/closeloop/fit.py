@@ -45,11 +45,9 @@ class Fit:
 def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
     """Residual on the identify part over `size` (n_y,), sample after sample, (m,)."""
     try:
-        residuals = problem.residuals(theta)
+        flat = (problem.identify_residual(theta) / size).ravel()
     except FmuError:
-        residuals = [np.full_like(run.y, np.nan) for run in problem.record.runs]
-    runs = zip(residuals, problem.record.runs, strict=True)
-    flat = np.concatenate([(r[run.fit] / size).ravel() for r, run in runs])
+        flat = np.full(sum(int(run.fit.sum()) for run in problem.record.runs) * len(size), np.nan)
     return np.nan_to_num(np.clip(flat, -REFUSED, REFUSED), nan=REFUSED)
 
 
@@ -87,10 +85,11 @@ def fit(
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     inside = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     found = least_squares(
-        residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-6, ftol=1e-7, max_nfev=evaluations
+        residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-5, ftol=1e-6, max_nfev=evaluations
     )
-    covariance = sandwich(found.fun, found.jac, scale)
-    return Fit(tuple(unknowns), found.x, covariance, found.fun, found.jac)
+    slopes = np.asarray(found.jac)
+    covariance = sandwich(found.fun, slopes, scale)
+    return Fit(tuple(unknowns), found.x, covariance, found.fun, slopes)
 
 
 def sandwich(residual: Array, jacobian: Array, scale: Array) -> Array:

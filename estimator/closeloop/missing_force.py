@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.closeloop.problem import Problem
 from estimator.record import Array
@@ -34,7 +35,7 @@ class MissingForce:
 class Linearised:
     """x+ = A x + B f, y = C x around a free run: (k, n, n), (k, n, ports), (k, n_y, n) at `index`."""
 
-    index: Array
+    index: NDArray[np.intp]
     A: Array
     B: Array
     C: Array
@@ -64,7 +65,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     return found
 
 
-def _linearise(problem: Problem, theta: Mapping[str, float], x: Array, keep: Array) -> Linearised:
+def _linearise(problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp]) -> Linearised:
     plant, run = problem.plant, problem.record.runs[0]
     index = np.unique(np.linspace(0, len(keep) - 2, min(POINTS, len(keep) - 1)).astype(int))
     start = {**problem.declared}

@@ -16,7 +16,8 @@ def noise_floor(record: Record) -> Array:
         measured.append(1.4826 * np.median(np.abs(rough)) / np.linalg.norm(DIFFERENCE))
     spread = np.std(np.vstack([run.y for run in record.runs]), axis=0)
     floor = np.where(np.isnan(record.noise_std), measured, record.noise_std)
-    return np.maximum(floor, 1e-12 * spread + 1e-300)
+    lowest: Array = np.maximum(floor, 1e-12 * spread + 1e-300)
+    return lowest
 
 
 def correlation_time(residual: Array) -> float:

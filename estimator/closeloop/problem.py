@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from estimator.closeloop.sensors import faulty
 from estimator.plant import Plant
@@ -18,7 +17,8 @@ from fmus.host.archive import Archive
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 
-START_SAMPLES = 20  # from which the start state of a held-out file is found
+START_SAMPLES = 20  # from which a start state that is measured is found
+START_ERROR = 3.0  # times the scatter of these samples: the most that it can be wrong
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Builder(Protocol):
 class Problem:
     """An FMU with declared values against a record.
 
-    builder: gives the FMU; effects: (kind, location) built in; declared: parameters and given start states; calibrate: bounds by name;
-    free_states: states whose start is not given. Small and picklable: workers open the FMU themselves.
+    builder: gives the FMU; effects: (kind, location) built in; declared: parameters and given start
+    states; calibrate: bounds by name; free_states: states whose start is not given. Small and picklable: workers open the FMU themselves.
     """
 
     builder: Builder
@@ -75,19 +75,28 @@ class Problem:
 
     def residuals(self, theta: Mapping[str, float]) -> list[Array]:
         """Measured minus simulated outputs of each run, (N, n_y)."""
-        simulated = self.simulate(theta)
-        return [run.y - y for run, y in zip(self.record.runs, simulated, strict=True)]
+        return [run.y - self._run(run, theta, ()) for run in self.record.runs]
 
-    def start_states(self, run: Run) -> dict[str, float]:
-        """First guess of the free states: a line through the first samples where measured, else the FMU's."""
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        """Measured minus simulated outputs on the identify part, (m, n_y)."""
+        runs = [run for run in self.record.runs if run.fit.any()]
+        return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in runs])
+
+    def start_states(self, run: Run) -> dict[str, tuple[float, float]]:
+        """First guess of the free states and how far it can be wrong.
+
+        A line through the first samples where a state is measured; else the FMU's start value, with
+        no limit to its error.
+        """
         head = slice(START_SAMPLES)
         guess = {}
         for name in self.free_states:
             if name in self.measured_state:
-                y = run.y[head, self.measured_state[name]]
-                guess[name] = float(np.polyfit(run.t[head] - run.t[0], y, 1)[1])
+                t, y = run.t[head] - run.t[0], run.y[head, self.measured_state[name]]
+                line = np.polynomial.Polynomial.fit(t, y, 1)
+                guess[name] = float(line(0.0)), START_ERROR * float(np.std(y - line(t)))
             else:
-                guess[name] = self.plant.fmu.description.variables[name].start or 0.0
+                guess[name] = self.plant.fmu.description.variables[name].start or 0.0, np.inf
         return guess
 
     def with_effects(self, effects: Sequence[tuple[str, str]]) -> Problem:
@@ -97,30 +106,13 @@ class Problem:
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
         start = {**self.declared, **self._own(theta)}
         if self.free_states and not run.fit.any():
-            start |= self._settle(run, start)
+            start |= {n: value for n, (value, _) in self.start_states(run).items()}
         y = self.plant.simulate(run, start, more)
         return faulty(y, run.t, self.record.outputs, theta)
 
     def _own(self, theta: Mapping[str, float]) -> dict[str, float]:
         known = self.plant.fmu.description.variables
         return {n: v for n, v in theta.items() if n in known}
-
-    def _settle(self, run: Run, start: Mapping[str, float]) -> dict[str, float]:
-        """Start states of a held-out run, from its first samples alone."""
-        guess = self.start_states(run)
-        names = [n for n in guess if n in self.measured_state]
-        if not names:
-            return guess
-        head = Run(*(a[:START_SAMPLES] for a in (run.t, run.u, run.y, run.fit, run.test)))
-        spread = np.std(run.y, axis=0) + 1e-300
-
-        def residual(x: Array) -> Array:
-            y = self.plant.simulate(head, {**start, **guess, **dict(zip(names, x, strict=True))})
-            return ((head.y - y) / spread).ravel()
-
-        scale = [spread[self.measured_state[n]] for n in names]
-        found = least_squares(residual, [guess[n] for n in names], x_scale=scale, diff_step=1e-4, max_nfev=10)
-        return {**guess, **dict(zip(names, found.x.tolist(), strict=True))}
 
 
 @cache

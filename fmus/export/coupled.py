@@ -47,9 +47,9 @@ def build_coupled(
     table = [r for group in rows for r in group]
     for r in table:
         r["start"] = float((starts or {}).get(r["name"], r["start"]))
-    order = [r["name"] for r in table]
+    order, names = [r["name"] for r in table], [f"{kind}@{location}" for kind, location in effects]
     card = {
-        "description": f"{description.name} with {', '.join(f'{k}@{at}' for k, at in effects) or 'no effect'}",
+        "description": f"{description.name} with {', '.join(names) or 'no effect'}",
         "step_size": COUPLING_STEP,
         "sizes": [len(group) for group in rows],
         "units": unit_table(r["unit"] for r in table if r["unit"]),
@@ -59,7 +59,7 @@ def build_coupled(
     files = {"laws.casadi": laws.function.serialize().encode(), "base.fmu": base.read_bytes()}
     title = name or f"{description.identifier}WithEffects"
     needs = "It carries another FMU and runs it with the package fmpy, which the importing process needs too."
-    page = documentation(title, card, [f"{k}@{at}" for k, at in effects], needs)
+    page = documentation(title, card, names, needs)
     return pack(Content(title, card, ("coupled",), files, page, saves_state=False), out)
 
 

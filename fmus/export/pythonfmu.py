@@ -65,8 +65,8 @@ def build_python(model: Model, out: Path) -> Path:
         "variables": variable_table(model),
     }
     files = {f"{n}.casadi": f.serialize().encode() for n, f in (("step", made.step), ("outputs", made.h))}
-    effects = [f"{e.kind}@{location}" for e, location in model.effects]
-    return pack(Content(model.name, card, ("solved", "stepping"), files, documentation(model.name, card, effects)), out)
+    page = documentation(model.name, card, [f"{e.kind}@{location}" for e, location in model.effects])
+    return pack(Content(model.name, card, ("solved", "stepping"), files, page), out)
 
 
 def pack(content: Content, out: Path) -> Path:

@@ -23,8 +23,7 @@ class Archive:
         names = _checked_names(self.path)
         self.folder = Path(tempfile.mkdtemp(prefix="railfmi_fmu_"))
         try:
-            with zipfile.ZipFile(self.path) as packed:
-                packed.extractall(self.folder)
+            _unpack(self.path, self.folder)
             self.description = _description(self.path, self.folder)
             _check_platform(self.path, self.description, names)
         except BaseException:
@@ -62,7 +61,7 @@ def _checked_names(path: Path) -> list[str]:
         with zipfile.ZipFile(path) as packed:
             names = packed.namelist()
             broken = packed.testzip()
-    except (zipfile.BadZipFile, OSError) as error:
+    except Exception as error:  # damage shows as errors of zipfile, zlib, struct, codecs and others
         raise BadInput(f"{path}: not a readable zip file, so no FMU ({error}); get it again") from error
     if broken:
         raise BadInput(f"{path}: '{broken}' in it is damaged; get the FMU again")
@@ -73,6 +72,16 @@ def _checked_names(path: Path) -> list[str]:
     if "modelDescription.xml" not in names:
         raise BadInput(f"{path}: has no modelDescription.xml, so it is no FMU")
     return names
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    try:
+        with zipfile.ZipFile(path) as packed:
+            packed.extractall(folder)
+    except OSError as error:
+        raise BadInput(
+            f"{path}: cannot be unpacked in {folder} ({error}); mend the file or free space"
+        ) from error
 
 
 def _description(path: Path, folder: Path) -> FmuDescription:

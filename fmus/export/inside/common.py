@@ -81,6 +81,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     @caught
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set states, inputs and parameters; what cannot be set stops the next step."""
+        self.stale = True
         for i, value in zip(vrs, values, strict=True):
             if i >= SETTABLE:
                 raise ValueError(f"{VARIABLES[i]['name']} is computed and cannot be set")
@@ -90,7 +91,22 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
             if not low <= value <= high:
                 raise ValueError(f"{VARIABLES[i]['name']} = {value:g} is outside {low:g} to {high:g}")
             self.values[i] = value
-        self.stale = True
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """There are none; PythonFMU would raise an error that no host survives."""
+        self.fail("it has Real variables only")
+        return [0] * len(vrs)
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """There are none."""
+        return [str(number) for number in self.get_integer(vrs)]
+
+    def set_integer(self, vrs: list[int], values: list[Any]) -> None:
+        """There are none."""
+        self.get_integer(vrs)
+
+    get_boolean = get_integer
+    set_boolean = set_string = set_integer
 
     @caught
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -98,8 +114,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         if self.failure:
             self.log(self.failure, Fmi2Status.discard)
             return False
-        if not step_size > 0:
-            raise ValueError(f"step size {step_size} s is not positive")
+        if not 0 < step_size < math.inf:
+            raise ValueError(f"step size {step_size} s is not positive and finite")
         self.stale = True
         return self.advance(current_time, step_size)
 
@@ -108,8 +124,17 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
 
     @caught
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        if len(state["values"]) != len(self.values):
+            raise ValueError("the saved state is not one of this FMU")
         self.values[:] = array("d", state["values"])
         self.failure, self.stale = state["failure"], True
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            return dict(json.loads(state.decode("utf-8")))
+        except (ValueError, TypeError):
+            return {"values": []}  # refused when it is set
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description, completed by what PythonFMU leaves out."""
@@ -133,9 +158,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         root.insert(place, units_xml())
         for node, v in zip(root.iter("ScalarVariable"), VARIABLES, strict=True):
             complete(node, v)
-        unknowns = SubElement(root.findall("ModelStructure")[0], "InitialUnknowns")
-        for i in range(SETTABLE, len(VARIABLES)):
-            SubElement(unknowns, "Unknown", index=str(i + 1))
+        computed = range(SETTABLE, len(VARIABLES))
+        if computed:
+            unknowns = SubElement(root.findall("ModelStructure")[0], "InitialUnknowns")
+            for i in computed:
+                SubElement(unknowns, "Unknown", index=str(i + 1))
         return root
 
 

@@ -42,16 +42,19 @@ class Slave(common.Slave):
         self.base, self.running = _instance(), False
         self.start_time = 0.0
         self.motion, self.force = (array("d", bytes(8 * n)) for n in (LAWS.numel_in(0), LAWS.numel_out(0)))
-        self.buffer, self.law = LAWS.buffer()
+        buffer: Any  # its type stubs ask for a size that a memoryview has
+        buffer, self.law = LAWS.buffer()
         own = memoryview(self.values)[OWN.start : OWN.stop]
         for i, part in enumerate((memoryview(self.motion), own)):
-            self.buffer.set_arg(i, part)
-        self.buffer.set_res(0, memoryview(self.force))
+            buffer.set_arg(i, part)
+        buffer.set_res(0, memoryview(self.force))
+        self.buffer = buffer
         ports = BASE["ports"]
         self.given = [port["force"] for port in ports]
-        self.read = self._call(
-            "fmi2GetReal", [i for port in ports for i in (port["displacement"], port["velocity"])], self.motion
-        )
+        motion = [i for port in ports for i in (port["displacement"], port["velocity"])]
+        self.read = self._call("fmi2GetReal", motion, self.motion)
+        self.step = self.base.dll.fmi2DoStep
+        self.step.argtypes = [c_void_p, c_double, c_double, c_uint]
         self.push = self._call("fmi2SetReal", self.given, self.force)
         self.look = [
             self._call("fmi2GetReal", list(part), self.values, part.start)
@@ -116,7 +119,7 @@ class Slave(common.Slave):
             for i, own in enumerate(given):
                 force[i] += own
             self.push()
-            self.base.doStep(current_time + k * dt, dt)
+            _ok(self.step(self.base.component, current_time + k * dt, dt, 1), "fmi2DoStep")
         self.refresh()
         self.stale = False
         if all(map(math.isfinite, self.values)):

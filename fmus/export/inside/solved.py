@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -26,14 +25,20 @@ class Slave(common.Slave):
         memory = memoryview(self.values)
         x, u, p, y = (memory[a:b] for a, b in pairwise(accumulate(common.SIZES, initial=0)))
         self.stepper = Stepper(STEP, x, u, p, common.MODEL["step_size"])
-        self.buffer, self.refresh = OUTPUTS.buffer()
+        buffer: Any  # its type stubs ask for a size that a memoryview has
+        buffer, self.compute = OUTPUTS.buffer()
         for i, part in enumerate((x, u, p)):
-            self.buffer.set_arg(i, part)
-        self.buffer.set_res(0, y)
+            buffer.set_arg(i, part)
+        buffer.set_res(0, y)
+        self.buffer = buffer
+
+    def refresh(self) -> None:
+        """Compute the outputs from states, inputs and parameters."""
+        self.compute()
 
     def advance(self, current_time: float, step_size: float) -> bool:
         """Internal steps as the method asks for, none longer than the model's."""
-        if self.stepper.advance(step_size) and all(map(math.isfinite, self.values[: common.SIZES[0]])):
+        if self.stepper.advance(step_size):
             return True
         self.log(f"no step is short enough after t = {current_time:g} s", Fmi2Status.discard)
         return False

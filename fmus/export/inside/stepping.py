@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from math import isfinite
 from typing import Any
 
 SHORTEST = 1e-7  # of the communication step; below this a step has failed
@@ -36,12 +37,12 @@ class Stepper:
             self.h[0] = h
             self.evaluate()
             error = self.error[0]
-            if error <= 1.0:  # false for NaN
+            if error <= 1.0 and all(map(isfinite, self.x1)):  # the error may be blind to NaN
                 self.x[:] = self.x1
                 done += h
                 h *= min(GROWTH, SAFETY * error ** (-1 / ORDER)) if error > 0 else 1.0
             else:
-                h *= max(CUT, SAFETY * error ** (-1 / ORDER)) if error < 1e300 else CUT
+                h *= max(CUT, SAFETY * error ** (-1 / ORDER)) if 1.0 < error < 1e300 else CUT
                 if h < SHORTEST * duration:
                     self.x[:] = array("d", before)
                     return False

@@ -1,0 +1,38 @@
+# Everything from nothing but Python 3.11+ and pip; quick the second time.
+PYTHON ?= python3
+BIN := .venv/bin
+OUT ?= out
+
+.PHONY: demo test test-all lint bench clean
+
+demo: .venv/ready  ## build the FMU, close the loop on the bundled record, name the report
+	$(BIN)/railfmi build testrig --out $(OUT)/demo
+	$(BIN)/railfmi check $(OUT)/demo/Testrig.fmu
+	$(BIN)/railfmi close-loop scenarios/demo/rig-drag --out $(OUT)/demo
+
+test: .venv/ready-dev  ## everything that is fast
+	$(BIN)/python -m pytest
+
+test-all: .venv/ready-dev  ## the slow ones too
+	$(BIN)/python -m pytest -m ""
+
+lint: .venv/ready-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: .venv/ready-dev  ## side-by-side measurements
+	$(BIN)/python -m benchmarks.steps
+
+.venv/ready: pyproject.toml requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit("railfmi needs Python 3.11 or newer; set PYTHON=..." if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e .
+	@touch $@
+
+.venv/ready-dev: .venv/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf .venv build out dist

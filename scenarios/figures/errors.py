@@ -1,0 +1,50 @@
+"""Errors on the held-out part as bars."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from scenarios.figures.sheet import AFTER, BEFORE, CLOUD, INK, NOISE, Plot, name_axes, sheet
+from scenarios.glossary import Glossary
+from scenarios.typography import number, quantity
+
+COLOURS = {"declared": CLOUD, "before": BEFORE, "after": AFTER, "wrong": NOISE}
+NAMES = {"declared": "as declared", "before": "before", "after": "after", "wrong": "best wrong effect"}
+STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labelled in each decade, by the decades that are shown
+CAPTION = (
+    "Error on the held-out part in multiples of the noise floor, on a logarithmic scale. The bars begin at "
+    "the floor, which no model can be expected to pass."
+)
+
+
+def error_plot(errors: dict[str, dict[str, float]], words: Glossary) -> Plot:
+    """Bars of the errors of each output, by output and by the keys of NAMES and `noise`."""
+    outputs = list(errors)
+    rows = [outputs[i : i + 2] for i in range(0, len(outputs), 2)]
+    layout = [row if len(row) == 2 or len(rows) == 1 else [*row, "."] for row in rows]
+    bars = len(next(iter(errors.values()))) - 1
+    figure, axes = sheet((0.75 + 0.27 * bars) * len(rows), layout)
+    for output, values in errors.items():
+        _bars(axes[output], values, words.unit(output))
+        name_axes(axes[output], "error over noise", "", output)
+    return Plot("error", figure, CAPTION)
+
+
+def _bars(ax: Axes, values: dict[str, float], unit: str) -> None:
+    """One bar a model, from the noise floor to its error."""
+    shown = [k for k in reversed(NAMES) if k in values]
+    over = {k: values[k] / values["noise"] for k in shown}
+    decades = np.log10(max(*over.values(), 3.0))
+    ax.set_xscale("log")
+    for i, key in enumerate(shown):
+        ax.barh(i, over[key] - 1, left=1, color=COLOURS[key], height=0.62)
+        text, at = quantity(number(values[key]), unit), max(over[key], 1.0) * 10 ** (0.03 * decades)
+        ax.text(at, i, text, va="center", fontsize=8, color=INK)
+    ax.axvline(1, color=INK, linewidth=0.9)
+    low = min(*over.values(), 10 ** (-0.05 * decades))
+    ax.set_xlim(low, 10 ** (1.55 * decades))
+    steps = next(s for limit, s in STEPS.items() if decades <= limit)
+    ticks = [s * 10**d for d in range(int(decades) + 1) for s in steps if s * 10**d <= 10 ** (1.1 * decades)]
+    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    ax.minorticks_off()
+    ax.set_yticks(range(len(shown)), [NAMES[k] for k in shown])
+    ax.grid(False, axis="y")

@@ -1,0 +1,29 @@
+"""The whole story in one small figure: residual before and after, and the law behind it."""
+
+import numpy as np
+
+from estimator.closeloop.chain import Outcome
+from estimator.closeloop.problem import Problem
+from scenarios.figures.channels import draw_residual, series, time_label
+from scenarios.figures.forces import draw_law, laws_found
+from scenarios.figures.sheet import Plot, legend, name_axes, sheet
+from scenarios.glossary import Glossary
+from scenarios.typography import label
+
+
+def headline_plot(problem: Problem, found: Outcome, words: Glossary) -> Plot:
+    """Residual of the output that stands out most from its noise, and the first law found, if any."""
+    j = int(np.argmax(found.base.rms(problem) / found.noise))
+    name, laws = problem.record.outputs[j], laws_found(found)
+    ratios = [1.35, 1] if laws else [1]
+    figure, axes = sheet(2.7, [["residual", "law"][: len(ratios)]], width_ratios=ratios)
+    draw_residual(axes["residual"], problem.record, series(found), j, found.noise[j])
+    name_axes(axes["residual"], time_label(problem.record), label("residual", words.unit(name)), name)
+    legend(figure, axes["residual"])
+    caption = f"Residual of {name} in free simulation, held-out part shaded."
+    if laws:
+        port = laws[0].missing.port.name
+        draw_law(axes["law"], laws[0], words)
+        axes["law"].set_title(f"force missing at: {port}", loc="left", fontsize=9, fontweight="bold")
+        caption += f" At the right the force that is missing at the port “{port}” (dots) and the law found for it (line)."
+    return Plot("headline", figure, caption)

@@ -1,0 +1,58 @@
+"""A force law as it was fitted at a port."""
+
+from dataclasses import dataclass
+
+import casadi as cs
+import numpy as np
+
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.missing_force import MissingForce
+from estimator.record import Array
+from fmus.effects import EFFECTS
+
+
+@dataclass(frozen=True)
+class Law:
+    """The fitted force law at a port, and its force (n,) along the motion there."""
+
+    candidate: Candidate
+    values: dict[str, float]
+    missing: MissingForce
+
+    def along(self, q: Array, v: Array) -> Array:
+        """Force at displacement q (n,) and velocity v (n,)."""
+        effect = EFFECTS[self.candidate.kind]
+        names = {p.name: p.start for p in effect.parameters("rotation")} | self.values
+        x = cs.SX.sym("q"), cs.SX.sym("v")
+        force = cs.Function("law", x, [effect({n: cs.SX(a) for n, a in names.items()}).force(*x)])
+        return np.array(force.map(len(q))(q[None, :], v[None, :])).ravel()
+
+    @property
+    def force(self) -> Array:
+        """Force along the recorded motion."""
+        return self.along(self.missing.displacement, self.missing.velocity)
+
+    @property
+    def of_displacement(self) -> bool:
+        """Whether it depends on the displacement."""
+        q, v = self.missing.displacement, self.missing.velocity
+        return not np.allclose(self.along(q[::-1], v), self.force, rtol=1e-6, atol=1e-12)
+
+    @property
+    def period(self) -> float | None:
+        """The displacement after which a periodic law repeats itself."""
+        order = self.values.get("order")
+        return 2 * np.pi / order if order else None
+
+
+def law_at(h: Hypothesis | None, missing: MissingForce) -> Law | None:
+    """The law that a hypothesis sees at the port of a missing force, if any."""
+    if h is None:
+        return None
+    for c in h.candidates:
+        if c.location == missing.port.name and c.kind in EFFECTS:
+            prefix = f"{c.kind}_{c.location}_"
+            own = {n.removeprefix(prefix): x for n, x in h.fit.theta.items() if n.startswith(prefix)}
+            return Law(c, own, missing)
+    return None

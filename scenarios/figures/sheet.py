@@ -1,0 +1,118 @@
+"""The look of all figures: palette, axes, envelopes of long records, and how they are written."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from estimator.record import Array, Record
+
+# apart in grey and for the colour-blind by their lightness
+INK, BEFORE, AFTER, LAW = "#1d2733", "#d98f3e", "#123f6b", "#a3122a"
+NOISE, CLOUD, SHADE = "#77828e", "#9fb6ca", "#eaeff4"
+
+WIDTH = 6.5  # in, with 9 pt text near the size of the page's own
+DPI = 170
+COLOURS = 96  # of a PNG: enough for smooth lines, and a third of the size
+POINTS = 700  # of an envelope: about what the width of a figure can show
+ROWS = 4  # panels above one another before a second sheet is begun
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure with its file name (without ending) and what is written below it."""
+
+    name: str
+    figure: Figure
+    caption: str
+
+    def write(self, folder: Path) -> bytes:
+        """Write as PNG and SVG into a folder; returns the PNG."""
+        full, small = BytesIO(), BytesIO()
+        self.figure.savefig(full, format="png", dpi=DPI)
+        with Image.open(full) as picture:
+            picture.convert("RGB").quantize(COLOURS).save(small, "png", optimize=True)
+        (folder / f"{self.name}.png").write_bytes(small.getvalue())
+        self.figure.savefig(folder / f"{self.name}.svg", metadata={"Date": None})
+        return small.getvalue()
+
+
+def sheet(height: float, layout: Sequence[Sequence[str]], width: float = WIDTH, **more: Any) -> Any:
+    """A figure [in] and its axes by name, from a mosaic of names."""
+    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    axes = figure.subplot_mosaic([list(row) for row in layout], **more)
+    for ax in axes.values():
+        dress(ax)
+    return figure, axes
+
+
+def dress(ax: Axes) -> None:
+    """Thin grey frame at the left and below, light grid, small text."""
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        ax.spines[side].set(color=NOISE, linewidth=0.7)
+    ax.tick_params(colors=INK, labelsize=8, width=0.7, length=3, color=NOISE)
+    ax.grid(True, color="#dde3e9", linewidth=0.5)
+    ax.set_axisbelow(True)
+    for label in (ax.xaxis.label, ax.yaxis.label, ax.title):
+        label.set(fontsize=9, color=INK)
+
+
+def name_axes(ax: Axes, x: str = "", y: str = "", title: str = "") -> None:
+    """Labels in the figures' size."""
+    ax.set_xlabel(x, fontsize=9)
+    ax.set_ylabel(y, fontsize=9)
+    if title:
+        ax.set_title(title, loc="left", fontsize=9, fontweight="bold")
+
+
+def legend(figure: Figure, ax: Axes) -> None:
+    """One legend for a figure, above its panels, of what one of them shows."""
+    handles, labels = ax.get_legend_handles_labels()
+    made = figure.legend(
+        handles, labels, loc="outside upper left", ncols=len(labels), frameon=False, fontsize=8.5,
+        handlelength=2.0, columnspacing=1.6, borderaxespad=0.1,
+    )  # fmt: skip
+    for line in made.get_lines():
+        line.set_linewidth(2.0)
+
+
+def envelope(t: Array, x: Array, points: int = POINTS) -> tuple[Array, Array]:
+    """Least and greatest value in each of `points` pieces of a channel (N,), in turn; short ones as is."""
+    if len(x) <= 2 * points:
+        return t, x
+    begin = np.linspace(0, len(x), points, endpoint=False).astype(int)
+    both = np.column_stack([np.minimum.reduceat(x, begin), np.maximum.reduceat(x, begin)])
+    return np.repeat(t[begin], 2), both.ravel()
+
+
+def times(record: Record) -> list[Array]:
+    """Time of each run (N,) s on one axis: a file that starts anew is set behind the one before."""
+    found: list[Array] = []
+    for run in record.runs:
+        late = found[-1][-1] - run.t[0] if found else -np.inf
+        found.append(run.t + late * 1.02 if late > 0 else run.t)
+    return found
+
+
+def shade_test(ax: Axes, record: Record) -> None:
+    """Mark the held-out part."""
+    for t, run in zip(times(record), record.runs, strict=True):
+        if run.test.any():
+            held_out = t[run.test]
+            ax.axvspan(held_out[0], held_out[-1], color=SHADE, linewidth=0, zorder=0)
+    ax.set_xlim(times(record)[0][0], times(record)[-1][-1])
+
+
+def sheets(items: Sequence[Item], rows: int = ROWS) -> Iterator[tuple[str, list[Item]]]:
+    """Items for each sheet with an ending for its name: none, then _2, _3."""
+    for first in range(0, len(items), rows):
+        yield (f"_{first // rows + 1}" if first else ""), list(items[first : first + rows])

@@ -1,0 +1,115 @@
+"""What was rejected and why, and the test for a discrepancy, in words."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.closeloop.chain import Outcome
+from estimator.closeloop.compare import Hypothesis, lead
+from estimator.closeloop.detect import LEVEL, NOISES, REPLICATES
+from estimator.closeloop.pairs import SIGNIFICANT, idle
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.verdict import EXPLAINED, GAP, explains, gap_closed
+from estimator.record import Array
+from scenarios.glossary import candidate_words, title
+from scenarios.typography import HELD, number, percent
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A rejected hypothesis: errors by output, and how far the best leads it on held-out data."""
+
+    name: str
+    errors: list[str]
+    score: str
+    reason: str
+
+
+def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
+    """All rejected hypotheses, best first on held-out data."""
+    best = found.chosen or found.base
+    others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
+    others.sort(key=lambda h: lead(problem, best, h, found.size)[0])
+    return [_row(problem, found, h) for h in others]
+
+
+def best_wrong(found: Outcome) -> Hypothesis | None:
+    """The best single hypothesis that was rejected: an error that any effect of the kind would reach."""
+    members = found.judgement.members
+    return next((h for h in found.singles if h not in members), None)
+
+
+def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
+    score, error = lead(problem, found.chosen or found.base, h, found.size)
+    return Rejected(
+        title(h),
+        [number(v) for v in h.rms(problem)],
+        f"{number(-score)}{HELD}±{HELD}{number(error, 2)}",
+        "; ".join(reasons(problem, found, h)),
+    )
+
+
+def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
+    """Why a hypothesis was rejected, most telling first."""
+    weak = idle(h)
+    for c in weak:
+        z = h.significance()[h.candidates.index(c)]
+        which = f" of {candidate_words(c)}" if len(h.candidates) > 1 else ""
+        yield f"size{which} only {number(z, 2)} standard errors from zero ({SIGNIFICANT:g} needed)"
+    if weak or not explains(problem, h, found.base, found.noise, found.size):
+        yield from _left(problem, found, h)
+        return
+    if found.chosen is None:
+        return
+    score, error = lead(problem, found.chosen, h, found.size)
+    if score > 0 and error > 0:
+        yield f"worse than the best by {number(score / error, 2)} standard errors"
+    elif len(h.candidates) > len(found.chosen.candidates):
+        yield "no better than fewer effects by more than chance"
+
+
+def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
+    """What a hypothesis leaves of the residual, where that is too much."""
+    before, after = found.base.rms(problem), h.rms(problem)
+    over, declared = after / found.noise, ~np.isnan(problem.record.noise_std)
+    reached = (after < NOISES * found.noise) | (gap_closed(before, after, found.noise) >= GAP)
+    short = np.flatnonzero(declared & ~reached)
+    if short.size:
+        j = short[np.argmax(over[short])]
+        yield f"leaves {number(over[j], 2)} times the noise in {problem.record.outputs[j]}"
+    if not declared.all():
+        share = (
+            1
+            - _squares(problem, found, h)[~declared].sum()
+            / _squares(problem, found, found.base)[~declared].sum()
+        )
+        if share < EXPLAINED:
+            yield f"takes away {percent(max(share, 0.0))} of the residual's variance ({EXPLAINED:.0%} needed)"
+
+
+def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
+    squares: Array = (h.rms(problem) / found.size) ** 2
+    return squares
+
+
+def detection_words(found: Outcome) -> str:
+    """The test for a discrepancy."""
+    d = found.detection
+    at_floor = d.p_value <= 1.001 * len(d.figures) / (REPLICATES + 1)
+    least = ", the least that so many records can show" if at_floor else ""
+    verdict = "more than noise" if d.detected else "no more than what noise leaves"
+    size = "large enough to matter" if d.material else "too small to matter"
+    return (
+        f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {LEVEL:g} it counts) "
+        f"and {size}. It was held against {REPLICATES} records that the calibrated FMU gives with noise alone, "
+        "calibrated like the measured one."
+    )
+
+
+def tried(problem: Problem) -> dict[str, list[str]]:
+    """Kinds of effects that the library offered, by location."""
+    places: dict[str, list[str]] = {}
+    for kind, location in problem.builder.offers:
+        places.setdefault(location, []).append(kind)
+    return places

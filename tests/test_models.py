@@ -1,0 +1,221 @@
+"""What every model keeps, whoever wrote it; and the names that the contract promises."""
+
+import re
+
+import casadi as cs
+import numpy as np
+import pytest
+
+from fmus.effects import EFFECTS
+from fmus.errors import BadInput
+from fmus.model import UNITS, Model, Port, equations
+from fmus.models import MODELS, model_class
+from fmus.units import base_exponents
+from fmus.variables import Input, Output, Parameter, Rate, State, Variable, rate
+from tests.everything import EVERY_MODEL, near_start, start, values
+
+TESTRIG = {  # name: unit, kind
+    **dict.fromkeys(["omega_w", "omega_r"], ("rad/s", State)),
+    **dict.fromkeys(["theta_w", "theta_r"], ("rad", State)),
+    **dict.fromkeys(["T_P", "T_w_ext", "T_r_ext"], ("N.m", Input)),
+    "f_sync": ("Hz", Input),
+    **dict.fromkeys(["omega_w_dot", "omega_r_dot"], ("rad/s2", Output)),
+    **dict.fromkeys(["xi_x", "f_adhesion"], ("1", Output)),
+    "F_x": ("N", Output),
+    "T_A": ("N.m", Output),
+    **dict.fromkeys(["J_w", "J_r"], ("kg.m2", Parameter)),
+    **dict.fromkeys(["r_w", "r_r", "a", "b"], ("m", Parameter)),
+    **dict.fromkeys(["mu0", "A", "k_A", "k_S", "nu", "pole_pairs"], ("1", Parameter)),
+    **dict.fromkeys(["R_Th", "X_Th", "X_2", "R_2"], ("Ohm", Parameter)),
+    "N": ("N", Parameter),
+    "B": ("s/m", Parameter),
+    "G": ("Pa", Parameter),
+    "V_Th": ("V", Parameter),
+    "f_nom": ("Hz", Parameter),
+}
+PROMISED = {"testrig": TESTRIG}
+
+
+@pytest.fixture(params=EVERY_MODEL)
+def model(request):
+    return MODELS[request.param]()
+
+
+def test_names_are_flat_identifiers(model):
+    for name, variable in model.variables.items():
+        assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name), name
+        assert variable.name == name
+    assert re.fullmatch(r"[A-Za-z][A-Za-z0-9]*", model.name)  # FMI's model identifier, a C name
+
+
+def test_units_are_si(model):
+    for variable in model.variables.values():
+        unit = base_exponents(variable.unit)
+        assert (unit.factor, unit.offset) == (1.0, 0.0), f"{variable.name} in {variable.unit}"
+
+
+def test_each_variable_has_a_description_and_a_start_within_its_limits(model):
+    for v in model.variables.values():
+        assert v.doc.strip(), v.name
+        assert v.min is None or v.min <= v.start, v.name
+        assert v.max is None or v.start <= v.max, v.name
+        assert v.nominal is None or v.nominal > 0, v.name
+
+
+def test_states_have_a_nominal(model):
+    # inputs of tests, tolerances of steps and estimators go by it
+    assert [v.name for v in model.of(State) if v.nominal is None] == []
+
+
+def test_rates_are_named_after_their_state_and_have_its_unit_by_second(model):
+    for v in model.of(Rate):
+        assert isinstance(v.of, State)
+        expected = f"{v.of.name[:-4]}_ddot" if v.of.name.endswith("_dot") else f"{v.of.name}_dot"
+        assert v.name == expected
+        state, derivative = base_exponents(v.of.unit).exponents, base_exponents(v.unit).exponents
+        assert {**state, "s": state.get("s", 0) - 1} == {"s": 0, **derivative}
+
+
+def test_names_of_derivatives_are_kept_for_derivatives(model):
+    rates = {v.name for v in model.of(Rate)}
+    for v in model.of(Output):
+        assert not v.name.endswith(("_dot", "_ddot")) or v.name in rates or _is_rate_of_known(model, v), (
+            v.name
+        )
+
+
+def _is_rate_of_known(model, v):
+    return v.name.rpartition("_")[0] in model.variables
+
+
+def test_ports_act_through_port_inputs(model):
+    for location, port in model.ports().items():
+        assert re.fullmatch(r"[a-z][a-z0-9_]*", location)
+        for name in port.forces:
+            assert name.endswith("_ext"), name
+            assert isinstance(model.variables[name], Input), name
+            assert model.variables[name].start == 0.0, name
+
+
+def test_every_port_input_belongs_to_a_port(model):
+    used = {name for port in model.ports().values() for name in port.forces}
+    assert {v.name for v in model.of(Input) if v.name.endswith("_ext")} <= used
+
+
+def test_velocity_of_a_port_is_the_rate_of_its_displacement(model):
+    x, u, p = (
+        cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
+    )
+    dx = equations(model).f(x, u, p)
+    point = near_start(model, np.random.default_rng(1))
+    for location, port in model.ports().items():
+        slope = cs.jtimes(cs.SX(port.displacement), x, dx)
+        gap = cs.Function("gap", [x, u, p], [slope - port.velocity])
+        assert abs(float(gap(*point))) < 1e-9, location
+
+
+def test_a_force_does_the_work_of_its_port(model):
+    """F v at a port is the power that its parts do on the coordinates: v = sum of gain * v of the input."""
+    ports = model.ports()
+    single = {next(iter(p.forces)): p.velocity for p in ports.values() if [*p.forces.values()] == [1.0]}
+    x, u, p = (
+        cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
+    )
+    point = near_start(model, np.random.default_rng(2))
+    for location, port in ports.items():
+        if set(port.forces) <= set(single):
+            parts = sum(gain * single[name] for name, gain in port.forces.items())
+            gap = cs.Function("gap", [x, u, p], [port.velocity - parts])
+            assert abs(float(gap(*point))) < 1e-9, location
+
+
+def test_equations_are_finite_at_the_start_and_about_it(model):
+    made, rng = equations(model), np.random.default_rng(3)
+    points = [(start(model, State), start(model, Input), start(model, Parameter))]
+    points += [near_start(model, rng) for _ in range(20)]
+    for point in points:
+        assert np.isfinite(values(made.f, *point)).all()
+        assert np.isfinite(values(made.h, *point)).all()
+        assert np.isfinite(values(made.step, *point, model.step_size)).all()
+
+
+def test_parameters_from_the_literature_name_it(model):
+    if model.name.lower() in PROMISED:
+        assert [v.name for v in model.of(Parameter) if not v.source] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "variable", "unit", "kind"),
+    [(m, n, unit, kind) for m, table in PROMISED.items() for n, (unit, kind) in table.items()],
+)
+def test_contract_names_exist(name, variable, unit, kind):
+    found = MODELS[name]().variables[variable]
+    assert isinstance(found, kind)
+    assert found.unit == unit
+
+
+class Ball(Model):
+    """A mass with a force."""
+
+    name = "Ball"
+    step_size = 0.01
+    x = State("m", doc="place", nominal=1.0)
+    v = State("m/s", doc="speed", nominal=1.0)
+    F_ext = Input("N", doc="force")
+    m = Parameter("kg", 2.0, doc="mass")
+    E = Output("J", doc="energy")
+    v_dot = rate(v, "m/s2", "acceleration")
+
+    def derivatives(self):
+        return {"x": self.v, "v": self.F_ext / self.m}
+
+    def outputs(self):
+        return {"E": self.m * self.v**2 / 2}
+
+    def ports(self):
+        return {"ball": Port(self.x, self.v, {"F_ext": 1.0})}
+
+
+def test_a_model_is_its_declaration():
+    made = equations(Ball())
+    assert values(made.f, [1, 3], [8], [2]).tolist() == [3, 4]
+    assert values(made.h, [1, 3], [8], [2]).tolist() == [9, 4]
+    assert list(Ball().variables) == ["x", "v", "F_ext", "m", "E", "v_dot"]
+    assert isinstance(Ball.x, Variable)
+
+
+@pytest.mark.parametrize(
+    ("method", "given", "words"),
+    [
+        ("derivatives", {"x": 0.0}, "Ball.derivatives: v declared or given"),
+        ("derivatives", {"x": 0.0, "v": 0.0, "w": 1.0}, "Ball.derivatives: w declared or given"),
+        ("outputs", {}, "Ball.outputs: E declared or given"),
+        ("outputs", {"E": 0.0, "P": 1.0}, "Ball.outputs: P declared or given"),
+    ],
+)
+def test_missing_and_left_over_expressions_are_refused(method, given, words):
+    wrong = type("Wrong", (Ball,), {method: lambda self: given})
+    with pytest.raises(ValueError, match=words):
+        equations(wrong())
+
+
+def test_probes_open_every_location(model):
+    probed = type(model)(probes=True)
+    for location, port in probed.ports().items():
+        units = UNITS[port.motion]
+        assert probed.variables[f"{location}_force"].unit == units["F"]
+        assert probed.variables[f"{location}_displacement"].unit == units["q"]
+        assert probed.variables[f"{location}_velocity"].unit == f"{units['q']}/s"
+    equations(probed)
+
+
+def test_models_are_found_by_name_in_any_case():
+    assert model_class("TestRig") is MODELS["testrig"]
+    with pytest.raises(BadInput, match="did you mean 'testrig'"):
+        model_class("testrigg")
+
+
+def test_an_effect_twice_at_one_place_is_refused():
+    twice = [(EFFECTS["viscous_damping"], "ball")] * 2
+    with pytest.raises(BadInput, match="built in twice"):
+        Ball(twice)
