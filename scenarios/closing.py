@@ -44,17 +44,27 @@ def close_loop(
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
         builder = builder_for(declared, Path(work))
         problem = pose(declared, builder)
+        folder = None if out is None else writable(Path(out))
         found = trace(problem, tell, jobs or os.cpu_count() or 1, seed)
-        if out is None:
+        if folder is None:
             return result_of(declared.id, problem, found, time.monotonic() - begun, None)
         tell("building the augmented FMU and writing the report")
-        folder = Path(out)
-        folder.mkdir(parents=True, exist_ok=True)
         augmented = augment(builder, found, folder)
         result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented)
         write_report(folder, problem, found, result)
         result.write(folder / "result.json")
         return result
+
+
+def writable(folder: Path) -> Path:
+    """The folder, made where it was not there; BadInput where it cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from error
+    if not os.access(folder, os.W_OK):
+        raise BadInput(f"--out {folder}: may not be written to; name another folder")
+    return folder
 
 
 def builder_for(e: Experiment, work: Path) -> Builder:

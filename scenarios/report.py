@@ -12,17 +12,18 @@ from estimator.closeloop.chain import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import KINDS
 from fmus.host.archive import describe
-from scenarios import sections
 from scenarios.figures.channels import record_plots, residual_plots, spectrum_plots
 from scenarios.figures.errors import error_plot
 from scenarios.figures.forces import OTHERS, force_plots, laws_found
 from scenarios.figures.headline import headline_plot
 from scenarios.figures.sheet import Plot
-from scenarios.glossary import effect_words, glossary, hypothesis_words
-from scenarios.rejected import best_wrong, detection_words, rejected, tried
+from scenarios.page import error_table, sections
+from scenarios.page.case import Case
+from scenarios.page.glossary import effect_words, glossary, hypothesis_words
+from scenarios.page.rejected import best_wrong, detection_words, rejected, tried
+from scenarios.page.typography import number, unit
+from scenarios.page.wording import missed_words, story
 from scenarios.result import Result
-from scenarios.typography import number, unit
-from scenarios.wording import Case, missed_words, story
 
 HERE = Path(__file__).parent
 ROWS = 15  # of the table of rejected hypotheses
@@ -63,7 +64,7 @@ def _figures(case: Case, folder: Path) -> Values:
         "headline_figure": embed([headline_plot(problem, found, words)]),
         "record_figures": embed(record_plots(problem, words)),
         "force_figures": embed(force_plots(found, words)),
-        "error_figures": embed([error_plot(sections.error_values(case), words)]),
+        "error_figures": embed([error_plot(error_table.error_values(case), words)] if found.singles else []),
         "residual_figures": embed(residual_plots(problem, found, words)),
         "spectrum_figures": embed(spectrum_plots(problem, found, words)),
     }
@@ -71,7 +72,7 @@ def _figures(case: Case, folder: Path) -> Values:
 
 def _measured(case: Case) -> Values:
     return {
-        "cards": sections.gap_cards(case),
+        "cards": error_table.gap_cards(case),
         "channels": list(sections.channels(case)),
         "runs": sections.runs(case),
         "free_states": case.problem.free_states,
@@ -92,7 +93,7 @@ def _law(case: Case) -> Values:
 def _rejection(case: Case) -> Values:
     rows, wrong = rejected(case.problem, case.found), best_wrong(case.found)
     return {
-        "errors": sections.error_rows(case),
+        "errors": error_table.error_rows(case),
         "wrong": hypothesis_words(wrong) if wrong else "",
         "rejected": rows[:ROWS],
         "more_rejected": max(0, len(rows) - ROWS),

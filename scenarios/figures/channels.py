@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 from scipy.signal import welch
 
 from estimator.closeloop.chain import Outcome
@@ -11,10 +12,22 @@ from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.problem import Problem
 from estimator.record import Array, Record
 from scenarios.figures.sheet import (
-    AFTER, BEFORE, CLOUD, INK, NOISE, Plot, envelope, legend, name_axes, shade_test, sheet, sheets, times,
+    AFTER,
+    BEFORE,
+    CLOUD,
+    INK,
+    NOISE,
+    Plot,
+    envelope,
+    legend,
+    name_axes,
+    shade_test,
+    sheet,
+    sheets,
+    times,
 )  # fmt: skip
-from scenarios.glossary import Glossary
-from scenarios.typography import label, unit
+from scenarios.page.glossary import Glossary
+from scenarios.page.typography import label, unit
 
 SEGMENTS = 8  # of the held-out part, between which the spectrum is averaged
 Series = list[tuple[str, Hypothesis, str]]
@@ -23,7 +36,9 @@ Series = list[tuple[str, Hypothesis, str]]
 def series(found: Outcome) -> Series:
     """Whose residuals are drawn: name, hypothesis and colour."""
     if found.chosen is None:
-        return [("as declared", found.declared, CLOUD), ("calibrated", found.base, BEFORE)]
+        good = found.judgement.verdict == "no_discrepancy"
+        colour = AFTER if good else BEFORE
+        return [("as declared", found.declared, CLOUD), ("calibrated", found.base, colour)]
     return [("before (calibrated)", found.base, BEFORE), ("after", found.chosen, AFTER)]
 
 
@@ -48,7 +63,7 @@ def residual_plots(problem: Problem, found: Outcome, words: Glossary) -> Iterato
     """Residual of each output over time, and again at the scale of the noise where an effect was found."""
     record, shown = problem.record, series(found)
     zoom = found.chosen is not None
-    for ending, some in sheets(record.outputs, 2 if zoom else 3):
+    for ending, some in sheets(record.outputs, 1 if zoom else 3):
         layout = [[f"{n}{z}"] for n in some for z in ("", "+")[: 1 + zoom]]
         heights = [h for _ in some for h in (1.6, 1.0)[: 1 + zoom]]
         figure, axes = sheet(0.8 + 1.15 * sum(heights), layout, sharex=True, height_ratios=heights)
@@ -111,11 +126,12 @@ def _spectrum(ax: Axes, problem: Problem, found: Outcome, j: int) -> None:
     level = found.noise[j] * np.sqrt(2 / rate)
     ax.axhline(level, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="noise")
     low, high = np.log10(ax.get_ylim())
-    ax.set_ylim(10 ** np.floor(low + 0.1), 10 ** np.ceil(high - 0.1))
+    ax.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _density(x: Array, rate: float) -> tuple[Array, Array]:
-    """Frequencies between 0 and the Nyquist frequency, and amplitude spectral density there of a channel (N,) at `rate` Hz."""
+    """Frequencies up to the Nyquist frequency, without both ends, and the density of x (N,) at `rate` Hz."""
     f, power = welch(x, rate, nperseg=max(min(len(x), 64), 2 * len(x) // SEGMENTS))
     return f[1:-1], np.sqrt(power[1:-1])
 

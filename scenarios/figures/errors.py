@@ -4,11 +4,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from scenarios.figures.sheet import AFTER, BEFORE, CLOUD, INK, NOISE, Plot, name_axes, sheet
-from scenarios.glossary import Glossary
-from scenarios.typography import number, quantity
+from scenarios.page.glossary import Glossary
+from scenarios.page.typography import number, quantity
 
 COLOURS = {"declared": CLOUD, "before": BEFORE, "after": AFTER, "wrong": NOISE}
 NAMES = {"declared": "as declared", "before": "before", "after": "after", "wrong": "best wrong effect"}
+ALONE = {"declared": "as declared", "before": "calibrated", "wrong": "nearest effect"}  # none was found
 STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labelled in each decade, by the decades that are shown
 CAPTION = (
     "Error on the held-out part in multiples of the noise floor, on a logarithmic scale. The bars begin at "
@@ -18,20 +19,21 @@ CAPTION = (
 
 def error_plot(errors: dict[str, dict[str, float]], words: Glossary) -> Plot:
     """Bars of the errors of each output, by output and by the keys of NAMES and `noise`."""
+    names = NAMES if all("after" in values for values in errors.values()) else ALONE
     outputs = list(errors)
     rows = [outputs[i : i + 2] for i in range(0, len(outputs), 2)]
     layout = [row if len(row) == 2 or len(rows) == 1 else [*row, "."] for row in rows]
     bars = len(next(iter(errors.values()))) - 1
     figure, axes = sheet((0.75 + 0.27 * bars) * len(rows), layout)
     for output, values in errors.items():
-        _bars(axes[output], values, words.unit(output))
+        _bars(axes[output], values, names, words.unit(output))
         name_axes(axes[output], "error over noise", "", output)
     return Plot("error", figure, CAPTION)
 
 
-def _bars(ax: Axes, values: dict[str, float], unit: str) -> None:
+def _bars(ax: Axes, values: dict[str, float], names: dict[str, str], unit: str) -> None:
     """One bar a model, from the noise floor to its error."""
-    shown = [k for k in reversed(NAMES) if k in values]
+    shown = [k for k in reversed(names) if k in values]
     over = {k: values[k] / values["noise"] for k in shown}
     decades = np.log10(max(*over.values(), 3.0))
     ax.set_xscale("log")
@@ -46,5 +48,5 @@ def _bars(ax: Axes, values: dict[str, float], unit: str) -> None:
     ticks = [s * 10**d for d in range(int(decades) + 1) for s in steps if s * 10**d <= 10 ** (1.1 * decades)]
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
     ax.minorticks_off()
-    ax.set_yticks(range(len(shown)), [NAMES[k] for k in shown])
+    ax.set_yticks(range(len(shown)), [names[k] for k in shown])
     ax.grid(False, axis="y")

@@ -10,8 +10,8 @@ from estimator.closeloop.missing_force import MissingForce
 from estimator.record import Array
 from scenarios.figures.law import Law, law_at
 from scenarios.figures.sheet import AFTER, CLOUD, LAW, Plot, envelope, legend, name_axes, sheet, sheets
-from scenarios.glossary import Glossary, effect_words
-from scenarios.typography import label
+from scenarios.page.glossary import Glossary, effect_words
+from scenarios.page.typography import label
 
 BINS = 25  # of velocity or displacement, over which the missing force is averaged
 TURNS = 16  # sign changes of a law that a time axis shows legibly

@@ -7,8 +7,8 @@ from estimator.closeloop.problem import Problem
 from scenarios.figures.channels import draw_residual, series, time_label
 from scenarios.figures.forces import draw_law, laws_found
 from scenarios.figures.sheet import Plot, legend, name_axes, sheet
-from scenarios.glossary import Glossary
-from scenarios.typography import label
+from scenarios.page.glossary import Glossary
+from scenarios.page.typography import label
 
 
 def headline_plot(problem: Problem, found: Outcome, words: Glossary) -> Plot:
@@ -25,5 +25,5 @@ def headline_plot(problem: Problem, found: Outcome, words: Glossary) -> Plot:
         port = laws[0].missing.port.name
         draw_law(axes["law"], laws[0], words)
         axes["law"].set_title(f"force missing at: {port}", loc="left", fontsize=9, fontweight="bold")
-        caption += f" At the right the force that is missing at the port “{port}” (dots) and the law found for it (line)."
+        caption += f" Right: the force that is missing at the port “{port}” (dots), and the law found (line)."
     return Plot("headline", figure, caption)

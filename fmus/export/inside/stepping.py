@@ -12,7 +12,7 @@ SAFETY, GROWTH, CUT, ORDER = 0.9, 4.0, 0.1, 3
 
 
 class Stepper:
-    """Steps of a function step(x, u, p, dt) -> (x1, error) on memory that its owner holds.
+    """Steps of a function step(x, u, p, dt) -> (x1, error) on the memory of its caller.
 
     Every communication step begins afresh: how the last one was divided is forgotten, so that a
     restart from the same values repeats a run to the last bit.
@@ -20,6 +20,7 @@ class Stepper:
 
     def __init__(self, step: Any, x: memoryview, u: memoryview, p: memoryview, longest: float) -> None:
         self.x, self.longest = x, longest
+        self.held = (x, u, p)  # CasADi keeps addresses only: the memory must outlive its buffer
         self.x1, self.error, self.h = array("d", bytes(8 * len(x))), array("d", [0.0]), array("d", [0.0])
         self.buffer, self.evaluate = step.buffer()
         for i, part in enumerate((x, u, p, memoryview(self.h))):

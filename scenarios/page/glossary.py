@@ -13,10 +13,10 @@ from estimator.closeloop.screen import built
 from fmus.effects import EFFECTS
 from fmus.host.archive import describe
 from fmus.host.description import FmuVariable
-from scenarios.typography import formula
+from scenarios.page.typography import formula
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
-_COUNTED = "force stop step offset drift lag delay mode change excitation bias gain saturation".split()
+_COUNTED = {"force", "stop", "step", "offset", "drift", "lag", "delay", "mode", "change", "bias", "gain"}
 _FAULT_UNITS = {"sensor_gain": "1", "sensor_delay": "s", "sensor_drift": "{}/s", "sensor_bias": "{}"}
 
 
@@ -44,7 +44,9 @@ class Glossary:
     def meaning_of_parameter(self, c: Candidate, parameter: str) -> str:
         """What a parameter of a candidate is."""
         if c.is_fault:
-            return "share by which it shows too much" if c.kind == "sensor_gain" else "of the sensor"
+            return (
+                "shown minus true, over true" if c.kind == "sensor_gain" else f"{effect_words(c.kind)} of it"
+            )
         if parameter == "amplitude":
             return "of sine and cosine together"
         return self.meaning(f"{c.kind}_{c.location}_{parameter}")
@@ -59,6 +61,11 @@ def glossary(problem: Problem, hypotheses: Iterable[Hypothesis]) -> Glossary:
     return Glossary(variables)
 
 
+def parameter_name(c: Candidate, parameter: str) -> str:
+    """What a parameter of a candidate is called: the gain of a sensor is told as what it is off."""
+    return "gain − 1" if c.kind == "sensor_gain" else parameter
+
+
 def effect_words(kind: str) -> str:
     """A kind of effect in words: Coulomb friction, periodic force."""
     words = kind.removeprefix("sensor_").split("_") if kind.startswith("sensor_") else kind.split("_")
@@ -68,6 +75,8 @@ def effect_words(kind: str) -> str:
 def with_article(kind: str) -> str:
     """A kind of effect as it stands in a sentence: a periodic force, Coulomb friction."""
     words = effect_words(kind)
+    if kind == "sensor_gain":
+        return "a wrong gain"
     if words.split()[-1] not in _COUNTED:
         return words
     return f"{'an' if words[0] in 'aeiou' else 'a'} {words}"

@@ -11,11 +11,10 @@ from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.record import BoolArray, Run
 from fmus.host.description import PortNames
-from scenarios.glossary import effect_words, hypothesis_words, law, place_words, traits
-from scenarios.rejected import best_wrong
+from scenarios.page.case import Case
+from scenarios.page.glossary import effect_words, hypothesis_words, law, parameter_name, place_words, traits
+from scenarios.page.typography import NOTHING, capital, short, symbol, unit, with_error
 from scenarios.result import effects_of
-from scenarios.typography import NOTHING, label, number, percent, quantity, short, symbol, unit, with_error
-from scenarios.wording import Case, size_words
 
 AT_BOUND = 1e-3  # of the distance of the bounds, within which an estimate stands at one of them
 Row = dict[str, Any]
@@ -74,24 +73,25 @@ def _window(run: Run, mask: BoolArray) -> str:
     return f"{short(t[0], 5)} to {short(t[-1], 5)} s ({mask.sum()} samples)"
 
 
-def laws(case: Case) -> Iterator[tuple[str, str, list[LawText]]]:
-    """Each member of the verdict's class: in words, its sizes, and its laws."""
+def laws(case: Case) -> Iterator[tuple[str, list[LawText]]]:
+    """Each member of the verdict's class: in words, and its laws."""
     for h in case.found.judgement.members:
-        texts = [_law(case, h, c) for c in h.candidates]
-        yield hypothesis_words(h), size_words(h, case.words), texts
+        yield hypothesis_words(h), [_law(case, h, c) for c in h.candidates]
 
 
 def _law(case: Case, h: Hypothesis, c: Candidate) -> LawText:
     equation, remark = law(c.kind)
-    causes, shows = map(_capital, traits(c.kind))
+    causes, shows = map(capital, traits(c.kind))
     motion = next((_motion(case, p) for p in case.problem.ports if p.name == c.location), "")
     return LawText(
-        f"{_capital(effect_words(c.kind))} {place_words(c)}", equation, remark, motion, causes, shows, list(_parameters(case, h, c))
+        f"{capital(effect_words(c.kind))} {place_words(c)}",
+        equation,
+        remark,
+        motion,
+        causes,
+        shows,
+        list(_parameters(case, h, c)),
     )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _motion(case: Case, port: PortNames) -> str:
@@ -107,7 +107,7 @@ def _parameters(case: Case, h: Hypothesis, c: Candidate) -> Iterator[Row]:
     for name, figure in effect.parameters.items():
         full = f"{c.kind}_{c.location}_{name}"
         yield {
-            "symbol": symbol(name),
+            "symbol": symbol(parameter_name(c, name)),
             "value": with_error(*figure),
             "unit": unit(case.words.unit_of_parameter(c, name)) or "1",
             "meaning": case.words.meaning_of_parameter(c, name),
@@ -131,43 +131,3 @@ def calibrated(case: Case) -> Iterator[Row]:
             "estimate": with_error(value, error),
             "at_bound": not low + margin <= value <= high - margin,
         }
-
-
-def error_values(case: Case) -> dict[str, dict[str, float]]:
-    """Errors on the held-out part by output; `after` and `wrong` only where there is an effect."""
-    wrong, chosen = best_wrong(case.found), case.found.chosen
-    found = {}
-    for j, (output, values) in enumerate(case.result.error.items()):
-        found[output] = {k: v for k, v in values.items() if k != "after" or chosen}
-        if wrong:
-            found[output]["wrong"] = float(wrong.rms(case.problem)[j])
-    return found
-
-
-def error_rows(case: Case) -> list[Row]:
-    """The table of errors, ready to print."""
-    rows = []
-    for output, values in error_values(case).items():
-        gap = case.result.gap_closed.get(output)
-        row = {
-            k: number(values[k]) if k in values else NOTHING for k in ("declared", "before", "after", "wrong")
-        }
-        row |= {"noise": short(values["noise"], 3), "gap": NOTHING if gap is None else percent(gap)}
-        rows.append(row | {"output": label(output, case.words.unit(output))})
-    return rows
-
-
-def gap_cards(case: Case) -> list[Row]:
-    """Headline numbers of each output: share of the gap closed, error before and after."""
-    cards = []
-    for output, e in case.result.error.items():
-        gap, of = case.result.gap_closed.get(output), case.words.unit(output)
-        after = f" → {number(e['after'])}" if gap is not None else ""
-        cards.append({
-            "output": output,
-            "figure": f"{number(e['before'] / e['noise'], 2)} ×" if gap is None else percent(gap),
-            "said": "the noise is left" if gap is None else "of the gap closed",
-            "error": quantity(number(e["before"]) + after, of),
-            "noise": quantity(short(e["noise"], 3), of),
-        })  # fmt: skip
-    return cards

@@ -12,8 +12,10 @@ from estimator.closeloop.pairs import SIGNIFICANT, idle
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.verdict import EXPLAINED, GAP, explains, gap_closed
 from estimator.record import Array
-from scenarios.glossary import candidate_words, title
-from scenarios.typography import HELD, number, percent
+from scenarios.page.glossary import candidate_words, title
+from scenarios.page.typography import HELD, number, percent
+
+NIL = 0.05  # a score or a significance that is nothing
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
     return Rejected(
         title(h),
         [number(v) for v in h.rms(problem)],
-        f"{number(-score)}{HELD}±{HELD}{number(error, 2)}",
+        f"{number(-score)}{HELD}±{HELD}{number(error, 2)}" if abs(score) >= NIL else "0",
         "; ".join(reasons(problem, found, h)),
     )
 
@@ -56,7 +58,8 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     for c in weak:
         z = h.significance()[h.candidates.index(c)]
         which = f" of {candidate_words(c)}" if len(h.candidates) > 1 else ""
-        yield f"size{which} only {number(z, 2)} standard errors from zero ({SIGNIFICANT:g} needed)"
+        from_zero = f"only {number(z, 2)} standard errors from zero ({SIGNIFICANT:g} needed)"
+        yield f"size{which} {from_zero if z >= NIL else 'zero'}"
     if weak or not explains(problem, h, found.base, found.noise, found.size):
         yield from _left(problem, found, h)
         return
@@ -101,9 +104,9 @@ def detection_words(found: Outcome) -> str:
     verdict = "more than noise" if d.detected else "no more than what noise leaves"
     size = "large enough to matter" if d.material else "too small to matter"
     return (
-        f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {LEVEL:g} it counts) "
-        f"and {size}. It was held against {REPLICATES} records that the calibrated FMU gives with noise alone, "
-        "calibrated like the measured one."
+        f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {LEVEL:g} it "
+        f"counts) and {size}. It was held against {REPLICATES} records that the calibrated FMU gives with "
+        "noise alone, calibrated like the measured one."
     )
 
 

@@ -44,7 +44,7 @@ def with_error(value: float, error: float) -> str:
 
 def percent(share: float) -> str:
     """A share in percent; all that reaches 1 within its last digit is 100 %."""
-    return f"100{HELD}%" if share >= 0.9995 else f"{_fixed(100 * share, 1)}{HELD}%"
+    return f"100{HELD}%" if share >= 0.9995 else f"{_fixed(round(100 * share, 1) + 0.0, 1)}{HELD}%"
 
 
 def unit(text: str | None) -> str:
@@ -63,6 +63,11 @@ def quantity(text: str, of: str | None) -> str:
 def label(text: str, of: str | None) -> str:
     """A quantity with its unit, for axes and heads of tables: "F in N·m"."""
     return f"{text} in {unit(of)}" if unit(of) else text
+
+
+def capital(text: str) -> str:
+    """A text that begins a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def formula(text: str) -> Markup:

@@ -1,0 +1,1 @@
+"""What stands on the report's page: names, sentences and tables."""

@@ -1,0 +1,172 @@
+"""Closing the loop end to end: what must be found, what must not, and what is written."""
+
+import json
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from estimator.closeloop.verdict import Verdict
+from fmus.drive.model import Drive
+from fmus.export.pythonfmu import build_python
+from fmus.host.fmu import Fmu
+from scenarios import close_loop
+from scenarios.result import Result
+from tests.truth.rig import single, write_record
+
+ROOT = Path(__file__).parents[1]
+DEMO = ROOT / "scenarios" / "demo" / "rig-drag"
+SHARED = ROOT.parent / "shared" / "data"
+shared = pytest.mark.skipif(not SHARED.is_dir(), reason="the shared records are not on this machine")
+
+
+def named(result: Result) -> set[tuple[str, str]]:
+    """Kind and location of the effects of a result."""
+    return {(e.kind, e.location) for e in result.effects}
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
+    """The bundled record, closed once."""
+    out = tmp_path_factory.mktemp("demo")
+    return close_loop(DEMO, out), out
+
+
+def test_the_demo_finds_the_drag_of_its_truth_model(demo: tuple[Result, Path]) -> None:
+    result, _ = demo
+    assert result.verdict == "traced"
+    assert named(result) == {("quadratic_damping", "roller")}
+    value, error = result.effects[0].parameters["c"]
+    assert abs(value - 0.3) < 4 * error + 0.001  # the truth model's contact differs in form by so much
+    assert abs(result.calibrated["mu0"][0] - 0.37) < 0.003
+    assert min(result.gap_closed.values()) > 0.9
+
+
+def test_the_result_is_the_contracts_json(demo: tuple[Result, Path]) -> None:
+    result, out = demo
+    written = json.loads((out / "result.json").read_text())
+    keys = {"experiment", "verdict", "effects", "alternatives", "calibrated", "error", "wall_seconds"}
+    assert keys <= written.keys()
+    assert written["experiment"] == "rig-drag"
+    assert written["verdict"] in get_args(Verdict)
+    for error in written["error"].values():
+        assert {"declared", "before", "after", "noise"} <= error.keys()
+    assert all({"kind", "location", "score"} <= a.keys() for a in written["alternatives"])
+    assert all(a["score"] < 0 for a in written["alternatives"])
+    assert written["effects"][0]["parameters"]["c"] == result.effects[0].parameters["c"]
+
+
+def test_the_augmented_fmu_carries_the_effect_and_the_calibration(demo: tuple[Result, Path]) -> None:
+    result, out = demo
+    with Fmu(out / result.augmented_fmu) as augmented:
+        start = {n: v.start for n, v in augmented.description.variables.items()}
+        assert start["quadratic_damping_roller_c"] == result.effects[0].parameters["c"][0]
+        assert start["mu0"] == result.calibrated["mu0"][0]
+        augmented.restart(omega_w=12.0, omega_r=9.3)
+        for _ in range(200):
+            augmented.step(0.01)
+        assert 0 < augmented["omega_r"] < 2 * np.pi * 7.5 / 5
+
+
+def test_the_error_before_and_after_is_that_of_a_free_run_of_the_fmus(demo: tuple[Result, Path]) -> None:
+    result, out = demo
+    data = np.genfromtxt(DEMO / "data.csv", delimiter=",", names=True)
+    test = data["time"] > 30
+    inputs = {n: (data[n][1:] + data[n][:-1]) / 2 for n in ("T_P", "f_sync")}
+    import tomllib
+
+    initial = tomllib.loads((DEMO / "experiment.toml").read_text())["initial"]
+    with Fmu(out / result.augmented_fmu) as augmented:
+        y = augmented.simulate(data["time"], inputs, ["omega_w", "omega_r"], initial)
+    for j, name in enumerate(("omega_w", "omega_r")):
+        rmse = np.sqrt(np.mean((data[name] - y[:, j])[test] ** 2))
+        assert rmse == pytest.approx(result.error[name]["after"], rel=1e-6)
+
+
+def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    effects = single("coulomb_friction", "roller")
+    made = write_record(tmp_path, "one-way", rng, effects=effects, duration=30.0, dt=0.01)
+    result = close_loop(made)
+    assert result.verdict == "ambiguous"
+    assert named(result) == {("coulomb_friction", "roller"), ("constant_force", "roller")}
+    assert "changes its sign" in result.next_experiment
+
+
+@pytest.mark.parametrize(("kind", "place"), [("sensor_gain", "omega_r"), ("sensor_bias", "omega_w")])
+def test_a_faulty_sensor_is_not_taken_for_physics(kind: str, place: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(12)
+    made = write_record(tmp_path, kind, rng, effects=single(kind, place), duration=30.0, dt=0.01)
+    result = close_loop(made)
+    assert result.verdict in ("sensor_fault", "ambiguous")
+    assert (kind, place) in named(result)
+    assert all(k.startswith("sensor_") for k, _ in named(result))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        ("actuator_saturation", "T_P"),
+        ("parameter_step", "mu0"),
+        ("step_force", "wheel"),
+        ("impact_train", "wheel"),
+    ],
+)
+def test_what_the_library_lacks_is_not_given_a_name(kind: str, place: str, tmp_path: Path) -> None:
+    made = write_record(tmp_path, kind, np.random.default_rng(13), effects=single(kind, place))
+    assert close_loop(made).verdict in ("unexplained", "no_discrepancy")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "place", "settings"),
+    [
+        ("viscous_damping", "wheel", {"viscous": 1.5}),
+        ("viscous_damping", "roller", {}),
+        ("quadratic_damping", "wheel", {"quadratic": 0.1}),
+        ("periodic_force", "roller", {"periodic": 30.0, "periodic_order": 3.0}),
+        ("periodic_force", "wheel", {"periodic": 12.0, "periodic_order": 2.0}),
+    ],
+)
+def test_effects_of_the_truth_model_are_traced(
+    kind: str, place: str, settings: dict[str, float], tmp_path: Path
+) -> None:
+    effects = single(kind, place, **settings)
+    result = close_loop(write_record(tmp_path, kind, np.random.default_rng(14), effects=effects))
+    assert result.verdict == "traced"
+    assert named(result) == {(kind, place)}
+    assert min(result.gap_closed.values()) > 0.9
+
+
+@shared
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rig-a", "rig-b", "rig-c", "rig-d"])
+def test_the_told_rig_records(name: str) -> None:
+    told = json.loads((SHARED / "experiments" / "truth.json").read_text())[name]
+    result = close_loop(SHARED / "experiments" / name)
+    in_library = {"rig-d": "unexplained"}  # its actuator saturation is not among the effects of the library
+    assert result.verdict == in_library.get(name, told["verdict"])
+    if result.verdict == "traced":
+        assert named(result) <= {tuple(a) for a in told["accept"]}
+        assert min(result.gap_closed.values()) > 0.9
+
+
+@shared
+@pytest.mark.slow
+def test_the_measured_drive_shows_friction_and_an_offset(tmp_path: Path) -> None:
+    """EMPS: Janot, Gautier, Brunot 2019; published M 95.11, F_v 203.5, F_c 20.39, offset -3.165."""
+    for file in (ROOT / "scenarios" / "emps").glob("*.toml"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    build_python(Drive(), tmp_path)
+    result = close_loop(tmp_path, data_dir=SHARED / "benchmarks")
+    assert named(result) == {("coulomb_friction", "carriage"), ("constant_force", "carriage")}
+    found = {n: v for e in result.effects for n, (v, _) in e.parameters.items()}
+    found |= {n: v for n, (v, _) in result.calibrated.items()}
+    assert found["M"] == pytest.approx(95, abs=2.5)
+    assert found["F_v"] == pytest.approx(200, abs=15)
+    assert found["F_c"] == pytest.approx(20.4, abs=2)
+    assert found["F_0"] == pytest.approx(-3.2, abs=0.5)
+    assert result.error["q_dot"]["before"] >= 14e-3
+    assert result.error["q_dot"]["after"] <= 6.5e-3
