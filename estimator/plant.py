@@ -1,6 +1,9 @@
 """Any FMU as a black box x+ = f(x, u, theta), y = h(x, u, theta), by restart from a state."""
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from multiprocessing.util import Finalize
+from pathlib import Path
 
 import numpy as np
 
@@ -34,6 +37,33 @@ class Plant:
         self.fmu.step(dt)
         values = np.array(self.fmu.read((*self.states, *self.outputs)))
         return values[: len(x)], values[len(x) :]
+
+
+class Plants:
+    """Running FMUs of this process, opened when first asked for; the least used ones are closed."""
+
+    def __init__(self, most: int = 24) -> None:
+        self.most = most
+        self._open: OrderedDict[tuple[Path, tuple[str, ...], tuple[str, ...]], Plant] = OrderedDict()
+
+    def get(self, fmu: Path, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Plant:
+        """The plant of an FMU file with these inputs and outputs."""
+        key = (fmu, inputs, outputs)
+        if key not in self._open:
+            if len(self._open) >= self.most:
+                self._open.popitem(last=False)[1].fmu.close()
+            self._open[key] = Plant(Fmu(fmu), inputs, outputs)
+        self._open.move_to_end(key)
+        return self._open[key]
+
+    def close(self) -> None:
+        """Close all."""
+        while self._open:
+            self._open.popitem()[1].fmu.close()
+
+
+PLANTS = Plants()
+Finalize(None, PLANTS.close, exitpriority=10)  # before the folders of their FMUs are deleted
 
 
 def held(u: Array) -> Array:

@@ -8,39 +8,17 @@ come every FMU, the model description, the parameter tables and the Jacobians.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar
 
 import casadi as cs
 
+from fmus.effects.effect import Effect
 from fmus.errors import BadInput, did_you_mean
 from fmus.integrate import Method, rk4
+from fmus.port import UNITS, Port
 from fmus.variables import Expr, Input, Output, Parameter, Rate, State, Variable
-
-if TYPE_CHECKING:
-    from fmus.effects.effect import Effect
-
-
-UNITS = {  # of generalised force and displacement, by kind of motion
-    "rotation": {"F": "N.m", "q": "rad"},
-    "translation": {"F": "N", "q": "m"},
-}
-
-
-@dataclass(frozen=True)
-class Port:
-    """A place where a generalised force acts: its conjugate motion, and how it enters the inputs.
-
-    forces: gain of the force on each `*_ext` input (virtual work: d(displacement)/d(coordinate)).
-    place: whether the displacement keeps to a rest position, turns on, or is only slip added up.
-    """
-
-    displacement: Expr
-    velocity: Expr
-    forces: Mapping[str, float | Expr]
-    motion: Literal["rotation", "translation"] = "translation"
-    place: Literal["rests", "turns", "slips"] = "rests"
 
 
 class Model(ABC):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from estimator.closeloop.chain import Outcome, trace
 from estimator.closeloop.problem import Problem
+from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.hypotheses import ForeignBuilder, ModelBuilder
 from fmus.host.archive import describe
@@ -45,7 +46,10 @@ def close_loop(
         builder = builder_for(declared, Path(work))
         problem = pose(declared, builder)
         folder = None if out is None else writable(Path(out))
-        found = trace(problem, tell, jobs or os.cpu_count() or 1, seed)
+        try:
+            found = trace(problem, tell, jobs or os.cpu_count() or 1, seed)
+        finally:
+            PLANTS.close()
         if folder is None:
             return result_of(declared.id, problem, found, time.monotonic() - begun, None)
         tell("building the augmented FMU and writing the report")

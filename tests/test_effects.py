@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fmus.effects import EFFECTS, parse_effect
 from fmus.effects.effect import Effect
 from fmus.errors import BadInput
-from fmus.model import UNITS, equations
+from fmus.model import equations
 from fmus.models import MODELS
+from fmus.port import UNITS
 from fmus.units import base_exponents
 from fmus.variables import Input, Output, Parameter
 from tests.everything import EVERY_EFFECT, EVERY_MODEL, EVERY_PLACE, fitting, near_start, start, values

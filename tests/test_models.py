@@ -8,8 +8,9 @@ import pytest
 
 from fmus.effects import EFFECTS
 from fmus.errors import BadInput
-from fmus.model import UNITS, Model, Port, equations
+from fmus.model import Model, equations
 from fmus.models import MODELS, model_class
+from fmus.port import UNITS, Port
 from fmus.units import base_exponents
 from fmus.variables import Input, Output, Parameter, Rate, State, Variable, rate
 from tests.everything import EVERY_MODEL, near_start, start, values

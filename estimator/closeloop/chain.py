@@ -14,7 +14,7 @@ from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, changes, screen
-from estimator.closeloop.verdict import Judgement, explains, judge
+from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
 
 Tell = Callable[[str], None]
@@ -58,8 +58,9 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     tell("testing for a discrepancy against simulated records without one")
     detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
     found = (declared, base, noise, size, detection, tuple(forces), tuple(promises))
-    if not (detection.detected and detection.material):
-        return Outcome(*found, (), (), Judgement("no_discrepancy", (), _nothing(detection)))
+    early = without_fits(problem, base, detection, noise)
+    if early:
+        return Outcome(*found, (), (), early)
     tell("fitting each candidate inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, promises, size, jobs)
     pairs: list[Hypothesis] = []
@@ -71,9 +72,3 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     singles, pairs = (ranked(problem, h, size) for h in (singles, pairs))
     judgement = judge(problem, base, singles, pairs, noise, size)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement)
-
-
-def _nothing(detection: Detection) -> str:
-    if not detection.detected:
-        return f"the residual is what noise would leave (p = {detection.p_value:.2g})"
-    return "the residual is more than noise, but too small to matter"

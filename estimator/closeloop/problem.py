@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from estimator.closeloop.sensors import faulty
-from estimator.plant import Plant
+from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
-from fmus.host.archive import Archive
 from fmus.host.description import PortNames
-from fmus.host.fmu import Fmu
 
 START_SAMPLES = 20  # from which a start state that is measured is found
 START_ERROR = 3.0  # times the scatter of these samples: the most that it can be wrong
@@ -47,8 +45,9 @@ class Builder(Protocol):
 class Problem:
     """An FMU with declared values against a record.
 
-    builder: gives the FMU; effects: (kind, location) built in; declared: parameters and given start
-    states; calibrate: bounds by name; free_states: states whose start is not given. Small and picklable: workers open the FMU themselves.
+    builder gives the FMU with `effects`, (kind, location), built in; declared holds parameters and given
+    start states, calibrate bounds by name, free_states those whose start is not given. Small and
+    picklable: workers open the FMU themselves.
     """
 
     builder: Builder
@@ -62,7 +61,7 @@ class Problem:
     @property
     def plant(self) -> Plant:
         """The running FMU, one in each process."""
-        return _plant(self.builder(self.effects), self.record.inputs, self.record.outputs)
+        return PLANTS.get(self.builder(self.effects), self.record.inputs, self.record.outputs)
 
     @cached_property
     def measured_state(self) -> dict[str, int]:
@@ -113,13 +112,3 @@ class Problem:
     def _own(self, theta: Mapping[str, float]) -> dict[str, float]:
         known = self.plant.fmu.description.variables
         return {n: v for n, v in theta.items() if n in known}
-
-
-@cache
-def _plant(fmu: Path, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Plant:
-    return Plant(Fmu(_archive(fmu)), inputs, outputs)
-
-
-@cache
-def _archive(fmu: Path) -> Archive:
-    return Archive(fmu)

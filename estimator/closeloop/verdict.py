@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.compare import Hypothesis, beats, lead
-from estimator.closeloop.detect import NOISES
+from estimator.closeloop.detect import NOISES, Detection
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
 from estimator.record import Array
@@ -21,6 +21,7 @@ Verdict = Literal[
     "unexplained",
     "insufficient_excitation",
 ]
+MOVES = 3.0  # times the noise: an output that moves less shows nothing
 GAP = 0.95  # share of the gap to the noise that an effect must close where noise is declared
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
@@ -76,6 +77,24 @@ def equivalent(
     return members
 
 
+def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:
+    """The verdict where no effect needs to be looked for, or None."""
+    measured = np.concatenate([run.y[run.test] for run in problem.record.runs])
+    if not detection.detected:
+        if np.all(np.std(measured, axis=0) < MOVES * noise):
+            reason = "no output moves out of its noise, so that no effect could have been seen"
+            return Judgement("insufficient_excitation", (), reason, "a record in which the outputs move")
+        return Judgement(
+            "no_discrepancy", (), f"the residual is what noise would leave (p = {detection.p_value:.2g})"
+        )
+    if not detection.material:
+        size = ", ".join(f"{r:.2f}" for r in base.rms(problem) / noise)
+        reason = f"the residual is more than noise, but too small to matter ({size} times the noise)"
+        return Judgement("no_discrepancy", (), reason)
+    dead = [n.sentence for n in problem.record.notes if n.kind == "constant"]
+    return Judgement("sensor_fault", (), "; ".join(dead)) if dead else None
+
+
 def judge(
     problem: Problem, base: Hypothesis, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
     noise: Array, size: Array,
@@ -119,7 +138,7 @@ def splitting(members: Sequence[Hypothesis]) -> str:
     advice = []
     if {"constant_force", "coulomb_friction"} <= kinds:
         advice.append(f"a run in which the velocity at {where} changes its sign")
-    if len(kinds & {"constant_force", "coulomb_friction", "viscous_damping", "quadratic_damping"}) > 1:
+    if kinds & {"viscous_damping", "quadratic_damping"} and len(kinds) > 1:
         advice.append(f"runs at two or more clearly different speeds of {where}")
     if any(k.startswith("sensor_") for k in kinds):
         advice.append("a second sensor for the same quantity, or a calibration of this one at rest")

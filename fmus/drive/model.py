@@ -4,7 +4,8 @@ Made for the public benchmark EMPS (Janot, Gautier, Brunot 2019) without the eff
 shows: a drive as a supplier would send it, mass and viscous friction only.
 """
 
-from fmus.model import Model, Port
+from fmus.model import Model
+from fmus.port import Port
 from fmus.variables import Expr, Input, Parameter, State, rate
 
 

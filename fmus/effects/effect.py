@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-from fmus.model import UNITS, Port
+from fmus.port import UNITS, Port
 from fmus.variables import Expr, Parameter
 
 

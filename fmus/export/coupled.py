@@ -20,7 +20,7 @@ from fmus.export.pythonfmu import Content, documentation, pack
 from fmus.export.table import row, unit_table
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, FmuVariable, PortNames
-from fmus.model import UNITS
+from fmus.port import UNITS
 from fmus.variables import Parameter
 
 COUPLING_STEP = 1e-3  # s, the longest between two readings of a port

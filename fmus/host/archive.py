@@ -3,6 +3,7 @@
 import shutil
 import tempfile
 import zipfile
+from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, Self
@@ -22,6 +23,8 @@ class Archive:
         self.path = Path(path)
         names = _checked_names(self.path)
         self.folder = Path(tempfile.mkdtemp(prefix="railfmi_fmu_"))
+        # goes with the object or the process, worker processes included, which skip atexit
+        self._delete = Finalize(self, shutil.rmtree, (self.folder, True), exitpriority=0)
         try:
             _unpack(self.path, self.folder)
             self.description = _description(self.path, self.folder)
@@ -32,7 +35,7 @@ class Archive:
 
     def close(self) -> None:
         """Delete the folder."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self._delete()
 
     def __enter__(self) -> Self:
         return self

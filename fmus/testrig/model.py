@@ -8,7 +8,8 @@ import casadi as cs
 from fmus.contact.kalker import coefficient
 from fmus.contact.polach import creep_force, friction_coefficient, stress_gradient
 from fmus.integrate import rodas3
-from fmus.model import Model, Port
+from fmus.model import Model
+from fmus.port import Port
 from fmus.variables import Expr, Input, Output, Parameter, State, rate
 
 V_MIN = 0.01  # m/s, rounds the rolling speed near standstill, where creepage has no limit

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import atexit
 import math
 import shutil
 import tempfile
 from array import array
 from ctypes import POINTER, c_double, c_size_t, c_uint, c_void_p
+from multiprocessing.util import Finalize
 from typing import Any
 
 import casadi as cs
@@ -27,7 +27,7 @@ OUTPUTS = range(common.SETTABLE, common.SETTABLE + N_OUTPUTS)
 OWN = range(common.SETTABLE - BASE["laws"], common.SETTABLE)  # parameters of the laws
 # unpacked once for the process: the folder this package came from may be gone at the next load
 FOLDER = tempfile.mkdtemp(prefix="railfmi_base_")
-atexit.register(shutil.rmtree, FOLDER, ignore_errors=True)
+Finalize(None, shutil.rmtree, (FOLDER, True), exitpriority=0)  # worker processes skip atexit
 fmpy.extract(str(common.HERE / "base.fmu"), FOLDER)
 WARNING = 1  # highest FMI status of a call that was done
 IDLE: list[FMU2Slave] = []  # carried instances whose slave is gone, for reuse
