@@ -18,14 +18,23 @@ class Plant:
         self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
         self.states = tuple(fmu.description.states)
 
-    def simulate(self, run: Run, start: Mapping[str, float], more: Sequence[str] = ()) -> Array:
+    def simulate(
+        self,
+        run: Run,
+        start: Mapping[str, float],
+        more: Sequence[str] = (),
+        push: Mapping[str, Array] | None = None,
+    ) -> Array:
         """Free run through a record from its first sample: outputs, then `more`, (N, n_y + n_more).
 
         start: states and parameters by name. An input acts with the mean of its samples at both ends
         of a step, which is exact to second order for signals sampled from continuous ones.
+        push: samples (N,) added to inputs.
         """
         u = held(run.u)
         inputs = {name: u[:, j] for j, name in enumerate(self.inputs)}
+        for name, samples in (push or {}).items():
+            inputs[name] = inputs.get(name, 0.0) + (samples[1:] + samples[:-1]) / 2
         return self.fmu.simulate(run.t, inputs, (*self.outputs, *more), start)
 
     def transition(

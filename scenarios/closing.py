@@ -83,7 +83,7 @@ def builder_for(e: Experiment, work: Path) -> Builder:
 
 def pose(e: Experiment, builder: Builder) -> Problem:
     """The question that an experiment asks of its FMU."""
-    description = describe(builder(()))
+    description = describe(e.fmu_path or builder(()))
     record = load_record(e, description)
     declared = {**_starts(description, e), **e.parameters, **e.initial}
     free = tuple(n for n in description.states if n not in e.initial)

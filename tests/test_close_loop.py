@@ -1,6 +1,7 @@
 """Closing the loop end to end: what must be found, what must not, and what is written."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import get_args
 
@@ -82,6 +83,57 @@ def test_the_error_before_and_after_is_that_of_a_free_run_of_the_fmus(demo: tupl
     for j, name in enumerate(("omega_w", "omega_r")):
         rmse = np.sqrt(np.mean((data[name] - y[:, j])[test] ** 2))
         assert rmse == pytest.approx(result.error[name]["after"], rel=1e-6)
+
+
+FOREIGN = """
+id = "foreign"
+fmu = "{fmu}"
+data = "data.csv"
+time = "t"
+[split]
+identify = [0.0, 18.0]
+test = [18.0, 30.0]
+[parameters]
+k = 2.0
+[calibrate]
+k = [1.5, 2.5]
+[inputs]
+u = "u"
+[outputs.x]
+column = "x"
+unit = "1"
+noise_std = 0.001
+[[ports]]
+name = "shaft"
+force = "u"
+velocity = "x"
+displacement = "x"
+"""
+
+
+@pytest.mark.parametrize("initial", ["exact", "calculated"])
+def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
+    initial: str, foreign: Callable[..., Path], tmp_path: Path
+) -> None:
+    rng, dt, n = np.random.default_rng(15), 0.01, 3001
+    t = np.arange(n) * dt
+    u = 2 * np.sin(2 * np.pi * t / 5) + np.sin(2 * np.pi * t / 1.7)
+    x = np.empty(n)
+    x[0] = 1.0  # where the FMU starts
+    for k in range(n - 1):
+        x[k + 1] = x[k]
+        for _ in range(10):  # the coupling step, and so that of this FMU's own method
+            x[k + 1] += dt / 10 * ((u[k] + u[k + 1]) / 2 - 2.1 * x[k + 1] - 0.3 * abs(x[k + 1]) * x[k + 1])
+    rows = np.column_stack([t, u, x + 0.001 * rng.standard_normal(n)])
+    np.savetxt(tmp_path / "data.csv", rows, delimiter=",", header="t,u,x", comments="")
+    (tmp_path / "experiment.toml").write_text(FOREIGN.format(fmu=foreign(initial=initial)))
+    result = close_loop(tmp_path, tmp_path / "out")
+    assert (result.verdict, named(result)) == ("traced", {("quadratic_damping", "shaft")})
+    assert result.effects[0].parameters["c"][0] == pytest.approx(0.3, rel=0.05)
+    with Fmu(tmp_path / "out" / result.augmented_fmu) as augmented:
+        inputs = {"u": (u[1:] + u[:-1]) / 2}
+        y = augmented.simulate(t, inputs, ["x"], {"x": 1.0} if initial == "exact" else {})
+    assert np.sqrt(np.mean((y[:, 0] - x) ** 2)) < 0.002
 
 
 def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tmp_path: Path) -> None:

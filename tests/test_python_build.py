@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fmus.export.pythonfmu import build_python
 from fmus.host.archive import Archive
-from fmus.host.fmi2 import MESSAGES, Fmi2Instance
+from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmu import Fmu
+from fmus.host.instance import MESSAGES
 from fmus.model import equations
 from fmus.models import MODELS
 from fmus.variables import Output, State

@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.pushes import pushed
 from estimator.record import Array
 from fmus.host.description import PortNames
 
 SAMPLES = 4000  # at most this many are smoothed
+PROBES = 5  # samples at which a restart is compared with the free run
+HIDDEN = 1e-3  # of a state's largest step: a restart that differs more has lost a state
 POINTS = 200  # at most this many linearisations along the run
 WALKS = (0.01, 0.1, 1.0)  # candidate changes of the force in a second, in units of its first guess
 
@@ -44,10 +47,11 @@ class Linearised:
 def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -> list[MissingForce]:
     """The missing force at each port of the problem, assuming that it acts there alone.
 
-    noise: (n_y,) standard deviation of each output. Empty where the FMU shows no states.
+    noise: (n_y,) standard deviation of each output. Where the FMU does not show all of its states, so
+    that it cannot be linearised, its answers to pushes take the smoother's place.
     """
     plant, run = problem.plant, problem.record.runs[0]
-    if not plant.states or not problem.ports:
+    if not problem.ports:
         return []
     motion = [name for p in problem.ports for name in (p.displacement, p.velocity)]
     [full, *_] = problem.simulate(theta, (*plant.states, *motion))
@@ -56,20 +60,38 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     keep = np.arange(0, last, stride)
     n_y, n = len(plant.outputs), len(plant.states)
     residual = (run.y - full[:, :n_y])[keep]
-    local = _linearise(problem, theta, full[:, n_y : n_y + n], keep)
+    x = full[:, n_y : n_y + n]
+    local = _linearise(problem, theta, x, keep) if _shows_its_state(problem, theta, x, last) else None
     found = []
     for i, port in enumerate(problem.ports):
-        force, std = _smooth(local, i, residual, noise, np.diff(run.t[keep]))
+        if local:
+            force, std = _smooth(local, i, residual, noise, np.diff(run.t[keep]))
+        else:
+            whole = run.y[:last] - full[:last, :n_y]
+            force, std = (f[keep] for f in pushed(problem, theta, port, whole, noise))
         q, v = full[keep, n_y + n + 2 * i], full[keep, n_y + n + 2 * i + 1]
         found.append(MissingForce(port, run.t[keep], force, std, q, v))
     return found
 
 
+def _shows_its_state(problem: Problem, theta: Mapping[str, float], x: Array, last: int) -> bool:
+    """Whether a restart from the states that the FMU shows goes on as its free run did."""
+    plant, run, start = problem.plant, problem.record.runs[0], problem.start(theta)
+    if not plant.states:
+        return False
+    moves = np.abs(np.diff(x[:last], axis=0)).max(axis=0) + 1e-300
+    for k in np.linspace(0, last - 2, PROBES).astype(int):
+        u = dict(zip(plant.inputs, run.u[k : k + 2].mean(axis=0).tolist(), strict=True))
+        after, _ = plant.transition(x[k], u, start, float(run.t[k + 1] - run.t[k]))
+        if np.any(np.abs(after - x[k + 1]) > HIDDEN * moves):
+            return False
+    return True
+
+
 def _linearise(problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp]) -> Linearised:
     plant, run = problem.plant, problem.record.runs[0]
     index = np.unique(np.linspace(0, len(keep) - 2, min(POINTS, len(keep) - 1)).astype(int))
-    start = {**problem.declared}
-    start |= {k: v for k, v in theta.items() if k in plant.fmu.description.variables}
+    start = problem.start(theta)
     scale = 1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9)
     a, b, c = [], [], []
     for k in index:

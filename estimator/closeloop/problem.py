@@ -103,12 +103,13 @@ class Problem:
         return replace(self, effects=tuple(effects))
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
-        start = {**self.declared, **self._own(theta)}
+        start = self.start(theta)
         if self.free_states and not run.fit.any():
             start |= {n: value for n, (value, _) in self.start_states(run).items()}
         y = self.plant.simulate(run, start, more)
         return faulty(y, run.t, self.record.outputs, theta)
 
-    def _own(self, theta: Mapping[str, float]) -> dict[str, float]:
+    def start(self, theta: Mapping[str, float]) -> dict[str, float]:
+        """Start values of the FMU: declared ones, and those of theta that are its own."""
         known = self.plant.fmu.description.variables
-        return {n: v for n, v in theta.items() if n in known}
+        return {**self.declared, **{n: v for n, v in theta.items() if n in known}}

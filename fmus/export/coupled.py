@@ -48,19 +48,20 @@ def build_coupled(
     for r in table:
         r["start"] = float((starts or {}).get(r["name"], r["start"]))
     order, names = [r["name"] for r in table], [f"{kind}@{location}" for kind, location in effects]
+    restarted = [order.index(n) for n in starts or {} if n in description.variables]
     card = {
         "description": f"{description.name} with {', '.join(names) or 'no effect'}",
         "step_size": COUPLING_STEP,
         "sizes": [len(group) for group in rows],
         "units": unit_table(r["unit"] for r in table if r["unit"]),
         "variables": table,
-        "base": _base_card(description, ports, order, len(own)),
+        "base": {**_base_card(description, ports, order, len(own)), "restarted": restarted},
     }
     files = {"laws.casadi": laws.function.serialize().encode(), "base.fmu": base.read_bytes()}
     title = name or f"{description.identifier}WithEffects"
     needs = "It carries another FMU and runs it with the package fmpy, which the importing process needs too."
     page = documentation(title, card, names, needs)
-    return pack(Content(title, card, ("coupled",), files, page, saves_state=False), out)
+    return pack(Content(title, card, ("coupled", "carried"), files, page, saves_state=False), out)
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,7 @@ def _base_card(
         {k: order.index(getattr(port, k)) for k in ("force", "velocity", "displacement")} for port in ports
     ]
     return {
+        "fmi": description.fmi_version,
         "guid": description.guid,
         "identifier": description.identifier,
         "references": references,

@@ -63,8 +63,11 @@ class ForeignBuilder:
         return tuple((k, port.name) for port in self.ports for k in EFFECTS)
 
     def __call__(self, effects: Effects) -> Path:
-        """Path of the FMU with these effects, all off at their start values; the FMU itself without any."""
-        if not effects:
+        """Path of the FMU with these effects, all off at their start values.
+
+        Without an effect too it runs in the coupled build, so that all hypotheses take the same steps.
+        """
+        if not self.ports:
             return self.fmu
         return _once(self.folder, effects, lambda path: build_coupled(self.fmu, self.ports, effects, path))
 

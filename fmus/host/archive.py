@@ -15,6 +15,8 @@ from fmpy.validation import validate_fmu
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable
 
+FMI_VERSIONS = ("2.0", "3.0")
+
 
 class Archive:
     """An unpacked FMU; several instances can run from one. BadInput where it cannot be used here."""
@@ -93,9 +95,12 @@ def _description(path: Path, folder: Path) -> FmuDescription:
     except Exception as error:
         line = " ".join(str(error).split())
         raise BadInput(f"{path}: its modelDescription.xml cannot be read ({line[:200]})") from error
+    if model.fmiVersion not in FMI_VERSIONS:
+        raise BadInput(f"{path}: is FMI {model.fmiVersion}; FMI {' and '.join(FMI_VERSIONS)} are read here")
     if model.coSimulation is None:
         raise BadInput(f"{path}: is not for co-simulation; export it again as a co-simulation FMU")
-    variables = {v.name: _variable(v) for v in model.modelVariables if v.type in ("Real", "Float64")}
+    unused = {v.name: kind for v in model.modelVariables if (kind := _unused(v))}
+    variables = {v.name: _variable(v) for v in model.modelVariables if v.name not in unused}
     kind, usual = model.coSimulation, model.defaultExperiment
     return FmuDescription(
         name=model.modelName,
@@ -107,22 +112,37 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         saves_state=kind.canGetAndSetFMUstate,
         serialises_state=kind.canSerializeFMUstate,
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,
+        unused=unused,
     )
 
 
+def _unused(v: Any) -> str:
+    """What a variable is that cannot be used here; empty for one that can."""
+    if v.dimensions:
+        return "an array"
+    if v.causality == "structuralParameter":
+        return "a structural parameter"
+    if v.clocks:
+        return "a clocked variable"
+    return "" if v.type in ("Real", "Float64") else f"of type {v.type}"
+
+
 def _variable(v: Any) -> FmuVariable:
-    kind = v.declaredType
+    def said(attribute: str) -> Any:
+        own = getattr(v, attribute)
+        return getattr(v.declaredType, attribute) if own is None and v.declaredType else own
+
     return FmuVariable(
         name=v.name,
         reference=int(v.valueReference),
-        causality=v.causality or "local",
+        causality="local" if v.alias else v.causality or "local",  # one state or input, whatever its names
         variability=v.variability or "continuous",
         initial=v.initial,
-        unit=v.unit or (kind.unit if kind else None),
+        unit=said("unit"),
         start=_number(v.start),
-        min=_number(v.min),
-        max=_number(v.max),
-        nominal=_number(v.nominal),
+        min=_number(said("min")),
+        max=_number(said("max")),
+        nominal=_number(said("nominal")),
         description=v.description or "",
     )
 

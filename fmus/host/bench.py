@@ -7,8 +7,8 @@ import numpy as np
 
 from fmus.host.archive import Archive
 from fmus.host.description import FmuVariable
-from fmus.host.fmi2 import Array
 from fmus.host.fmu import Fmu, FmuError
+from fmus.host.instance import Array
 
 STEP = 1e-3  # s, where the FMU does not say what is usual for it
 NUDGE = 0.01  # of its value or nominal, by which a parameter is changed

@@ -1,6 +1,6 @@
 """What an FMU says of itself, reduced to what its users here need."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 Causality = Literal["parameter", "calculatedParameter", "input", "output", "local", "independent"]
@@ -8,7 +8,7 @@ Causality = Literal["parameter", "calculatedParameter", "input", "output", "loca
 
 @dataclass(frozen=True)
 class FmuVariable:
-    """One Real variable of an FMU; numbers are in `unit`, None where the FMU says nothing."""
+    """One Real or scalar Float64 variable; numbers are in `unit`, None where the FMU says nothing."""
 
     name: str
     reference: int
@@ -35,7 +35,7 @@ class PortNames:
 
 @dataclass(frozen=True)
 class FmuDescription:
-    """Name, FMI version and Real variables of an FMU, in the order of its model description."""
+    """Name, FMI version and variables of an FMU, in the order of its model description."""
 
     name: str
     fmi_version: str
@@ -43,9 +43,10 @@ class FmuDescription:
     guid: str
     variables: dict[str, FmuVariable]
     step_size: float | None = None  # s, of its default experiment
-    saves_state: bool = False  # fmi2GetFMUstate and fmi2SetFMUstate
+    saves_state: bool = False  # and goes back to it
     serialises_state: bool = False
     once_per_process: bool = False  # no second instance
+    unused: dict[str, str] = field(default_factory=dict)  # other variables: what each is
 
     def of(self, *causalities: Causality) -> list[str]:
         """Names of the variables of the given causalities."""

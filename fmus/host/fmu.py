@@ -10,7 +10,9 @@ import numpy as np
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
-from fmus.host.fmi2 import Array, CallFailed, Fmi2Instance
+from fmus.host.fmi2 import Fmi2Instance
+from fmus.host.fmi3 import Fmi3Instance
+from fmus.host.instance import Array, CallFailed, Instance
 
 
 class FmuError(RuntimeError):
@@ -33,9 +35,8 @@ class Fmu:
         self.name = archive.path.name
         self.time = 0.0
         try:
-            if not self.description.fmi_version.startswith("2."):
-                raise BadInput(f"{archive.path}: is FMI {self.description.fmi_version}; FMI 2.0 is read here")
-            self._instance = self._safely(Fmi2Instance, archive, self.description.name)
+            kind = Fmi3Instance if self.description.fmi_version == "3.0" else Fmi2Instance
+            self._instance: Instance = self._safely(kind, archive, self.description.name)
         except BaseException:
             if self._own:
                 self._own.close()
@@ -103,8 +104,10 @@ class Fmu:
 
     def references(self, names: Sequence[str] | Mapping[str, Any]) -> list[int]:
         """Value references of names; BadInput with the nearest name where one is not in the FMU."""
-        variables = self.description.variables
+        variables, unused = self.description.variables, self.description.unused
         for name in names:
+            if name in unused:
+                raise BadInput(f"{self.name}: '{name}' is {unused[name]}; use a scalar Real or Float64 one")
             if name not in variables:
                 raise BadInput(f"{self.name}: has no variable '{name}'; {did_you_mean(name, variables)}")
         return [variables[name].reference for name in names]

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 import shutil
+import sys
 import tempfile
 from array import array
-from ctypes import POINTER, c_double, c_size_t, c_uint, c_void_p
+from collections.abc import Sequence
 from multiprocessing.util import Finalize
 from typing import Any
 
 import casadi as cs
 import fmpy
-from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
-from . import common
+from . import carried, common
 
 LAWS = cs.Function.deserialize((common.HERE / "laws.casadi").read_text())
 BASE: dict[str, Any] = common.MODEL["base"]
@@ -29,8 +29,7 @@ OWN = range(common.SETTABLE - BASE["laws"], common.SETTABLE)  # parameters of th
 FOLDER = tempfile.mkdtemp(prefix="railfmi_base_")
 Finalize(None, shutil.rmtree, (FOLDER, True), exitpriority=0)  # worker processes skip atexit
 fmpy.extract(str(common.HERE / "base.fmu"), FOLDER)
-WARNING = 1  # highest FMI status of a call that was done
-IDLE: list[FMU2Slave] = []  # carried instances whose slave is gone, for reuse
+IDLE: list[carried.Carried] = []  # carried instances whose slave is gone, for reuse
 
 
 class Slave(common.Slave):
@@ -38,7 +37,7 @@ class Slave(common.Slave):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.touched: set[int] = set()
+        self.touched = set(BASE["restarted"])  # settable variables whose value the carried FMU must be told
         self.base, self.running = _instance(), False
         self.start_time = 0.0
         self.motion, self.force = (array("d", bytes(8 * n)) for n in (LAWS.numel_in(0), LAWS.numel_out(0)))
@@ -52,25 +51,14 @@ class Slave(common.Slave):
         ports = BASE["ports"]
         self.given = [port["force"] for port in ports]
         motion = [i for port in ports for i in (port["displacement"], port["velocity"])]
-        self.read = self._call("fmi2GetReal", motion, self.motion)
-        self.step = self.base.dll.fmi2DoStep
-        self.step.argtypes = [c_void_p, c_double, c_double, c_uint]
-        self.push = self._call("fmi2SetReal", self.given, self.force)
-        self.look = [
-            self._call("fmi2GetReal", list(part), self.values, part.start)
-            for part in (range(N_STATES), OUTPUTS)
-        ]
-
-    def _call(self, function: str, indices: list[int], memory: array[float], first: int = 0) -> Any:
-        """A raw call of the carried FMU that gets or sets variables in memory that stays in place."""
-        n, raw = len(indices), getattr(self.base.dll, function)
-        raw.argtypes = [c_void_p, POINTER(c_uint), c_size_t, POINTER(c_double)]
-        references = (c_uint * n)(*(REFERENCES[i] for i in indices))
-        values = (c_double * n).from_buffer(memory, 8 * first) if n else (c_double * 0)()
-        return lambda: _ok(raw(self.base.component, references, n, values), function)
+        self.read = self.base.getter(_references(motion), self.motion)
+        self.push = self.base.setter(_references(self.given), self.force)
+        parts = (range(N_STATES), OUTPUTS)
+        self.look = [self.base.getter(_references(part), self.values, part.start) for part in parts]
 
     def __del__(self) -> None:
-        IDLE.append(self.base)
+        if hasattr(self, "base"):
+            IDLE.append(self.base)
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
         """Remember the start time."""
@@ -81,14 +69,13 @@ class Slave(common.Slave):
         """Initialise the carried FMU from what was set."""
         self.base.reset()
         self._pass_on(self.touched - set(OWN))
-        self.base.setupExperiment(startTime=self.start_time)
-        self.base.enterInitializationMode()
+        self.base.enter(self.start_time)
 
     @common.caught
     def exit_initialization_mode(self) -> None:
         """The carried FMU may step."""
         self._pass_on(set(INPUTS))
-        self.base.exitInitializationMode()
+        self.base.leave()
         self.running = True
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
@@ -119,7 +106,7 @@ class Slave(common.Slave):
             for i, own in enumerate(given):
                 force[i] += own
             self.push()
-            _ok(self.step(self.base.component, current_time + k * dt, dt, 1), "fmi2DoStep")
+            self.base.step(current_time + k * dt, dt)
         self.refresh()
         self.stale = False
         if all(map(math.isfinite, self.values)):
@@ -130,19 +117,19 @@ class Slave(common.Slave):
     def _pass_on(self, indices: set[int]) -> None:
         order = sorted(indices)
         if order:
-            self.base.setReal([REFERENCES[i] for i in order], [self.values[i] for i in order])
+            self.base.set(_references(order), [self.values[i] for i in order])
 
 
-def _ok(status: int, function: str) -> None:
-    if status > WARNING:
-        raise RuntimeError(f"the carried FMU refused {function} (status {status})")
+def _references(indices: Sequence[int]) -> list[int]:
+    return [REFERENCES[i] for i in indices]
 
 
-def _instance() -> FMU2Slave:
+def _instance() -> carried.Carried:
     if IDLE:
         return IDLE.pop()
-    base = FMU2Slave(
+    path = sys.path.copy()
+    base = carried.CARRIED[BASE["fmi"]](
         guid=BASE["guid"], modelIdentifier=BASE["identifier"], unzipDirectory=FOLDER, instanceName="base"
     )
-    base.instantiate()
+    sys.path[:] = path  # an FMU in Python puts its own folder in front
     return base

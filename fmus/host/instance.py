@@ -1,0 +1,171 @@
+"""The calls of an FMU instance that all FMI versions share: refusals with reasons, the loop of a run."""
+
+import os
+import sys
+from abc import ABC, abstractmethod
+from collections import defaultdict, deque
+from collections.abc import Callable, Sequence
+from ctypes import c_double, c_uint
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+
+from fmus.host.archive import Archive
+
+Array = NDArray[np.float64]
+OK, WARNING, FATAL = 0, 1, 4
+NUMBERS = count()
+MESSAGES: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=20))  # by instance name
+
+
+class CallFailed(Exception):
+    """An FMI call that did not succeed, with what the FMU logged about it."""
+
+
+class Instance(ABC):
+    """One instance between instantiation and free; references are FMI value references."""
+
+    def __init__(self, archive: Archive, name: str) -> None:
+        unique = f"{name}_{next(NUMBERS)}"
+        self._name, self.messages = unique, MESSAGES[unique]
+        self._fatal = ""  # why no call may be made any more, not even to free it
+        path, here = sys.path.copy(), Path.cwd()
+        try:
+            self._slave = self._started(
+                guid=archive.description.guid,
+                unzipDirectory=str(archive.folder),
+                modelIdentifier=archive.description.identifier,
+                instanceName=unique,
+            )
+        except Exception as error:  # FMPy has no class of its own for these
+            MESSAGES.pop(unique, None)
+            raise CallFailed(self._reason(" ".join(str(error).split()).rstrip("."))) from error
+        finally:
+            sys.path[:] = path  # an FMU in Python puts its own folder in front
+            os.chdir(here)  # FMPy stays in the library's folder where it cannot load it
+
+    @abstractmethod
+    def _started(self, **identity: str) -> Any:
+        """FMPy's object of the instance, instantiated, with its log going to `heard`."""
+
+    @abstractmethod
+    def _enter_initialisation(self, t0: float) -> None:
+        """Begin initialisation at t0, s."""
+
+    @abstractmethod
+    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
+        """Set variables."""
+
+    @abstractmethod
+    def get(self, references: Sequence[int]) -> list[float]:
+        """Read variables."""
+
+    @abstractmethod
+    def step(self, t: float, dt: float) -> None:
+        """Advance from t by dt, s."""
+
+    @abstractmethod
+    def state(self) -> Any:
+        """A saved FMU state."""
+
+    @abstractmethod
+    def restore(self, state: Any) -> None:
+        """Go back to a saved FMU state."""
+
+    @abstractmethod
+    def serialised(self, state: Any) -> bytes:
+        """A saved FMU state as bytes."""
+
+    @abstractmethod
+    def deserialised(self, data: bytes) -> Any:
+        """A saved FMU state from bytes."""
+
+    @abstractmethod
+    def forget(self, state: Any) -> None:
+        """Free a saved FMU state."""
+
+    @abstractmethod
+    def _setter(self, references: Any, values: Any) -> Callable[[], int]:
+        """A raw call that sets variables from a C array and returns its status."""
+
+    @abstractmethod
+    def _getter(self, references: Any, values: Any) -> Callable[[], int]:
+        """A raw call that reads variables into a C array and returns its status."""
+
+    @abstractmethod
+    def _stepper(self) -> Callable[[float, float], int]:
+        """A raw step from t by dt that returns its status."""
+
+    def initialise(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
+        """Reset, set the values, go through initialisation at t0."""
+        self.messages.clear()
+        self._call(self._slave.reset)
+        self.set(references, values)
+        self._enter_initialisation(t0)
+        self._call(self._slave.exitInitializationMode)
+
+    def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
+        """Step from t[0] through t with inputs u (N-1, n_u) held over each step; outputs (N-1, n_y).
+
+        The loop of every simulation: raw calls on arrays made once.
+        """
+        n_u, n_y = len(set_refs), len(get_refs)
+        u_now, y_now = (c_double * n_u)(), (c_double * n_y)()
+        push = self._setter((c_uint * n_u)(*set_refs), u_now)
+        pull = self._getter((c_uint * n_y)(*get_refs), y_now)
+        step = self._stepper()
+        y = np.empty((len(t) - 1, n_y))
+        times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
+        into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
+        self._refuse_after_fatal()
+        for k, dt in enumerate(steps):
+            into[:] = rows[k]
+            status = push() if n_u else OK
+            if status <= WARNING:
+                status = step(times[k], dt)
+            if status <= WARNING:
+                status = pull()
+            if status > WARNING:
+                raise CallFailed(self._failed(f"step at t = {times[k]:g} s", status))
+            y[k] = out
+        return y
+
+    def close(self) -> None:
+        """Free the instance and unload the library; one that failed fatally stays where it is."""
+        if not self._fatal:
+            self._slave.freeInstance()
+        MESSAGES.pop(self._name, None)
+
+    def _call(self, function: Any, *args: Any, **kwargs: Any) -> Any:
+        self._refuse_after_fatal()
+        try:
+            return function(*args, **kwargs)
+        except FMICallException as error:
+            raise CallFailed(self._failed(str(error).rstrip("."), error.status)) from error
+        except OSError as error:
+            raise CallFailed(self._reason(str(error).rstrip("."))) from error
+
+    def _refuse_after_fatal(self) -> None:
+        """A call after a fatal status can end the process, so none is made."""
+        if self._fatal:
+            raise CallFailed(f"cannot be used any more after a fatal failure ({self._fatal})")
+
+    def _failed(self, what: str, status: int) -> str:
+        reason = self._reason(what)
+        if status == FATAL:
+            self._fatal = reason
+        return reason
+
+    def _reason(self, what: str) -> str:
+        said = f": {self.messages[-1]}" if self.messages else ""
+        return what + said
+
+
+def heard(instance: str, status: int, message: bytes | None) -> None:
+    """Keep what an instance logs of anything that did not go well."""
+    if status > OK:
+        MESSAGES[instance].append(" ".join((message or b"").decode("utf-8", "replace").split()))

@@ -1,0 +1,79 @@
+"""An FMI 3.0 FMU in C of the van der Pol oscillator, and the same in Python."""
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+from scipy.integrate import solve_ivp
+
+SOURCE = Path(__file__).parent / "c" / "vdp_fmi3.c"
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="VanDerPol" instantiationToken="{vdp-of-the-tests}">
+  <CoSimulation modelIdentifier="vdp" canHandleVariableCommunicationStepSize="true"
+    canGetAndSetFMUState="true" canSerializeFMUState="true"/>
+  <UnitDefinitions>
+    <Unit name="s"><BaseUnit s="1"/></Unit>
+    <Unit name="m"><BaseUnit m="1"/></Unit>
+    <Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit>
+  </UnitDefinitions>
+  <TypeDefinitions><Float64Type name="Speed" unit="m/s" min="-50" max="50" nominal="3"/></TypeDefinitions>
+  <DefaultExperiment startTime="0" stopTime="20" stepSize="0.01"/>
+  <ModelVariables>
+    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>
+    <Float64 name="x0" valueReference="1" causality="output" initial="exact" start="2" unit="m"
+      nominal="2" description="displacement">
+      <Alias name="position" description="the same"/>
+    </Float64>
+    <Float64 name="x1" valueReference="2" causality="output" initial="exact" start="0" declaredType="Speed"/>
+    <Float64 name="x1_dot" valueReference="3" causality="output"/>
+    <Float64 name="mu" valueReference="4" causality="parameter" variability="tunable" start="1.5"
+      min="0" max="10"/>
+    <Float64 name="u" valueReference="5" causality="input" start="0"/>
+    <Float64 name="fault" valueReference="6" causality="parameter" variability="fixed" start="0"/>
+    <UInt64 name="n" valueReference="7" causality="structuralParameter" start="3"/>
+    <Float64 name="table" valueReference="8" causality="parameter" variability="tunable" start="1 2 3">
+      <Dimension valueReference="7"/>
+    </Float64>
+    <Float64 name="scale" valueReference="9" causality="structuralParameter" start="1"/>
+    <Int32 name="count" valueReference="10" causality="local"/>
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="1"/>
+    <Output valueReference="2"/>
+    <Output valueReference="3"/>
+    <InitialUnknown valueReference="3"/>
+  </ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def build_vdp(compiler, folder):
+    """Compile and pack it; the path of the FMU."""
+    library = folder / f"vdp{fmpy.sharedLibraryExtension}"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2"]
+    made = [compiler, *strict, "-shared", "-fPIC", "-I", headers, SOURCE, "-o", library, "-lm"]
+    subprocess.run(made, check=True)
+    path = folder / "VanDerPol.fmu"
+    with zipfile.ZipFile(path, "w") as packed:
+        packed.writestr("modelDescription.xml", DESCRIPTION)
+        packed.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
+    return path
+
+
+def solved(t, u, mu=1.5, x=(2.0, 0.0), damping=0.0):
+    """x0, x1, x1_dot at times t (N,) with inputs u (N-1,) held over each step, by scipy; (N, 3)."""
+
+    def f(_, x, u):
+        return [x[1], mu * (1 - x[0] ** 2) * x[1] - x[0] + u - damping * x[1]]
+
+    rows = [np.array(x)]
+    for k, held in enumerate(u):
+        end = solve_ivp(f, t[k : k + 2], rows[-1], args=(held,), method="DOP853", rtol=1e-11, atol=1e-12)
+        rows.append(end.y[:, -1])
+    held = [*u, u[-1]]
+    # an output at the end of a step still sees the input of that step
+    slopes = [f(0.0, x, held[max(k - 1, 0)])[1] for k, x in enumerate(rows)]
+    return np.column_stack([rows, slopes])
