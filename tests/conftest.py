@@ -1,5 +1,6 @@
 """FMUs built once for all tests, and examples without a time limit."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from fmus.export.pythonfmu import build_python
 from fmus.models import model_class
 from tests.everything import fitting
 from tests.foreign import foreign_builder
+from tests.vdp import build_vdp
 
 settings.register_profile("railfmi", deadline=None)  # a busy machine is no failure
 settings.load_profile("railfmi")
@@ -38,3 +40,12 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
 def foreign(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """foreign(body of do_step, more of the class) is the path of an FMU made with PythonFMU alone."""
     return foreign_builder(tmp_path_factory.mktemp("foreign"))
+
+
+@pytest.fixture(scope="session")
+def vdp(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The path of an FMI 3.0 FMU compiled from C."""
+    compiler = shutil.which("cc")
+    if not compiler:
+        pytest.skip("no C compiler 'cc' here to make an FMI 3.0 FMU with")
+    return build_vdp(compiler, tmp_path_factory.mktemp("vdp"))

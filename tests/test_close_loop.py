@@ -111,10 +111,8 @@ displacement = "x"
 """
 
 
-@pytest.mark.parametrize("initial", ["exact", "calculated"])
-def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
-    initial: str, foreign: Callable[..., Path], tmp_path: Path
-) -> None:
+def write_foreign(folder: Path, fmu: Path, text: str = FOREIGN) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A record of x' = u - 2.1 x - 0.3 |x| x for an FMU without the last term; t, u, and x without noise."""
     rng, dt, n = np.random.default_rng(15), 0.01, 3001
     t = np.arange(n) * dt
     u = 2 * np.sin(2 * np.pi * t / 5) + np.sin(2 * np.pi * t / 1.7)
@@ -125,8 +123,16 @@ def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
         for _ in range(10):  # the coupling step, and so that of this FMU's own method
             x[k + 1] += dt / 10 * ((u[k] + u[k + 1]) / 2 - 2.1 * x[k + 1] - 0.3 * abs(x[k + 1]) * x[k + 1])
     rows = np.column_stack([t, u, x + 0.001 * rng.standard_normal(n)])
-    np.savetxt(tmp_path / "data.csv", rows, delimiter=",", header="t,u,x", comments="")
-    (tmp_path / "experiment.toml").write_text(FOREIGN.format(fmu=foreign(initial=initial)))
+    np.savetxt(folder / "data.csv", rows, delimiter=",", header="t,u,x", comments="")
+    (folder / "experiment.toml").write_text(text.format(fmu=fmu))
+    return t, u, x
+
+
+@pytest.mark.parametrize("initial", ["exact", "calculated"])
+def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
+    initial: str, foreign: Callable[..., Path], tmp_path: Path
+) -> None:
+    t, u, x = write_foreign(tmp_path, foreign(initial=initial))
     result = close_loop(tmp_path, tmp_path / "out")
     assert (result.verdict, named(result)) == ("traced", {("quadratic_damping", "shaft")})
     assert result.effects[0].parameters["c"][0] == pytest.approx(0.3, rel=0.05)
@@ -134,6 +140,21 @@ def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
         inputs = {"u": (u[1:] + u[:-1]) / 2}
         y = augmented.simulate(t, inputs, ["x"], {"x": 1.0} if initial == "exact" else {})
     assert np.sqrt(np.mean((y[:, 0] - x) ** 2)) < 0.002
+
+
+def test_nothing_to_calibrate_is_no_obstacle(foreign: Callable[..., Path], tmp_path: Path) -> None:
+    text = FOREIGN.replace("[calibrate]\nk = [1.5, 2.5]", "[initial]\nx = 1.0").replace("k = 2.0", "k = 2.1")
+    write_foreign(tmp_path, foreign(), text)
+    result = close_loop(tmp_path)
+    assert (result.verdict, named(result)) == ("traced", {("quadratic_damping", "shaft")})
+    assert result.calibrated == {}
+
+
+def test_without_ports_only_sensors_are_suspected(foreign: Callable[..., Path], tmp_path: Path) -> None:
+    write_foreign(tmp_path, foreign(), FOREIGN[: FOREIGN.index("[[ports]]")])
+    result = close_loop(tmp_path)
+    assert result.verdict == "unexplained"
+    assert {a.kind.split("_")[0] for a in result.alternatives} == {"sensor"}
 
 
 def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tmp_path: Path) -> None:

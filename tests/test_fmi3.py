@@ -1,7 +1,5 @@
 """The host with an FMI 3.0 FMU compiled from C: every promise that it keeps for FMI 2.0."""
 
-import shutil
-
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
@@ -12,28 +10,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from estimator.plant import Plant
 from estimator.record import Run
 from fmus.errors import BadInput
-from fmus.export.coupled import build_coupled
 from fmus.host.archive import Archive, describe, problems
 from fmus.host.check import grade
-from fmus.host.description import PortNames
 from fmus.host.fmi3 import Fmi3Instance
 from fmus.host.fmu import Fmu, FmuError
 from fmus.host.instance import MESSAGES
 from fmus.host.trials import TRIALS
 from tests.packed import repacked, with_description
-from tests.vdp import build_vdp, solved
-
-OUTPUTS = ["x0", "x1", "x1_dot"]
-ERROR = 1e-9  # of Runge-Kutta steps of 1 ms over some seconds, against the solution
-PORT = PortNames("mass", "u", "x1", "x0")
-
-
-@pytest.fixture(scope="session")
-def vdp(tmp_path_factory):
-    compiler = shutil.which("cc")
-    if not compiler:
-        pytest.skip("no C compiler 'cc' here to make an FMI 3.0 FMU with")
-    return build_vdp(compiler, tmp_path_factory.mktemp("vdp"))
+from tests.vdp import ERROR, OUTPUTS, solved, stirred
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +31,6 @@ def fresh(vdp):
     with Fmu(vdp) as fmu:
         fmu.restart()
         yield fmu
-
-
-def stirred(t):
-    return np.sin(3 * t[:-1])
 
 
 def test_description(vdp):
@@ -287,29 +267,3 @@ def test_a_plant(vdp):
         x, y = plant.transition(np.array([1.0, -0.5]), {"u": 0.3}, {"mu": 0.8}, 0.01)
         expected = solved(np.array([0, 0.01]), [0.3], 0.8, (1.0, -0.5))[-1]
         assert_allclose([*x, *y], expected[[0, 1, 0, 2]], atol=ERROR)
-
-
-def test_an_effect_at_its_port(vdp, tmp_path):
-    """Carried in a coupled FMU: force held over coupling steps of 1 ms, so of first order in these."""
-    damped = build_coupled(vdp, [PORT], [("viscous_damping", "mass")], tmp_path)
-    t = np.linspace(0, 4, 401)
-    u = stirred(t)
-    [name] = set(describe(damped).parameters) - {"mu", "fault"}
-    with Fmu(vdp) as bare, Fmu(damped) as coupled:
-        expected = bare.simulate(t, {"u": u}, OUTPUTS[:2], {})
-        assert_allclose(coupled.simulate(t, {"u": u}, OUTPUTS[:2], {}), expected, atol=ERROR)
-        found = coupled.simulate(t, {"u": u}, OUTPUTS[:2], {name: 0.4})
-        assert_allclose(found, solved(t, u, damping=0.4)[:, :2], atol=5e-3)
-        for fault, words in ((1, "stopped in the step"), (2, "stopped in the step at t = 0 s")):
-            coupled.restart(fault=fault)
-            with pytest.raises(FmuError, match=f"the carried FMU {words}"):
-                coupled.step(0.01)
-        coupled.restart(mu=np.nan)
-        with pytest.raises(FmuError, match="mu = nan"):
-            coupled.step(0.01)
-        assert_array_equal(coupled.simulate(t, {"u": u}, OUTPUTS[:2], {name: 0.4}), found)
-
-
-def test_the_grade_of_a_coupled_one_is_clean_but_for_a_saved_state(vdp, tmp_path):
-    found = grade(build_coupled(vdp, [PORT], [("coulomb_friction", "mass")], tmp_path))
-    assert {c.title: c.passed for c in found.checks} == {**dict.fromkeys(TRIALS, True), "saved state": None}

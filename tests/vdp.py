@@ -8,6 +8,8 @@ import fmpy
 import numpy as np
 from scipy.integrate import solve_ivp
 
+OUTPUTS = ["x0", "x1", "x1_dot"]
+ERROR = 1e-9  # of Runge-Kutta steps of 1 ms over some seconds, against the solution
 SOURCE = Path(__file__).parent / "c" / "vdp_fmi3.c"
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="VanDerPol" instantiationToken="{vdp-of-the-tests}">
@@ -61,6 +63,11 @@ def build_vdp(compiler, folder):
         packed.writestr("modelDescription.xml", DESCRIPTION)
         packed.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
     return path
+
+
+def stirred(t):
+    """An input that moves, (N-1,), for times t (N,)."""
+    return np.sin(3 * t[:-1])
 
 
 def solved(t, u, mu=1.5, x=(2.0, 0.0), damping=0.0):

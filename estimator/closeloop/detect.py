@@ -47,11 +47,13 @@ def detect(
     slopes = _sensitivities(problem, base, noise)
     g = _directions(base.fit.jacobian, regressors) if regressors else None
     observed = _figures(residual, fit_mask, test_mask, g)
-    back = np.linalg.pinv(slopes[fit_mask].reshape(-1, slopes.shape[2]))
+    n = slopes.shape[2]
+    back = np.linalg.pinv(slopes[fit_mask].reshape(fit_mask.sum() * len(noise), n)) if n else np.zeros((0, 1))
     copies = []
     for _ in range(REPLICATES):
         e = rng.standard_normal(residual.shape)
-        e -= slopes @ (back @ e[fit_mask].ravel())
+        if n:
+            e -= slopes @ (back @ e[fit_mask].ravel())
         copies.append(_figures(e, fit_mask, test_mask, g))
     p_values, figures = [], {}
     for name, value in observed.items():

@@ -12,7 +12,7 @@ from estimator.closeloop.screen import Promise, built, changes, screen
 from estimator.record import Array
 
 PARTNERS = 12  # leading candidates among which pairs are screened
-PROMISES = 6  # pairs from each of the two screenings that are fitted
+PROMISES = 4  # pairs from each of the two screenings that are fitted
 SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
 
 Changes = Sequence[tuple[Candidate, Array]]
