@@ -10,6 +10,8 @@ from hypothesis import settings
 from fmus.effects import parse_effect
 from fmus.export.pythonfmu import build_python
 from fmus.models import model_class
+from scenarios import close_loop
+from scenarios.result import Result
 from tests.everything import fitting
 from tests.foreign import foreign_builder
 from tests.vdp import build_vdp
@@ -17,6 +19,7 @@ from tests.vdp import build_vdp
 settings.register_profile("railfmi", deadline=None)  # a busy machine is no failure
 settings.load_profile("railfmi")
 
+DEMO = Path(__file__).parents[1] / "scenarios" / "demo" / "rig-drag"
 Built = Callable[..., Path]
 
 
@@ -49,3 +52,10 @@ def vdp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not compiler:
         pytest.skip("no C compiler 'cc' here to make an FMI 3.0 FMU with")
     return build_vdp(compiler, tmp_path_factory.mktemp("vdp"))
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
+    """The bundled record, closed once, and the folder of its report."""
+    out = tmp_path_factory.mktemp("demo")
+    return close_loop(DEMO, out), out

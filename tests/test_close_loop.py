@@ -27,13 +27,6 @@ def named(result: Result) -> set[tuple[str, str]]:
     return {(e.kind, e.location) for e in result.effects}
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
-    """The bundled record, closed once."""
-    out = tmp_path_factory.mktemp("demo")
-    return close_loop(DEMO, out), out
-
-
 def test_the_demo_finds_the_drag_of_its_truth_model(demo: tuple[Result, Path]) -> None:
     result, _ = demo
     assert result.verdict == "traced"
