@@ -11,6 +11,7 @@ COLOURS = {"declared": CLOUD, "before": BEFORE, "after": AFTER, "wrong": NOISE}
 NAMES = {"declared": "as declared", "before": "before", "after": "after", "wrong": "best wrong effect"}
 ALONE = {"declared": "as declared", "before": "calibrated", "wrong": "nearest effect"}  # none was found
 STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labelled in each decade, by the decades that are shown
+LABELS = 3  # decades that have room for a label
 CAPTION = (
     "Error on the held-out part in multiples of the noise floor, on a logarithmic scale. The bars begin at "
     "the floor, which no model can be expected to pass."
@@ -45,7 +46,8 @@ def _bars(ax: Axes, values: dict[str, float], names: dict[str, str], unit: str) 
     low = min(*over.values(), 10 ** (-0.05 * decades))
     ax.set_xlim(low, 10 ** (1.55 * decades))
     steps = next(s for limit, s in STEPS.items() if decades <= limit)
-    ticks = [s * 10**d for d in range(int(decades) + 1) for s in steps if s * 10**d <= 10 ** (1.1 * decades)]
+    powers = range(0, int(decades) + 1, max(1, round(decades / LABELS)))  # so that labels keep apart
+    ticks = [s * 10**d for d in powers for s in steps if s * 10**d <= 10 ** (1.1 * decades)]
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
     ax.minorticks_off()
     ax.set_yticks(range(len(shown)), [names[k] for k in shown])
