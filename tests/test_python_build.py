@@ -1,5 +1,7 @@
 """PythonFMU builds: their numbers, and the traps of an interpreter that all FMUs share."""
 
+import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -190,9 +192,27 @@ def test_an_fmu_runs_where_this_repository_is_not(built, name, tmp_path):
     """
     site = Path(np.__file__).parents[1]
     command = [sys.executable, "-I", "-S", "-c", textwrap.dedent(script), str(built(name, "all")), str(site)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "11 True"
-    assert done.stderr == ""
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "11 True", "")
+
+
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
+@pytest.mark.parametrize("ours", [True, False])
+def test_the_end_of_a_process_touches_no_freed_memory(built, foreign, tmp_path, ours):
+    """PythonFMU 0.7 frees its interpreter twice, and now and then the host aborts."""
+    script = """
+        import sys
+        from fmus.host.fmu import Fmu
+        with Fmu(sys.argv[1]) as fmu:
+            fmu.restart()
+            fmu.step(1e-3)
+    """
+    path, log = (built("drive") if ours else foreign()), tmp_path / "log"
+    check = ["valgrind", f"--log-file={log}", "--undef-value-errors=no", sys.executable, "-c"]
+    surroundings = os.environ | {"PYTHONMALLOC": "malloc"}
+    subprocess.run([*check, textwrap.dedent(script), str(path)], env=surroundings, check=True)
+    assert "ERROR SUMMARY" in log.read_text()
+    assert "finalizePythonInterpreter" not in log.read_text()
 
 
 def test_instance_messages_are_forgotten_with_it(built):

@@ -1,8 +1,9 @@
 """The calls of one FMI 2.0 co-simulation instance, through FMPy's low-level interface."""
 
+import atexit
 from collections.abc import Callable, Sequence
-from ctypes import byref
-from functools import partial
+from ctypes import CDLL, byref
+from functools import cache, partial
 from typing import Any
 
 import pythonfmu  # noqa: F401  the installed one first: FMUs bring copies of it that cannot build
@@ -20,11 +21,20 @@ from fmpy.logging import addLoggerProxy
 from fmus.host.instance import Instance, heard
 
 
+@cache
+def _let_go_in_time(binary: str) -> None:
+    """Have PythonFMU 0.7 drop its interpreter once, before the process ends; see export/inside/common.py."""
+    release = getattr(CDLL(binary), "finalizePythonInterpreter", None)
+    if release is not None:
+        atexit.register(release)
+
+
 class Fmi2Instance(Instance):
     """An instance by FMI 2.0; its variables are Real ones."""
 
     def _started(self, **identity: str) -> Any:
         slave = FMU2Slave(**identity)
+        _let_go_in_time(slave.dll._name)
         slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
         return slave
 

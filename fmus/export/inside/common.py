@@ -6,10 +6,13 @@ no exception leaves it, since a host could not survive one.
 
 from __future__ import annotations
 
+import atexit
+import ctypes
 import json
 import math
+import sys
 from array import array
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -43,11 +46,26 @@ def caught(method: Any) -> Any:
     return safe
 
 
+@cache
+def let_go_in_time(binaries: Path) -> None:
+    """Have PythonFMU's binary drop its interpreter before the process ends, not twice while it ends.
+
+    Its destructor for the library runs after that of its variables and releases freed memory (0.7.0),
+    which now and then aborts a host. Where the host is no Python, the binary owns the interpreter and
+    must keep it.
+    """
+    hosted_by_python = bool(sys.orig_argv)
+    for binary in binaries.glob("*.so") if hosted_by_python else ():
+        atexit.register(ctypes.CDLL(str(binary)).finalizePythonInterpreter)
+
+
 class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     """One instance: values of all variables in the order of the model description."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        if "resources" in kwargs:
+            let_go_in_time(Path(kwargs["resources"]).parent / "binaries" / "linux64")
         self.description, self.author = MODEL["description"], None
         self.guid, self.version = MODEL["guid"], MODEL["version"]
         self.values = array("d", [v["start"] for v in VARIABLES])
