@@ -9,6 +9,8 @@ from typing import TypeAlias
 
 import casadi as cs
 
+from fmus.variables import Expr
+
 Method: TypeAlias = Callable[[cs.Function, Sequence[float]], cs.Function]
 
 
@@ -19,7 +21,7 @@ def rk4(f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
     k2 = f(x + dt / 2 * k1, u, p)
     k3 = f(x + dt / 2 * k2, u, p)
     k4 = f(x + dt * k3, u, p)
-    return _step(x, u, p, dt, x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4), cs.SX(0))
+    return _step(x, u, p, dt, x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4), 0.0)
 
 
 def rodas3(f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
@@ -30,9 +32,9 @@ def rodas3(f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
     Rosenbrock solvers", Atmospheric Environment 31 (1997), 3459-3472; gamma = 1/2.
     """
     x, u, p, dt = _symbols(f)
-    w = 2 / dt * cs.SX.eye(x.numel()) - cs.jacobian(f(x, u, p), x)
+    w = 2 / dt * cs.DM.eye(x.numel()) - cs.jacobian(f(x, u, p), x)
 
-    def solve(rhs: cs.SX) -> cs.SX:
+    def solve(rhs: Expr) -> Expr:
         return cs.solve(w, rhs)
 
     k1 = solve(f(x, u, p))
@@ -42,12 +44,14 @@ def rodas3(f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
     return _step(x, u, p, dt, x + 2 * k1 + k3 + k4, cs.norm_inf(k4 / cs.DM(tolerated)))
 
 
-def _symbols(f: cs.Function) -> tuple[cs.SX, cs.SX, cs.SX, cs.SX]:
-    x, u, p = (cs.SX.sym(f.name_in(i), f.size1_in(i)) for i in range(3))
-    return x, u, p, cs.SX.sym("dt")
+def _symbols(f: cs.Function) -> tuple[Expr, Expr, Expr, Expr]:
+    kind = cs.SX if f.is_a("SXFunction") else cs.MX
+    x, u, p = (kind.sym(f.name_in(i), f.size1_in(i)) for i in range(3))
+    return x, u, p, kind.sym("dt")
 
 
-def _step(x: cs.SX, u: cs.SX, p: cs.SX, dt: cs.SX, x1: cs.SX, error: cs.SX) -> cs.Function:
-    both = cs.cse(cs.vertcat(x1, error))
+def _step(x: Expr, u: Expr, p: Expr, dt: Expr, x1: Expr, error: Expr) -> cs.Function:
+    both: Expr = cs.vertcat(x1, error)
+    both = cs.cse(both) if isinstance(both, cs.SX) else both
     results = [both[:-1], both[-1]]
     return cs.Function("step", [x, u, p, dt], results, ["x", "u", "p", "dt"], ["x1", "error"])

@@ -21,6 +21,15 @@ from fmus.port import UNITS, Port
 from fmus.variables import Expr, Input, Output, Parameter, Rate, State, Variable
 
 
+@dataclass(frozen=True)
+class Call:
+    """A function called in a model's equations: its arguments, and the symbols that stand for its results."""
+
+    function: cs.Function
+    arguments: tuple[Expr, ...]
+    results: tuple[Expr, ...]
+
+
 class Model(ABC):
     """A dynamic model x' = f(x, u, p), y = h(x, u, p), with effects built in at its ports."""
 
@@ -38,6 +47,7 @@ class Model(ABC):
         self.effects = tuple(effects)
         self.free_symbols = dict(self.symbols)
         self.motions: dict[str, Expr] = {}  # outputs of the probes
+        self.calls: list[Call] = []
         at = self.ports()
         forces = [self._build_in(effect, location, at) for effect, location in self.effects]
         forces += [self._probe(location, port) for location, port in at.items()] if probes else []
@@ -56,6 +66,19 @@ class Model(ABC):
     def ports(self) -> dict[str, Port]:
         """Locations at which an effect can act, by the contract's names."""
         return {}
+
+    def call(self, function: cs.Function, *arguments: Expr) -> list[Expr]:
+        """Results of a CasADi function in the equations, as symbols: a table, or a choice between laws.
+
+        For what a scalar expression cannot hold without working out every branch of it. The arguments
+        are expressions of the model's symbols and of results of earlier calls.
+        """
+        results = [
+            cs.SX.sym(f"{function.name()}_{function.name_out(i)}", function.sparsity_out(i))
+            for i in range(function.n_out())
+        ]
+        self.calls.append(Call(function, tuple(cs.vertcat(a) for a in arguments), tuple(results)))
+        return results
 
     def of(self, *kinds: type[Variable]) -> list[Variable]:
         """Variables of the given kinds, in the order of declaration."""
@@ -125,11 +148,28 @@ def equations(model: Model) -> Equations:
     given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)}
     given |= model.outputs() | model.motions
     y = _complete(model, "outputs", given, [v.name for v in model.of(Output)])
-    names = ["x", "u", "p"]
-    f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])
-    h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
+    f = _compiled("f", model, [x, u, p], cs.vertcat(*dot.values()), "dx")
+    h = _compiled("h", model, [x, u, p], cs.vertcat(*y.values()), "y")
     tolerated = [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
     return Equations(f, h, type(model).method(f, tolerated))
+
+
+def _compiled(name: str, model: Model, symbols: list[Expr], expression: Expr, result: str) -> cs.Function:
+    """A function of x, u, p; where the model calls others, a graph of them around its own expressions."""
+    names = ["x", "u", "p"]
+    if not model.calls:
+        return cs.Function(name, symbols, [cs.cse(expression)], names, [result])
+    given = [cs.MX.sym(n, s.shape) for n, s in zip(names, symbols, strict=True)]
+    known = list(zip(symbols, given, strict=True))
+
+    def worked_out(part: Expr) -> Expr:
+        needed = [(s, m) for s, m in known if cs.depends_on(part, s)]
+        return cs.Function("part", [s for s, _ in needed], [cs.cse(part)])(*(m for _, m in needed))
+
+    for call in model.calls:
+        results = call.function.call([worked_out(a) for a in call.arguments])
+        known += zip(call.results, results, strict=True)
+    return cs.Function(name, given, [worked_out(expression)], names, [result])
 
 
 def _complete(model: Model, what: str, given: dict[str, Expr], names: list[str]) -> dict[str, Expr]:

@@ -107,10 +107,13 @@ def test_velocity_of_a_port_is_the_rate_of_its_displacement(model):
     x, u, p = (
         cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
     )
-    dx = equations(model).f(x, u, p)
     point = near_start(model, np.random.default_rng(1))
+    dx = values(equations(model).f, *point)
+    # an input that comes with its rate moves with it, all others are held
+    du = cs.vertcat(*(model.free_symbols.get(f"{v.name}_dot", 0.0) for v in model.of(Input)))
     for location, port in model.ports().items():
-        slope = cs.jtimes(cs.SX(port.displacement), x, dx)
+        q = cs.SX(port.displacement)
+        slope = cs.jtimes(q, x, cs.DM(dx)) + cs.jtimes(q, u, du)
         gap = cs.Function("gap", [x, u, p], [slope - port.velocity])
         assert abs(float(gap(*point))) < 1e-9, location
 
@@ -208,6 +211,28 @@ def test_probes_open_every_location(model):
         assert probed.variables[f"{location}_displacement"].unit == units["q"]
         assert probed.variables[f"{location}_velocity"].unit == f"{units['q']}/s"
     equations(probed)
+
+
+class Called(Ball):
+    """The ball with functions called in its equations: they see each other's results."""
+
+    def derivatives(self):
+        x, y = cs.MX.sym("x"), cs.MX.sym("y", 2)
+        square = cs.Function("square", [x], [x**2, cs.vertcat(x, 3 * x)])
+        product = cs.Function("product", [y], [y[0] * y[1]])
+        squared, both = self.call(square, self.x + self.v)
+        (thrice,) = self.call(product, both)  # 3 (x + v)^2
+        return {"x": self.v, "v": self.F_ext / self.m + thrice - 3 * squared + self.v * squared}
+
+
+def test_functions_called_in_the_equations_are_worked_out_in_their_order():
+    made = equations(Called())
+    x, F, m = np.array([0.7, -0.2]), np.array([8.0]), np.array([2.0])
+    assert values(made.f, x, F, m) == pytest.approx([-0.2, 4 - 0.2 * 0.25])
+    step = values(made.step, x, F, m, np.array([1e-3]))
+    assert step == pytest.approx(x + 1e-3 * np.array([-0.198, 3.95]), abs=1e-6)
+    slope = made.f.jacobian()(x, F, m, 0)[0].full()
+    assert slope == pytest.approx(np.array([[0, 1], [-0.2, 0.25 - 0.2]]))
 
 
 def test_models_are_found_by_name_in_any_case():
