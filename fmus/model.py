@@ -94,8 +94,10 @@ class Model(ABC):
             parameter.name: self._add(replace(parameter, name=effect.name_at(location, parameter.name)))
             for parameter in effect.parameters(port.motion)
         }
-        force = effect(symbols).force(port.displacement, port.velocity)
-        return {name: gain * force for name, gain in port.forces.items()}
+        law, acting = effect(symbols), dict[str, Expr]()
+        for part in port.acting:
+            part.act(acting, law.force(part.displacement, part.velocity))
+        return acting
 
     def _probe(self, location: str, port: Port) -> dict[str, Expr]:
         unit = UNITS[port.motion]

@@ -1,0 +1,1 @@
+"""Vertical vehicle on two bogies with seven degrees of freedom."""
