@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import casadi as cs
 
 from fmus.effects.effect import Effect
-from fmus.errors import BadInput, did_you_mean
+from fmus.effects.site import Site
 from fmus.integrate import Method, rk4
-from fmus.port import UNITS, Port
+from fmus.port import UNITS
 from fmus.variables import Expr, Input, Output, Parameter, Rate, State, Variable
 
 
@@ -30,30 +30,25 @@ class Call:
     results: tuple[Expr, ...]
 
 
-class Model(ABC):
-    """A dynamic model x' = f(x, u, p), y = h(x, u, p), with effects built in at its ports."""
+class Model(Site, ABC):
+    """A dynamic model x' = f(x, u, p), y = h(x, u, p), with effects built in at its locations."""
 
-    name: ClassVar[str]
     step_size: ClassVar[float]  # s, the longest internal step
     tolerance: ClassVar[float] = 1e-6  # of a state's nominal, error of an internal step where it is known
     method: ClassVar[Method] = rk4
 
     def __init__(self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False) -> None:
         """effects: laws and their locations; probes: open every location by a force input and its motion."""
-        self.variables: dict[str, Variable] = declared(type(self))
-        self.symbols: dict[str, Expr] = {
-            n: cs.SX.sym(n) for n, v in self.variables.items() if not _computed(v)
-        }
+        variables = declared(type(self))
+        super().__init__(
+            variables, {n: cs.SX.sym(n) for n, v in variables.items() if not isinstance(v, Output)}
+        )
         self.effects = tuple(effects)
-        self.free_symbols = dict(self.symbols)
         self.motions: dict[str, Expr] = {}  # outputs of the probes
         self.calls: list[Call] = []
-        at = self.ports()
-        forces = [self._build_in(effect, location, at) for effect, location in self.effects]
-        forces += [self._probe(location, port) for location, port in at.items()] if probes else []
-        for acting in forces:
-            for name, force in acting.items():
-                self.symbols[name] = self.symbols[name] + force
+        self.build(self.effects)
+        if probes:
+            self._probe()
 
     @abstractmethod
     def derivatives(self) -> dict[str, Expr]:
@@ -61,10 +56,6 @@ class Model(ABC):
 
     def outputs(self) -> dict[str, Expr]:
         """Expression of each output, by name; rates of states are filled in from `derivatives`."""
-        return {}
-
-    def ports(self) -> dict[str, Port]:
-        """Locations at which an effect can act, by the contract's names."""
         return {}
 
     def call(self, function: cs.Function, *arguments: Expr) -> list[Expr]:
@@ -84,38 +75,19 @@ class Model(ABC):
         """Variables of the given kinds, in the order of declaration."""
         return [v for v in self.variables.values() if isinstance(v, kinds)]
 
-    def _build_in(self, effect: type[Effect], location: str, at: dict[str, Port]) -> dict[str, Expr]:
-        port = at.get(location)
-        if port is None:
-            raise BadInput(f"{self.name} has no location '{location}'; {did_you_mean(location, at)}")
-        if not effect.fits(port):
-            raise BadInput(f"{effect.kind} makes no sense at '{location}' of {self.name}, which {port.place}")
-        symbols = {
-            parameter.name: self._add(replace(parameter, name=effect.name_at(location, parameter.name)))
-            for parameter in effect.parameters(port.motion)
-        }
-        law, acting = effect(symbols), dict[str, Expr]()
-        for part in port.acting:
-            part.act(acting, law.force(part.displacement, part.velocity))
-        return acting
-
-    def _probe(self, location: str, port: Port) -> dict[str, Expr]:
-        unit = UNITS[port.motion]
-        force = self._add(Input(unit["F"], doc=f"probe: force at {location}", name=f"{location}_force"))
-        for name, expression, u in (
-            (f"{location}_velocity", port.velocity, f"{unit['q']}/s"),
-            (f"{location}_displacement", port.displacement, unit["q"]),
-        ):
-            self.variables[name] = Output(u, doc=f"probe: motion at {location}", name=name)
-            self.motions[name] = expression
-        return {name: gain * force for name, gain in port.forces.items()}
-
-    def _add(self, variable: Variable) -> Expr:
-        if variable.name in self.variables:
-            raise BadInput(f"{self.name}: '{variable.name}' is built in twice; name each effect once")
-        self.variables[variable.name] = variable
-        self.symbols[variable.name] = self.free_symbols[variable.name] = cs.SX.sym(variable.name)
-        return self.symbols[variable.name]
+    def _probe(self) -> None:
+        """Open each location by a force input and by outputs of its motion."""
+        for location, port in self.ports().items():
+            unit = UNITS[port.motion]
+            force = self.add(Input(unit["F"], doc=f"probe: force at {location}", name=f"{location}_force"))
+            for name, expression, u in (
+                (f"{location}_velocity", port.velocity, f"{unit['q']}/s"),
+                (f"{location}_displacement", port.displacement, unit["q"]),
+            ):
+                self.variables[name] = Output(u, doc=f"probe: motion at {location}", name=name)
+                self.motions[name] = expression
+            for name, gain in port.forces.items():
+                self.symbols[name] = self.symbols[name] + gain * force
 
 
 def declared(model: type[Model]) -> dict[str, Variable]:
@@ -123,10 +95,6 @@ def declared(model: type[Model]) -> dict[str, Variable]:
     found = {n: v for c in reversed(model.__mro__) for n, v in vars(c).items() if isinstance(v, Variable)}
     order = (State, Input, Parameter, Output)
     return {n: v for kind in order for n, v in found.items() if isinstance(v, kind)}
-
-
-def _computed(variable: Variable) -> bool:
-    return isinstance(variable, Output)
 
 
 @dataclass(frozen=True)
@@ -146,7 +114,9 @@ def equations(model: Model) -> Equations:
     x, u, p = (
         cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
     )
-    dot = _complete(model, "derivatives", model.derivatives(), [v.name for v in model.of(State)])
+    dot = _complete(
+        model, "derivatives", model.derivatives() | model.rates, [v.name for v in model.of(State)]
+    )
     given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)}
     given |= model.outputs() | model.motions
     y = _complete(model, "outputs", given, [v.name for v in model.of(Output)])

@@ -3,11 +3,11 @@
 In data: a residual that keeps its sign when the motion turns round.
 """
 
-from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.variables import Expr, Parameter
 
 
-class ConstantForce(Effect):
+class ConstantForce(ForceLaw):
     """F = -F_0; resists positive motion where F_0 > 0."""
 
     kind = "constant_force"
@@ -15,5 +15,5 @@ class ConstantForce(Effect):
     F_0 = Parameter("{F}", doc="constant resistance")
 
     def force(self, q: Expr, v: Expr) -> Expr:
-        """See Effect.force."""
+        """See ForceLaw.force."""
         return -self.F_0

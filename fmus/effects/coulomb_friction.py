@@ -5,11 +5,11 @@ In data: a residual of one height that turns its sign with the velocity, flat to
 
 import casadi as cs
 
-from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.variables import Expr, Parameter
 
 
-class CoulombFriction(Effect):
+class CoulombFriction(ForceLaw):
     """F = -F_c tanh(v / v_s); v_s rounds the step at zero velocity."""
 
     kind = "coulomb_friction"
@@ -18,5 +18,5 @@ class CoulombFriction(Effect):
     v_s = Parameter("{q}/s", 1e-3, min=1e-6, doc="velocity at which friction is nearly full")
 
     def force(self, q: Expr, v: Expr) -> Expr:
-        """See Effect.force."""
+        """See ForceLaw.force."""
         return -self.F_c * cs.tanh(v / self.v_s)

@@ -3,11 +3,11 @@
 In data: higher harmonics that grow with amplitude, a natural frequency that moves with it.
 """
 
-from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.variables import Expr, Parameter
 
 
-class CubicStiffness(Effect):
+class CubicStiffness(ForceLaw):
     """F = -k_3 q^3."""
 
     kind = "cubic_stiffness"
@@ -16,5 +16,5 @@ class CubicStiffness(Effect):
     k_3 = Parameter("{F}/{q}3", doc="cubic stiffness, negative where the spring softens")
 
     def force(self, q: Expr, v: Expr) -> Expr:
-        """See Effect.force."""
+        """See ForceLaw.force."""
         return -self.k_3 * q**3

@@ -5,43 +5,80 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from fmus.port import UNITS, Port
-from fmus.variables import Expr, Parameter
+from fmus.variables import Expr, Parameter, State, Variable
+
+if TYPE_CHECKING:
+    from fmus.effects.site import Site
+
+Declared = TypeVar("Declared", bound=Variable)
 
 
 class Effect(ABC):
-    """A force law at a port, from displacement and velocity there.
+    """A law with parameters, and states of its own where it has a memory.
 
-    Every law is a resistance: a positive parameter opposes motion in the positive direction.
-    Units of parameters are templates in {F} (force or torque) and {q} (way or angle).
-    `amplitudes` names the parameters the force is proportional to; the others give its shape.
+    amplitudes: parameters that switch it on, the others give its shape; complete: the value of an
+    amplitude that a true effect of this kind has, fixed in the end; told: parameters that a record
+    tells and no fit has to find; asks: what it must know beside the motion, "clock" or "way".
     """
 
     kind: ClassVar[str]
     amplitudes: ClassVar[tuple[str, ...]]
-    places: ClassVar[tuple[str, ...]] = ("rests", "turns", "slips")  # where the law makes sense
+    complete: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    told: ClassVar[tuple[str, ...]] = ()
+    asks: ClassVar[tuple[str, ...]] = ()
+    acts_on: ClassVar[str]  # port, component, parameter or input
 
     def __init__(self, symbols: Mapping[str, Expr]) -> None:
-        self.symbols = symbols
+        """symbols: values of parameters and states; those not given are at their start, clock and way at 0."""
+        starts = {v.name: v.start for v in self._declared(Variable)}
+        self.symbols = {**starts, "clock": 0.0, "way": 0.0, **symbols}
 
+    @classmethod
     @abstractmethod
-    def force(self, q: Expr, v: Expr) -> Expr:
-        """Generalised force in the positive direction of q, from displacement q and velocity v."""
+    def locations(cls, site: Site) -> dict[str, Any]:
+        """Places of a site that are of the sort that the effect acts on, by name."""
 
     @classmethod
-    def parameters(cls, motion: str) -> list[Parameter]:
-        """Its parameters with units for a port of that motion, in the order of declaration."""
-        own = [p for p in vars(cls).values() if isinstance(p, Parameter)]
-        return [replace(p, unit=p.unit.format(**UNITS[motion])) for p in own]
+    @abstractmethod
+    def fits(cls, place: Any) -> bool:
+        """Whether the law makes physical sense there."""
 
     @classmethod
-    def fits(cls, port: Port) -> bool:
-        """Whether the law makes physical sense at a port."""
-        return port.place in cls.places
+    @abstractmethod
+    def build(cls, site: Site, location: str, place: Any) -> None:
+        """Build it into a site at one of its locations."""
 
     @classmethod
-    def name_at(cls, location: str, parameter: str) -> str:
-        """Name of one of its parameters in an FMU with the effect built in at a location."""
-        return f"{cls.kind}_{location}_{parameter}"
+    @abstractmethod
+    def units(cls, of: str) -> Mapping[str, str]:
+        """What the templates in units of parameters and states stand for at a place; see `parameters`."""
+
+    @classmethod
+    def parameters(cls, of: str) -> list[Parameter]:
+        """Its parameters in the order of declaration, with units.
+
+        of: the kind of motion of a port, or the unit of a parameter or input.
+        """
+        return [replace(p, unit=p.unit.format(**cls.units(of))) for p in cls._declared(Parameter)]
+
+    @classmethod
+    def states(cls, of: str) -> list[State]:
+        """Its states in the order of declaration, with units; at rest at their start values."""
+        return [replace(s, unit=s.unit.format(**cls.units(of))) for s in cls._declared(State)]
+
+    @classmethod
+    def is_amplitude(cls, parameter: str) -> bool:
+        """Whether a parameter, by its name without kind and location, switches the effect on."""
+        return parameter in cls.amplitudes
+
+    @classmethod
+    def name_at(cls, location: str, name: str) -> str:
+        """Name of one of its parameters or states in an FMU with the effect built in at a location."""
+        return f"{cls.kind}_{location}_{name}"
+
+    @classmethod
+    def _declared(cls, kind: type[Declared]) -> list[Declared]:
+        return [v for c in reversed(cls.__mro__) for v in vars(c).values() if isinstance(v, kind)]

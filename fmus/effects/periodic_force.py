@@ -5,11 +5,11 @@ In data: a line in the residual's spectrum that moves with the speed.
 
 import casadi as cs
 
-from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.variables import Expr, Parameter
 
 
-class PeriodicForce(Effect):
+class PeriodicForce(ForceLaw):
     """F = F_sin sin(order q) + F_cos cos(order q); amplitude hypot(F_sin, F_cos)."""
 
     kind = "periodic_force"
@@ -20,5 +20,5 @@ class PeriodicForce(Effect):
     order = Parameter("rad/{q}", 1.0, min=0.0, doc="cycles per turn; rad per metre of way on a line")
 
     def force(self, q: Expr, v: Expr) -> Expr:
-        """See Effect.force."""
+        """See ForceLaw.force."""
         return self.F_sin * cs.sin(self.order * q) + self.F_cos * cs.cos(self.order * q)

@@ -5,11 +5,11 @@ In data: a residual that grows with the square of the velocity and keeps opposin
 
 import casadi as cs
 
-from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.variables import Expr, Parameter
 
 
-class QuadraticDamping(Effect):
+class QuadraticDamping(ForceLaw):
     """F = -c |v| v."""
 
     kind = "quadratic_damping"
@@ -17,5 +17,5 @@ class QuadraticDamping(Effect):
     c = Parameter("{F}.s2/{q}2", min=0.0, doc="drag coefficient")
 
     def force(self, q: Expr, v: Expr) -> Expr:
-        """See Effect.force."""
+        """See ForceLaw.force."""
         return -self.c * cs.fabs(v) * v

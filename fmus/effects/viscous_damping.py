@@ -3,11 +3,11 @@
 In data: a residual in proportion to the velocity.
 """
 
-from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.variables import Expr, Parameter
 
 
-class ViscousDamping(Effect):
+class ViscousDamping(ForceLaw):
     """F = -c v."""
 
     kind = "viscous_damping"
@@ -15,5 +15,5 @@ class ViscousDamping(Effect):
     c = Parameter("{F}.s/{q}", min=0.0, doc="damping coefficient")
 
     def force(self, q: Expr, v: Expr) -> Expr:
-        """See Effect.force."""
+        """See ForceLaw.force."""
         return -self.c * v

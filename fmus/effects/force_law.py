@@ -1,0 +1,143 @@
+"""A force law: a generalised force at a port, from displacement and velocity there."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.effects.effect import Effect
+from fmus.port import UNITS, Port
+from fmus.variables import Expr, Parameter
+
+if TYPE_CHECKING:
+    from fmus.effects.site import Site
+
+Array = NDArray[np.float64]
+HANDFUL = 3  # shapes that are worth a simulation each
+
+
+class ForceLaw(Effect):
+    """A force law at a port.
+
+    Every law is a resistance: a positive parameter opposes motion in the positive direction.
+    Units of parameters are templates in {F} (force or torque) and {q} (way or angle).
+    The force along a motion that starts at rest is in proportion to the amplitudes.
+    """
+
+    acts_on = "port"
+    places: ClassVar[tuple[str, ...]] = ("rests", "turns", "slips")  # where the law makes sense
+    of_way: ClassVar[tuple[str, ...]] = ()  # parameters that make sense only where the way is known
+
+    @abstractmethod
+    def force(self, q: Expr, v: Expr) -> Expr:
+        """Generalised force in the positive direction of q, from displacement q and velocity v."""
+
+    def rates(self, q: Expr, v: Expr) -> dict[str, Expr]:
+        """Derivative of each state, by name."""
+        return {}
+
+    @classmethod
+    def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
+        """Start values of shape parameters that a motion suggests; see `guesses`."""
+        return [{}]
+
+    @classmethod
+    def guesses(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
+        """Start values of shape parameters to try, a handful, likeliest first; {} where there are none.
+
+        t: (N,) s, increasing; q, v: (N,) motion at the port; force: (N,) what is missing there.
+        Of many shapes those stay with which the law explains most of the force.
+        """
+        shapes = cls.shapes(t, q, v, force)
+        if len(shapes) <= HANDFUL:
+            return shapes
+        left = [_left(cls, shape, t, q, v, force) for shape in shapes]
+        return [shapes[i] for i in np.argsort(left, kind="stable")[:HANDFUL]]
+
+    @classmethod
+    def along(cls, values: Mapping[str, float], t: Array, q: Array, v: Array) -> Array:
+        """Force (N,) along a motion (N,) at times t, s, with a memory at rest at t[0].
+
+        values: parameters by name, those not given at their start. States by Runge-Kutta steps between
+        the samples, the motion linear between them.
+        """
+        motion = np.vstack([t, q, v])
+        law = _Compiled(cls, values)
+        if not law.states:
+            return np.array(law.force.map(len(t))(motion, np.zeros((0, len(t))))).ravel()
+        x0 = np.array([s.start for s in cls.states("translation")])
+        x1 = law.step.mapaccum(len(t) - 1)(x0, motion[:, :-1], motion[:, 1:]).full()
+        return np.array(law.force.map(len(t))(motion, np.column_stack([x0, x1]))).ravel()
+
+    @classmethod
+    def units(cls, of: str) -> Mapping[str, str]:
+        """See Effect.units: force and displacement of a kind of motion."""
+        return UNITS[of]
+
+    @classmethod
+    def locations(cls, site: Site) -> dict[str, Port]:
+        """See Effect.locations."""
+        return site.ports()
+
+    @classmethod
+    def fits(cls, place: Port) -> bool:
+        """See Effect.fits."""
+        return place.place in cls.places
+
+    @classmethod
+    def build(cls, site: Site, location: str, place: Port) -> None:
+        """See Effect.build: where several ports act alike, each has its own motion and memory."""
+        shared = {
+            p.name: site.add(replace(p, name=cls.name_at(location, p.name)))
+            for p in cls.parameters(place.motion)
+            if site.has_way or p.name not in cls.of_way
+        }
+        shared |= {quantity: site.known(quantity) for quantity in cls.asks}
+        if cls.of_way and site.has_way:
+            shared["way"] = site.known("way")
+        acting: dict[str, Expr] = {}
+        for i, port in enumerate(place.acting, 1):
+            number = f"_{i}" if len(place.acting) > 1 else ""
+            names = {s.name: cls.name_at(location, s.name + number) for s in cls.states(port.motion)}
+            memory = {s.name: site.add(replace(s, name=names[s.name])) for s in cls.states(port.motion)}
+            law = cls({**shared, **memory})
+            rates = law.rates(port.displacement, port.velocity)
+            site.rates.update({names[name]: rate for name, rate in rates.items()})
+            port.act(acting, law.force(port.displacement, port.velocity))
+        for name, force in acting.items():
+            site.push(name, force)
+
+
+class _Compiled:
+    """A law with values: force(motion, states), step(states, motion at both ends) -> states; motion (t, q, v)."""
+
+    def __init__(self, law: type[ForceLaw], values: Mapping[str, float]) -> None:
+        self.states = [s.name for s in law.states("translation")]
+        m, x = cs.SX.sym("m", 3), cs.SX.sym("x", len(self.states))
+        memory = {name: x[i] for i, name in enumerate(self.states)}
+        made = law({**{n: cs.SX(v) for n, v in values.items()}, **memory, "clock": m[0]})
+        self.force = cs.Function("force", [m, x], [made.force(m[1], m[2])])
+        rates = made.rates(m[1], m[2])
+        f = cs.Function("f", [m, x], [cs.vertcat(*(rates[name] for name in self.states))])
+        a, b = cs.SX.sym("a", 3), cs.SX.sym("b", 3)
+        dt, middle = b[0] - a[0], (a + b) / 2
+        k1 = f(a, x)
+        k2 = f(middle, x + dt / 2 * k1)
+        k3 = f(middle, x + dt / 2 * k2)
+        k4 = f(b, x + dt * k3)
+        self.step = cs.Function("step", [x, a, b], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+
+
+def _left(law: type[ForceLaw], shape: dict[str, float], t: Array, q: Array, v: Array, force: Array) -> float:
+    """Sum of squares of a force that a law with a shape and a constant leave unexplained."""
+    columns = [law.along({**shape, a: 1.0}, t, q, v) for a in law.amplitudes]
+    basis = np.column_stack([np.ones_like(t), *columns])
+    size = np.linalg.norm(basis, axis=0) + 1e-300
+    rest = force - (basis / size) @ np.linalg.lstsq(basis / size, force, rcond=1e-9)[0]
+    return float(rest @ rest)

@@ -1,0 +1,18 @@
+"""A change at a time, rounded so that integrators and fits can follow it."""
+
+import casadi as cs
+
+from fmus.variables import Expr, Parameter
+
+RISE = 0.02  # s, of a change at a time: two samples of a usual record, four steps of the stiff model
+
+
+def start_time() -> Parameter:
+    """The parameter t0 of an effect that begins at a time."""
+    return Parameter("s", 0.0, min=0.0, doc="time at which it begins; 0: it is there from the start")
+
+
+def begun(clock: Expr, t0: Expr) -> Expr:
+    """0 before t0, 1 after it, a cubic over RISE about it; 1 throughout where t0 = 0."""
+    s = cs.fmin(cs.fmax((clock - t0) / RISE + 0.5, 0.0), 1.0)
+    return cs.if_else(t0 > 0.0, s**2 * (3 - 2 * s), 1.0)
