@@ -6,7 +6,7 @@ import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
-from fmus.effects import EFFECTS
+from fmus.effects import EFFECTS, offers
 from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.models import MODELS
@@ -18,11 +18,7 @@ Place = tuple[str, str, str]  # model, kind of effect, location
 EVERY_MODEL = sorted(MODELS)
 EVERY_EFFECT = sorted(EFFECTS)
 EVERY_PLACE: list[Place] = [
-    (name, kind, location)
-    for name in EVERY_MODEL
-    for location, port in MODELS[name]().ports().items()
-    for kind in EVERY_EFFECT
-    if EFFECTS[kind].fits(port)
+    (name, kind, location) for name in EVERY_MODEL for kind, location in offers(MODELS[name]())
 ]
 
 

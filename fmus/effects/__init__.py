@@ -3,6 +3,7 @@
 import sys
 
 from fmus.effects.effect import Effect
+from fmus.effects.site import Site
 from fmus.errors import BadInput, did_you_mean
 from fmus.registry import classes_in
 
@@ -20,3 +21,13 @@ def parse_effect(text: str) -> tuple[type[Effect], str]:
     if kind not in EFFECTS:
         raise BadInput(f"effect '{text}': kind '{kind}' is not known; {did_you_mean(kind, EFFECTS)}")
     return EFFECTS[kind], location
+
+
+def offers(site: Site) -> tuple[tuple[str, str], ...]:
+    """(kind, location) of every effect that makes sense in a site, each possible change under one name."""
+    return tuple(
+        (kind, location)
+        for kind, effect in EFFECTS.items()
+        for location, place in effect.locations(site).items()
+        if (effect.fits(place) or not site.places_known) and effect.offered(site, location)
+    )

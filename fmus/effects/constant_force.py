@@ -11,6 +11,7 @@ class ConstantForce(ForceLaw):
     """F = -F_0; resists positive motion where F_0 > 0."""
 
     kind = "constant_force"
+    source = "the additive fault, Isermann, Fault-Diagnosis Systems (2006)"
     amplitudes = ("F_0",)
     F_0 = Parameter("{F}", doc="constant resistance")
 

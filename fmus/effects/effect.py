@@ -25,6 +25,7 @@ class Effect(ABC):
     """
 
     kind: ClassVar[str]
+    source: ClassVar[str]  # textbook or paper of the law
     amplitudes: ClassVar[tuple[str, ...]]
     complete: ClassVar[Mapping[str, float]] = MappingProxyType({})
     told: ClassVar[tuple[str, ...]] = ()
@@ -32,7 +33,7 @@ class Effect(ABC):
     acts_on: ClassVar[str]  # port, component, parameter or input
 
     def __init__(self, symbols: Mapping[str, Expr]) -> None:
-        """symbols: values of parameters and states; those not given are at their start, clock and way at 0."""
+        """symbols: of parameters and states; those not given are at their start, clock and way at 0."""
         starts = {v.name: v.start for v in self._declared(Variable)}
         self.symbols = {**starts, "clock": 0.0, "way": 0.0, **symbols}
 
@@ -45,6 +46,11 @@ class Effect(ABC):
     @abstractmethod
     def fits(cls, place: Any) -> bool:
         """Whether the law makes physical sense there."""
+
+    @classmethod
+    def offered(cls, site: Site, location: str) -> bool:
+        """Whether it says something there that no other effect says."""
+        return True
 
     @classmethod
     @abstractmethod

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fmus.effects.effect import Effect
 from fmus.port import UNITS, Port
-from fmus.variables import Expr, Parameter
+from fmus.variables import Expr
 
 if TYPE_CHECKING:
     from fmus.effects.site import Site
@@ -115,7 +115,7 @@ class ForceLaw(Effect):
 
 
 class _Compiled:
-    """A law with values: force(motion, states), step(states, motion at both ends) -> states; motion (t, q, v)."""
+    """A law with values: force(motion, x), step(x, motion at both ends) -> x; a motion is (t, q, v)."""
 
     def __init__(self, law: type[ForceLaw], values: Mapping[str, float]) -> None:
         self.states = [s.name for s in law.states("translation")]

@@ -1,0 +1,65 @@
+"""Lines in what is missing: over time and over a displacement that goes on; and its best split."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+Array = NDArray[np.float64]
+LINES = 2  # that are tried
+MAX_ORDER = 60.0  # cycles per turn, beyond which nothing on a shaft is looked for
+PERIODS = 3  # in a record, to tell a line from a slow change
+FINE = 8  # points of the grids over a period of the highest line, and over a line of the spectrum
+
+
+def orders(q: Array, v: Array, force: Array) -> list[float]:
+    """Strongest lines of a force (N,) over displacement q (N,), in rad per unit of it; v: (N,) velocity."""
+    span, step = float(np.ptp(q)), float(np.median(np.abs(np.diff(q))))
+    rest = _without_damping(v, force)
+    if span <= 0 or step <= 0 or not np.any(rest):
+        return []
+    low = 2 * np.pi / span * PERIODS
+    high = min(np.pi / step, MAX_ORDER * max(1.0, low))
+    return _lines(q, rest, low, high)
+
+
+def frequencies(t: Array, v: Array, force: Array) -> list[float]:
+    """Strongest lines of a force (N,) over time t, s (N,), in Hz; v: (N,) velocity."""
+    rest = _without_damping(v, force)
+    if not np.any(rest):
+        return []
+    low, high = 2 * np.pi * PERIODS / float(np.ptp(t)), np.pi / float(np.median(np.diff(t)))
+    return [omega / (2 * np.pi) for omega in _lines(t, rest, low, high)]
+
+
+def splits(t: Array, force: Array) -> list[float]:
+    """Times, s, at which a force (N,) most likely steps from one mean to another, best first."""
+    n, left = np.arange(1, len(force)), np.cumsum(force)[:-1]
+    right = force.sum() - left
+    gain = left**2 / n + right**2 / n[::-1]  # fall of the sum of squares, but for a constant
+    edge = max(2, len(force) // 50)  # a mean of a few samples is no mean
+    gain[:edge] = gain[-edge:] = gain.min()
+    peaks, _ = find_peaks(np.concatenate([[-np.inf], gain, [-np.inf]]), distance=edge)
+    best = (peaks - 1)[np.argsort(gain[peaks - 1])[::-1][: LINES + 1]]
+    return [float((t[k] + t[k + 1]) / 2) for k in best]
+
+
+def _without_damping(v: Array, force: Array) -> Array:
+    """What a constant, friction and damping by the velocity leave of a force."""
+    smooth = np.column_stack([np.ones_like(v), v, np.abs(v) * v, np.sign(v)])
+    rest: Array = force - smooth @ np.linalg.lstsq(smooth, force, rcond=None)[0]
+    return rest
+
+
+def _lines(place: Array, rest: Array, low: float, high: float) -> list[float]:
+    """Strongest lines between two angular frequencies, of samples at places in any order."""
+    if high <= low:
+        return []
+    cell = 2 * np.pi / high / FINE
+    gathered = np.bincount(
+        ((place - place.min()) / cell).astype(int), rest
+    )  # what falls on one place adds up
+    power = np.abs(np.fft.rfft(gathered, FINE * len(gathered)))
+    grid = 2 * np.pi * np.fft.rfftfreq(FINE * len(gathered), cell)
+    power[(grid < low) | (grid > high)] = 0.0
+    peaks, _ = find_peaks(power, distance=2 * FINE)
+    return [float(grid[i]) for i in peaks[np.argsort(power[peaks])[::-1][:LINES]]]
