@@ -1,0 +1,26 @@
+"""Track irregularities: where they come from, and what a vehicle feels of them."""
+
+from scenarios.track.figures import profile_figure, spectrum_figure
+from scenarios.track.inputs import INPUTS, inputs
+from scenarios.track.journey import Journey, journey
+from scenarios.track.rails import QUANTITIES, Rails
+from scenarios.track.reading import read_source, read_track
+from scenarios.track.spectra import SPECTRA, Spectrum, spectra
+from scenarios.track.track import Track
+
+__all__ = [
+    "INPUTS",
+    "QUANTITIES",
+    "SPECTRA",
+    "Journey",
+    "Rails",
+    "Spectrum",
+    "Track",
+    "inputs",
+    "journey",
+    "profile_figure",
+    "read_source",
+    "read_track",
+    "spectra",
+    "spectrum_figure",
+]

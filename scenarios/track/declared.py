@@ -1,0 +1,75 @@
+"""Reads a declared table into its class; whatever is wrong with it is a BadInput of one line."""
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import Any, TypeVar, get_args
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from fmus.errors import BadInput, did_you_mean
+from scenarios.declaration import Table
+
+T = TypeVar("T", bound=Table)
+
+
+def read_table(cls: type[T], table: object, key: str) -> T:
+    """The table that stands at `key` of a file as an object of its class."""
+    try:
+        return cls.model_validate(table)
+    except ValidationError as error:
+        raise BadInput(_one_line(cls, error, key)) from None
+
+
+def _one_line(cls: type[Table], error: ValidationError, key: str) -> str:
+    """The first problem in one sentence, and how many more there are.
+
+    Unknown keys go first: a misspelt key is also a missing one.
+    """
+    problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return " ".join(_sentence(cls, problems[0], key).split()) + more
+
+
+def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
+    """One problem found by pydantic, in the words of the file."""
+    loc, kind, value = problem["loc"], problem["type"], problem["input"]
+    # pydantic marks the key of a table, beside its value, as [key]
+    parts = [part for part in loc if part != "[key]"]
+    key = root + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
+    if kind == "extra_forbidden":
+        known = _table_at(cls, loc).model_fields
+        return f"key '{key}' is not known; {did_you_mean(str(loc[-1]), known)}"
+    if kind == "missing":
+        return f"key '{key}' is missing"
+    if kind == "literal_error":
+        names = [str(name) for name in _literals(problem)]
+        return f"key '{key}' must be one of {', '.join(names)}, not {str(value)[:60]!r}"
+    if kind == "value_error":
+        ours = str(problem["ctx"]["error"])
+        return f"[{key}] {ours}" if isinstance(value, dict) else f"key '{key}' {ours}"
+    said = problem["msg"].replace("Input should", "must").replace("a valid ", "a ")
+    if kind in ("dict_type", "model_type"):
+        said = "must be a table"
+    return f"key '{key}' {said}, not {str(value)[:60]!r}"
+
+
+def _literals(problem: ErrorDetails) -> list[str]:
+    """The choices of a literal: pydantic gives them as "'a', 'b' or 'c'"."""
+    return [c.strip().strip("'") for c in problem["ctx"]["expected"].replace(" or ", ", ").split(",")]
+
+
+def _table_at(cls: type[Table], loc: tuple[int | str, ...]) -> type[Table]:
+    """The table in which the key at that place stands."""
+    table = cls
+    for part in loc:
+        if isinstance(part, str) and part in table.model_fields:
+            table = next(_tables_in(table.model_fields[part].annotation), table)
+    return table
+
+
+def _tables_in(annotation: Any) -> Iterator[type[Table]]:
+    """The classes of tables within a field's type, as Column in dict[str, Column]."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        yield annotation
+    yield from chain.from_iterable(_tables_in(argument) for argument in get_args(annotation))

@@ -1,0 +1,11 @@
+"""Defects by shape. Each class of this folder that is a Defect is one; there is no other list."""
+
+import sys
+
+from fmus.registry import classes_in
+from scenarios.track.defects.defect import Defect
+
+DEFECTS: dict[str, type[Defect]] = {
+    c.shape: c
+    for c in classes_in(sys.modules[__name__], Defect)  # type: ignore[type-abstract]  # what is found is concrete
+}

@@ -1,0 +1,11 @@
+"""Sources of tracks by kind. Each file of this folder with a Source is one; there is no other list."""
+
+import sys
+
+from fmus.registry import classes_in
+from scenarios.track.sources.source import Source
+
+SOURCES: dict[str, type[Source]] = {
+    c.kind: c
+    for c in classes_in(sys.modules[__name__], Source)  # type: ignore[type-abstract]  # what is found is concrete
+}

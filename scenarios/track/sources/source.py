@@ -1,0 +1,18 @@
+"""What a track can come from."""
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import ClassVar
+
+from scenarios.declaration import Table
+from scenarios.track.track import Track
+
+
+class Source(Table, ABC):
+    """A declared source of a track: its fields are the keys of the table beside `kind`."""
+
+    kind: ClassVar[str]
+
+    @abstractmethod
+    def track(self, folder: Path) -> Track:
+        """The track; files are read relative to a folder. Raises BadInput for data that make none."""
