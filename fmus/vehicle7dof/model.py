@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from fmus.component import Component
 from fmus.model import Model
 from fmus.port import Port, alike
 from fmus.variables import Expr, Input, Output, Parameter, State, rate
@@ -142,6 +143,15 @@ class Vehicle7dof(Model):
         for suspension, at in (("secondary", m._secondary), ("primary", m._primary)):
             corners = {f"{suspension}_{c}": at(c) for c in CORNERS}
             found |= {suspension: alike([*corners.values()]), **corners}
+        return found
+
+    def components(m) -> dict[str, Component]:
+        """Springs and dampers of each suspension, alone or all four corners alike."""
+        found: dict[str, Component] = {}
+        for suspension, k, b in (("secondary", "k1", "b1"), ("primary", "k2", "b2")):
+            every = {e: tuple(f"h_{e}_{c}" for c in CORNERS) for e in (k, b)}
+            found[suspension] = Component(every[k], every[b])
+            found |= {f"{suspension}_{c}": Component((f"h_{k}_{c}",), (f"h_{b}_{c}",)) for c in CORNERS}
         return found
 
     def _secondary(m, c: str) -> Port:
