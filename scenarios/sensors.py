@@ -70,7 +70,8 @@ def measure(
     time: (N,) s, increasing; signals: (N,) by name in SI, sampled finely enough that cubics (PCHIP) between
     the samples are true to them. Outside the given times a signal rests at its first or last value.
     Sensors of different rates share the rows where their samples coincide; elsewhere they hold nan, as for
-    lost samples. The draws of a sensor depend on the seed and its name alone. Raises BadInput for what does not fit.
+    lost samples. The draws of a sensor depend on the seed and its name alone. Raises BadInput for what does
+    not fit.
     """
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise BadInput(f"seed must be a whole number from 0, not {seed!r}")
