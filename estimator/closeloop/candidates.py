@@ -3,20 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi as cs
 import numpy as np
-from scipy.signal import find_peaks
 
 from estimator.closeloop import sensors
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Unknown
 from estimator.record import Array, Record
-from fmus.effects import EFFECTS
-from fmus.effects.effect import Effect
+from fmus.effects import EFFECTS, spectrum
+from fmus.effects.force_law import ForceLaw
 
-ORDERS = 2  # lines of a missing force's spectrum that are tried at each port
-MAX_ORDER = 60.0  # cycles per turn, beyond which nothing on a shaft is looked for
-FINE = 8  # points of the grids over a period of the highest order, and over a line of the spectrum
+TRIED = (  # laws whose shape is nothing or the line of a spectrum
+    "constant_force",
+    "coulomb_friction",
+    "cubic_stiffness",
+    "periodic_force",
+    "quadratic_damping",
+    "viscous_damping",
+)
 
 
 @dataclass(frozen=True)
@@ -53,8 +56,9 @@ def physical_candidates(offers: Sequence[tuple[str, str]], forces: Sequence[Miss
     at = {missing.port.name: missing for missing in forces}
     found = []
     for kind, location in offers:
-        if location in at:
-            effect, missing = EFFECTS[kind], at[location]
+        effect = EFFECTS[kind]
+        if location in at and kind in TRIED and issubclass(effect, ForceLaw):
+            missing = at[location]
             found += [_candidate(effect, location, missing, shape) for shape in _shapes(effect, missing)]
     return found
 
@@ -77,7 +81,7 @@ def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
 
 
 def _candidate(
-    effect: type[Effect], location: str, missing: MissingForce, shape: dict[str, float]
+    effect: type[ForceLaw], location: str, missing: MissingForce, shape: dict[str, float]
 ) -> Candidate:
     parameters = {p.name: p for p in effect.parameters("rotation")}
     amplitudes, others = [], []
@@ -94,47 +98,23 @@ def _candidate(
     return Candidate(effect.kind, location, tuple(amplitudes), tuple(others))
 
 
-def _size(effect: type[Effect], amplitude: str, missing: MissingForce, shape: dict[str, float]) -> float:
+def _size(effect: type[ForceLaw], amplitude: str, missing: MissingForce, shape: dict[str, float]) -> float:
     """The amplitude with which the law's force has the rms of the missing one."""
     unit = _law(effect, missing, {**shape, amplitude: 1.0})
     rms = float(np.sqrt(np.mean(unit**2)))
     return float(np.sqrt(np.mean(missing.force**2))) / max(rms, 1e-12)
 
 
-def _law(effect: type[Effect], missing: MissingForce, values: dict[str, float]) -> Array:
+def _law(effect: type[ForceLaw], missing: MissingForce, values: dict[str, float]) -> Array:
     """The force of a law along the motion (n,), with the amplitudes not named at 0."""
-    q, v = cs.SX.sym("q"), cs.SX.sym("v")
-    parameters = effect.parameters("rotation")
-    symbols = {p.name: cs.SX(values.get(p.name, p.start)) for p in parameters}
-    law = cs.Function("law", [q, v], [effect(symbols).force(q, v)]).map(len(missing.t))
-    return np.array(law(missing.displacement[None, :], missing.velocity[None, :])).ravel()
+    return effect.along(values, missing.t, missing.displacement, missing.velocity)
 
 
-def _shapes(effect: type[Effect], missing: MissingForce) -> list[dict[str, float]]:
+def _shapes(effect: type[ForceLaw], missing: MissingForce) -> list[dict[str, float]]:
     """Start values of an effect's shape parameters worth trying; one empty set where it has none to find."""
-    if effect.kind != "periodic_force":
-        return [{}]
-    return [{"order": order} for order in orders(missing)]
+    return effect.guesses(missing.t, missing.displacement, missing.velocity, missing.force)
 
 
 def orders(missing: MissingForce) -> list[float]:
     """Strongest lines of the missing force over its displacement, in rad per unit of displacement."""
-    q, v = missing.displacement, missing.velocity
-    smooth = np.column_stack([np.ones_like(v), v, np.abs(v) * v, np.sign(v)])
-    rest = missing.force - smooth @ np.linalg.lstsq(smooth, missing.force, rcond=None)[0]
-    span, step = float(np.ptp(q)), float(np.median(np.abs(np.diff(q))))
-    if span <= 0 or step <= 0 or not np.any(rest):
-        return []
-    low = 2 * np.pi / span * 3  # three periods in the record, to tell a line from a slow change
-    high = min(np.pi / step, MAX_ORDER * max(1.0, low))
-    if high <= low:
-        return []
-    cell = 2 * np.pi / high / FINE
-    place = ((q - q.min()) / cell).astype(int)
-    gathered = np.bincount(place, rest)  # the motion may turn round: what falls on one place adds up
-    power = np.abs(np.fft.rfft(gathered, FINE * len(gathered)))
-    grid = 2 * np.pi * np.fft.rfftfreq(FINE * len(gathered), cell)
-    power[(grid < low) | (grid > high)] = 0.0
-    peaks, _ = find_peaks(power, distance=2 * FINE)
-    strongest = peaks[np.argsort(power[peaks])[::-1][:ORDERS]]
-    return [float(grid[i]) for i in strongest]
+    return spectrum.orders(missing.displacement, missing.velocity, missing.force)

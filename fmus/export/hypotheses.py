@@ -5,9 +5,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fmus.effects import EFFECTS
+from fmus.effects import EFFECTS, offers
 from fmus.export.coupled import build_coupled
+from fmus.export.outside import Outside
 from fmus.export.pythonfmu import build_python
+from fmus.host.archive import describe
 from fmus.host.description import PortNames
 from fmus.model import Model
 from fmus.models import model_class
@@ -25,8 +27,7 @@ class ModelBuilder:
     @property
     def offers(self) -> Effects:
         """Every effect at every location where it makes sense."""
-        ports = model_class(self.model)().ports()
-        return tuple((k, at) for at, port in ports.items() for k, e in EFFECTS.items() if e.fits(port))
+        return offers(model_class(self.model)())
 
     @property
     def ports(self) -> tuple[PortNames, ...]:
@@ -51,7 +52,7 @@ class ModelBuilder:
 
 @dataclass(frozen=True)
 class ForeignBuilder:
-    """A foreign FMU with effects coupled to its ports; kept in a folder."""
+    """A foreign FMU with effects around it; kept in a folder."""
 
     fmu: Path
     ports: tuple[PortNames, ...]
@@ -59,15 +60,17 @@ class ForeignBuilder:
 
     @property
     def offers(self) -> Effects:
-        """Every effect at every port: only its owner knows what makes sense there."""
-        return tuple((k, port.name) for port in self.ports for k in EFFECTS)
+        """Every force law at every port, for only its owner knows what makes sense there; and what can
+        befall its tunable parameters and its inputs.
+        """
+        return offers(Outside(describe(self.fmu), self.ports))
 
     def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values.
 
         Without an effect too it runs in the coupled build, so that all hypotheses take the same steps.
         """
-        if not self.ports:
+        if not self.ports and not effects:
             return self.fmu
         return _once(self.folder, effects, lambda path: build_coupled(self.fmu, self.ports, effects, path))
 

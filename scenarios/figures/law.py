@@ -10,6 +10,7 @@ from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.missing_force import MissingForce
 from estimator.record import Array
 from fmus.effects import EFFECTS
+from fmus.effects.force_law import ForceLaw
 
 
 @dataclass(frozen=True)
@@ -17,15 +18,15 @@ class Law:
     """The fitted force law at a port, and its force (n,) along the motion there."""
 
     candidate: Candidate
+    effect: type[ForceLaw]
     values: dict[str, float]
     missing: MissingForce
 
     def along(self, q: Array, v: Array) -> Array:
         """Force at displacement q (n,) and velocity v (n,)."""
-        effect = EFFECTS[self.candidate.kind]
-        names = {p.name: p.start for p in effect.parameters("rotation")} | self.values
         x = cs.SX.sym("q"), cs.SX.sym("v")
-        force = cs.Function("law", x, [effect({n: cs.SX(a) for n, a in names.items()}).force(*x)])
+        made = self.effect({n: cs.SX(a) for n, a in self.values.items()})
+        force = cs.Function("law", x, [made.force(*x)])
         return np.array(force.map(len(q))(q[None, :], v[None, :])).ravel()
 
     @property
@@ -51,8 +52,9 @@ def law_at(h: Hypothesis | None, missing: MissingForce) -> Law | None:
     if h is None:
         return None
     for c in h.candidates:
-        if c.location == missing.port.name and c.kind in EFFECTS:
+        effect = EFFECTS.get(c.kind)
+        if c.location == missing.port.name and effect and issubclass(effect, ForceLaw):
             prefix = f"{c.kind}_{c.location}_"
             own = {n.removeprefix(prefix): x for n, x in h.fit.theta.items() if n.startswith(prefix)}
-            return Law(c, own, missing)
+            return Law(c, effect, own, missing)
     return None

@@ -1,4 +1,4 @@
-"""A slave that carries another FMU and laws at its ports: force from motion, step by step."""
+"""A slave that carries another FMU and laws around it: its inputs from its motion, step by step."""
 
 from __future__ import annotations
 
@@ -17,14 +17,18 @@ from pythonfmu.enums import Fmi2Status
 
 from . import carried, common
 
-LAWS = cs.Function.deserialize((common.HERE / "laws.casadi").read_text())
+PUSH, GO_ON = (
+    cs.Function.deserialize((common.HERE / f"{name}.casadi").read_text()) for name in ("push", "go_on")
+)
 BASE: dict[str, Any] = common.MODEL["base"]
 REFERENCES: list[int] = BASE["references"]  # of the carried FMU, in the order of this one's variables
+TOLD: list[int] = BASE["told"]  # inputs and parameters that the laws set
 TIME_TOLERANCE = 1e-9  # of a coupling step, so that a whole number of them is seen as one
 N_STATES, N_INPUTS, _, N_OUTPUTS = common.SIZES
 INPUTS = range(N_STATES, N_STATES + N_INPUTS)
 OUTPUTS = range(common.SETTABLE, common.SETTABLE + N_OUTPUTS)
-OWN = range(common.SETTABLE - BASE["laws"], common.SETTABLE)  # parameters of the laws
+MEMORY = slice(N_STATES - BASE["states"], N_STATES)  # states of the laws
+PASSED = {i for i in range(common.SETTABLE) if REFERENCES[i] >= 0} - set(TOLD)  # on to the carried FMU
 # unpacked once for the process: the folder this package came from may be gone at the next load
 FOLDER = tempfile.mkdtemp(prefix="railfmi_base_")
 Finalize(None, shutil.rmtree, (FOLDER, True), exitpriority=0)  # worker processes skip atexit
@@ -40,21 +44,26 @@ class Slave(common.Slave):
         self.touched = set(BASE["restarted"])  # settable variables whose value the carried FMU must be told
         self.base, self.running = _instance(), False
         self.start_time = 0.0
-        self.motion, self.force = (array("d", bytes(8 * n)) for n in (LAWS.numel_in(0), LAWS.numel_out(0)))
-        buffer: Any  # its type stubs ask for a size that a memoryview has
-        buffer, self.law = LAWS.buffer()
-        own = memoryview(self.values)[OWN.start : OWN.stop]
-        for i, part in enumerate((memoryview(self.motion), own)):
-            buffer.set_arg(i, part)
-        buffer.set_res(0, memoryview(self.force))
-        self.buffer = buffer
-        ports = BASE["ports"]
-        self.given = [port["force"] for port in ports]
-        motion = [i for port in ports for i in (port["displacement"], port["velocity"])]
-        self.read = self.base.getter(_references(motion), self.motion)
-        self.push = self.base.setter(_references(self.given), self.force)
-        parts = (range(N_STATES), OUTPUTS)
+        self.before, self.motion = (array("d", bytes(8 * PUSH.numel_in(0))) for _ in range(2))
+        self.told, self.memory = (array("d", bytes(8 * f.numel_out(0))) for f in (PUSH, GO_ON))
+        self.dt = array("d", [0.0])
+        settable = memoryview(self.values)[: common.SETTABLE]
+        self.work_out = self._on_memory(PUSH, (self.motion, settable, self.dt), self.told)
+        self.remember = self._on_memory(GO_ON, (self.before, self.motion, settable, self.dt), self.memory)
+        self.read = self.base.getter(_references(BASE["motion"]), self.motion)
+        self.tell = self.base.setter(_references(TOLD), self.told)
+        parts = (range(MEMORY.start), OUTPUTS)
         self.look = [self.base.getter(_references(part), self.values, part.start) for part in parts]
+
+    def _on_memory(self, function: cs.Function, arguments: Sequence[Any], result: array[float]) -> Any:
+        """A call of a function that works on memory, which the instance keeps."""
+        buffer: Any  # its type stubs ask for a size that a memoryview has
+        buffer, call = function.buffer()
+        for i, part in enumerate(arguments):
+            buffer.set_arg(i, memoryview(part))
+        buffer.set_res(0, memoryview(result))
+        self.held = (*getattr(self, "held", ()), buffer)
+        return call
 
     def __del__(self) -> None:
         if hasattr(self, "base"):
@@ -68,13 +77,16 @@ class Slave(common.Slave):
     def enter_initialization_mode(self) -> None:
         """Initialise the carried FMU from what was set."""
         self.base.reset()
-        self._pass_on(self.touched - set(OWN))
+        self._pass_on(self.touched)
+        self._by_the_laws()
         self.base.enter(self.start_time)
 
     @common.caught
     def exit_initialization_mode(self) -> None:
         """The carried FMU may step."""
         self._pass_on(set(INPUTS))
+        self.read()
+        self._by_the_laws()
         self.base.leave()
         self.running = True
 
@@ -83,30 +95,36 @@ class Slave(common.Slave):
         super().set_real(vrs, values)
         self.touched.update(vrs)
         if self.running and not self.failure:
-            self._changed(set(vrs) - set(OWN))
+            self._changed(set(vrs))
 
     @common.caught
     def _changed(self, indices: set[int]) -> None:
         self._pass_on(indices)
+        if not indices <= PASSED:
+            self.read()
+            self._by_the_laws()
 
     def refresh(self) -> None:
-        """Read states and outputs of the carried FMU."""
+        """Read states and outputs of the carried FMU; those of the laws are there already."""
         if self.running:
             for look in self.look:
                 look()
 
     def advance(self, current_time: float, step_size: float) -> bool:
-        """Equal coupling steps: motion at the ports, force of the laws held over the step, step."""
+        """Equal coupling steps: motion at the ports, what the laws set held over the step, step."""
         steps = max(1, math.ceil(step_size / common.MODEL["step_size"] - TIME_TOLERANCE))
-        dt, force = step_size / steps, self.force
-        given = [self.values[i] for i in self.given]
+        dt = self.dt[0] = step_size / steps
+        self.read()
         for k in range(steps):
-            self.read()
-            self.law()
-            for i, own in enumerate(given):
-                force[i] += own
-            self.push()
+            if TOLD:
+                self.work_out()
+                self.tell()
             self.base.step(current_time + k * dt, dt)
+            self.before[:] = self.motion
+            self.read()
+            if self.memory:
+                self.remember()
+                self.values[MEMORY] = self.memory
         self.refresh()
         self.stale = False
         if all(map(math.isfinite, self.values)):
@@ -114,8 +132,15 @@ class Slave(common.Slave):
         self.log(f"the carried FMU is no longer finite after t = {current_time:g} s", Fmi2Status.discard)
         return False
 
+    def _by_the_laws(self) -> None:
+        """Set what the laws set, for the instant."""
+        self.dt[0] = 0.0
+        if TOLD:
+            self.work_out()
+            self.tell()
+
     def _pass_on(self, indices: set[int]) -> None:
-        order = sorted(indices)
+        order = sorted(indices & PASSED)
         if order:
             self.base.set(_references(order), [self.values[i] for i in order])
 

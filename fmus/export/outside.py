@@ -1,0 +1,120 @@
+"""The outside of a foreign FMU as a site for effects, and the laws built into it as CasADi functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as cs
+
+from fmus.effects import EFFECTS
+from fmus.effects.site import Site
+from fmus.errors import BadInput
+from fmus.host.description import FmuDescription, FmuVariable, PortNames
+from fmus.port import UNITS, Port
+from fmus.variables import Expr, Input, Parameter, State, Variable
+
+
+class Outside(Site):
+    """Inputs, parameters and ports of a foreign FMU; only its owner knows what makes sense at a port."""
+
+    places_known = False
+
+    def __init__(self, description: FmuDescription, ports: Sequence[PortNames]) -> None:
+        known, seen = description.variables, {*description.inputs, *description.outputs}
+        for port in ports:
+            for name in (port.force, port.velocity, port.displacement):
+                if name not in seen:
+                    raise BadInput(f"port '{port.name}': {description.name} has no input or output '{name}'")
+        names = [*description.inputs, *description.parameters]
+        super().__init__({n: _variable(known[n]) for n in names}, {n: cs.SX.sym(n) for n in names})
+        self.name = description.name  # type: ignore[misc]  # of this one, where a model has that of its class
+        self.names, self.description = ports, description
+        self.motion = cs.SX.sym("motion", 2 * len(ports))
+
+    def ports(self) -> dict[str, Port]:
+        """See Site.ports: by displacement and velocity read from the FMU."""
+        return {
+            port.name: Port(
+                self.motion[2 * i],
+                self.motion[2 * i + 1],
+                {port.force: 1.0},
+                "rotation" if self._turns(port) else "translation",
+            )
+            for i, port in enumerate(self.names)
+        }
+
+    def own_inputs(self) -> list[Input]:
+        """See Site.own_inputs: those that are no ports."""
+        forces = {port.force for port in self.names}
+        return [u for u in super().own_inputs() if u.name not in forces]
+
+    def _turns(self, port: PortNames) -> bool:
+        return self.description.variables[port.displacement].unit in (UNITS["rotation"]["q"], "deg")
+
+
+@dataclass(frozen=True)
+class Laws:
+    """Effects around a carried FMU, from its motion m = (q, v) at each port and the table's settable part z.
+
+    states, parameters: what the effects bring; told: names of the inputs and parameters that the FMU is
+    given by the laws. push(m, z, dt) -> their values for a step: in its middle, each port moved on by its
+    velocity. go_on(m0, m1, z, dt) -> the states after it, the motion linear over the step.
+    """
+
+    states: list[State]
+    parameters: list[Parameter]
+    told: list[str]
+    push: cs.Function
+    go_on: cs.Function
+
+
+def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Sequence[tuple[str, str]]) -> Laws:
+    """Build effects (kind, location) around a foreign FMU; BadInput where a location is not known."""
+    site = Outside(description, ports)
+    site.build([(EFFECTS[kind], location) for kind, location in effects])
+    brought = [v for n, v in site.variables.items() if n in site.brought]
+    states = [v for v in brought if isinstance(v, State)]
+    parameters = [v for v in brought if isinstance(v, Parameter)]
+    symbols = site.free_symbols
+    told = [n for n in symbols if n not in site.brought and not cs.is_equal(site.symbols[n], symbols[n])]
+    unseen = cs.SX.sym("unseen", len(description.states))
+    x = cs.vertcat(*(symbols[s.name] for s in states))
+    own = cs.vertcat(*(symbols[p.name] for p in parameters))
+    foreign = cs.vertcat(*(symbols[n] for n in (*description.inputs, *description.parameters)))
+    z = cs.vertcat(unseen, x, foreign, own)
+    f = cs.Function("f", [site.motion, x, z], [cs.vertcat(*(site.rates[s.name] for s in states))])
+    values = cs.Function("values", [site.motion, x, z], [cs.vertcat(*(site.symbols[n] for n in told))])
+    m0, m1, dt = (
+        cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 1))
+    )
+    half = _moved_on(m0, dt / 2)
+    middle = values(half, _after(f, x, z, m0, half, dt / 2), z)
+    return Laws(
+        states,
+        parameters,
+        told,
+        cs.Function("push", [m0, z, dt], [cs.cse(middle)]),
+        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(_after(f, x, z, m0, m1, dt))]),
+    )
+
+
+def _after(f: cs.Function, x: Expr, z: Expr, m0: Expr, m1: Expr, dt: Expr) -> Expr:
+    """States x after dt by a Runge-Kutta step."""
+    middle = (m0 + m1) / 2
+    k1 = f(m0, x, z)
+    k2 = f(middle, x + dt / 2 * k1, z)
+    k3 = f(middle, x + dt / 2 * k2, z)
+    k4 = f(m1, x + dt * k3, z)
+    return x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def _moved_on(motion: Expr, dt: Expr) -> Expr:
+    """Displacement and velocity of each port after dt with that velocity."""
+    parts = [(motion[i] + dt * motion[i + 1], motion[i + 1]) for i in range(0, motion.numel(), 2)]
+    return cs.vertcat(*(part for pair in parts for part in pair))
+
+
+def _variable(v: FmuVariable) -> Variable:
+    common = (v.unit or "1", v.start or 0.0, v.description, v.min, v.max, v.nominal, "", v.name)
+    return Input(*common) if v.causality == "input" else Parameter(*common, v.variability != "tunable")
