@@ -112,6 +112,12 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         saves_state=kind.canGetAndSetFMUstate,
         serialises_state=kind.canSerializeFMUstate,
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,
+        variable_step=kind.canHandleVariableCommunicationStepSize,
+        dependencies={
+            u.variable.name: tuple(v.name for v in u.dependencies if v.causality == "input")
+            for u in model.outputs
+            if u.dependencies is not None
+        },
         unused=unused,
     )
 

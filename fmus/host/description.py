@@ -46,6 +46,8 @@ class FmuDescription:
     saves_state: bool = False  # and goes back to it
     serialises_state: bool = False
     once_per_process: bool = False  # no second instance
+    variable_step: bool = False  # takes communication steps of any length
+    dependencies: dict[str, tuple[str, ...]] = field(default_factory=dict)  # inputs in an output, where said
     unused: dict[str, str] = field(default_factory=dict)  # other variables: what each is
 
     def of(self, *causalities: Causality) -> list[str]:

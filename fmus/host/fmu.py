@@ -42,6 +42,11 @@ class Fmu:
                 self._own.close()
             raise
 
+    @property
+    def instance(self) -> Instance:
+        """The calls behind the names, for loops that make them many times."""
+        return self._instance
+
     def restart(self, t0: float = 0.0, **start: float) -> None:
         """Reset, set states, parameters and inputs, initialise at time t0, s."""
         self._safely(self._instance.initialise, self.references(start), list(start.values()), t0)

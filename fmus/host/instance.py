@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fmus.host.archive import Archive
 
 Array = NDArray[np.float64]
-OK, WARNING, FATAL = 0, 1, 4
+OK, WARNING, DISCARD, FATAL = 0, 1, 2, 4
 NUMBERS = count()
 MESSAGES: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=20))  # by instance name
 
@@ -102,11 +102,42 @@ class Instance(ABC):
 
     def initialise(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
         """Reset, set the values, go through initialisation at t0."""
+        self.enter(references, values, t0)
+        self.leave()
+
+    def enter(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
+        """Reset, set the values, begin initialisation at t0: inputs can be set and outputs read."""
         self.messages.clear()
         self._call(self._slave.reset)
         self.set(references, values)
         self._enter_initialisation(t0)
+
+    def leave(self) -> None:
+        """End initialisation."""
         self._call(self._slave.exitInitializationMode)
+
+    def pusher(self, references: Sequence[int]) -> tuple[Any, Callable[[], int]]:
+        """A C array, and a raw call that sets variables to what it holds and returns its status."""
+        values = (c_double * len(references))()
+        return values, self._setter((c_uint * len(references))(*references), values)
+
+    def puller(self, references: Sequence[int]) -> tuple[Any, Callable[[], int]]:
+        """A C array, and a raw call that reads variables into it and returns its status."""
+        values = (c_double * len(references))()
+        return values, self._getter((c_uint * len(references))(*references), values)
+
+    def stepper(self) -> Callable[[float, float], int]:
+        """A raw step from t by dt, s, that returns its status."""
+        return self._stepper()
+
+    @property
+    def dead(self) -> bool:
+        """Whether it failed fatally, after which no call may be made."""
+        return bool(self._fatal)
+
+    def failed(self, what: str, status: int) -> str:
+        """What failed and why, for a raw call whose status is above WARNING."""
+        return self._failed(what, status)
 
     def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
         """Step from t[0] through t with inputs u (N-1, n_u) held over each step; outputs (N-1, n_y).
@@ -114,10 +145,7 @@ class Instance(ABC):
         The loop of every simulation: raw calls on arrays made once.
         """
         n_u, n_y = len(set_refs), len(get_refs)
-        u_now, y_now = (c_double * n_u)(), (c_double * n_y)()
-        push = self._setter((c_uint * n_u)(*set_refs), u_now)
-        pull = self._getter((c_uint * n_y)(*get_refs), y_now)
-        step = self._stepper()
+        (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
         y = np.empty((len(t) - 1, n_y))
         times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
         into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)

@@ -1,0 +1,99 @@
+"""What a run recorded: a table with units, written as CSV or Parquet and read back."""
+
+import json
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pyarrow import csv
+
+from fmus.errors import BadInput
+
+TIME = "time"
+UNIT = b"unit"  # key of a Parquet column's metadata
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Values over time: `data` with the column 'time' (s) and one column per recorded variable.
+
+    units: by column, None where the FMU states none. interrupted_at: s, where the run was broken off.
+    """
+
+    data: pd.DataFrame
+    units: Mapping[str, str | None]
+    interrupted_at: float | None = None
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write names in line 1 and numbers below; the units go beside it, in NAME.csv.units.json."""
+        target = Path(path)
+        self.data.to_csv(target, index=False, lineterminator="\n")
+        text = json.dumps(dict(self.units), indent=1, ensure_ascii=False)
+        _beside(target).write_text(text + "\n", encoding="utf-8")
+        return target
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write a Parquet file whose columns carry their unit as metadata `unit`."""
+        target = Path(path)
+        fields = [
+            pa.field(name, pa.float64(), metadata={UNIT: unit} if (unit := self.units[name]) else None)
+            for name in self.data.columns
+        ]
+        columns = [pa.array(self.data[name].to_numpy()) for name in self.data.columns]
+        pq.write_table(pa.Table.from_arrays(columns, schema=pa.schema(fields)), target)
+        return target
+
+
+def read_recording(path: str | Path) -> Recording:
+    """A recording from a file that one was written to, .csv or .parquet."""
+    source = Path(path)
+    if not source.is_file():
+        raise BadInput(f"{source}: no such recording; run a scenario or mend the path")
+    if source.suffix.lower() == ".parquet":
+        table = pq.read_table(source)
+        said = {f.name: (f.metadata or {}).get(UNIT) for f in table.schema}
+        return Recording(table.to_pandas(), {n: u.decode("utf-8") if u else None for n, u in said.items()})
+    if source.suffix.lower() != ".csv":
+        raise BadInput(f"{source}: is neither .csv nor .parquet; read it with a tool for its format")
+    data = csv.read_csv(source).to_pandas().astype(np.float64)  # to the last bit, unlike pandas < 3
+    beside = _beside(source)
+    units = json.loads(beside.read_text(encoding="utf-8")) if beside.is_file() else {}
+    return Recording(data, {name: units.get(name) for name in data.columns})
+
+
+class Recorder:
+    """Collects rows of numbers, compactly."""
+
+    def __init__(self, columns: Sequence[str], units: Sequence[str | None]) -> None:
+        self._columns, self._units = (TIME, *columns), ("s", *units)
+        self._cells = array("d")
+
+    def add(self, row: list[float]) -> None:
+        """One row: the time, then a value for each column."""
+        self._cells.extend(row)
+
+    @property
+    def rows(self) -> int:
+        """How many there are; one that was broken off does not count."""
+        return len(self._cells) // len(self._columns)
+
+    def keep(self, rows: int) -> None:
+        """Forget all rows but the first ones."""
+        del self._cells[rows * len(self._columns) :]
+
+    def recording(self, interrupted_at: float | None) -> Recording:
+        """All of it."""
+        self.keep(self.rows)
+        cells: Any = np.array(self._cells).reshape(-1, len(self._columns))
+        data = pd.DataFrame(cells, columns=list(self._columns))
+        return Recording(data, dict(zip(self._columns, self._units, strict=True)), interrupted_at)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(path.name + ".units.json")
