@@ -63,9 +63,7 @@ def test_tabulated_coefficients(theta, m, n):
     A, B = 1 - np.cos(np.deg2rad(theta)), 1 + np.cos(np.deg2rad(theta))
     a, b, _, _ = hertz(A, B, 1e4, E, NU)
     unit = np.cbrt(3 * 1e4 / (4 * E_STAR * (A + B)))
-    assert_allclose(
-        [a / unit, b / unit], [m, n], rtol=3e-3
-    )  # as printed; the row of 70 degrees is off by that
+    assert_allclose([a / unit, b / unit], [m, n], rtol=3e-3)  # the row of 70 degrees is off by that
 
 
 @given(curvatures, curvatures, loads)

@@ -1,8 +1,9 @@
-"""Arguments of the public array functions: checked once, at the border."""
+"""The border of the public array functions: arguments checked once, laws of scalars mapped over arrays."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
+import casadi as cs
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -46,3 +47,13 @@ def broadcast(**arrays: Array) -> dict[str, Array]:
         shapes = ", ".join(f"{name} {x.shape}" for name, x in arrays.items() if x.ndim)
         raise ValueError(f"the arrays do not broadcast together: {shapes}") from None
     return dict(zip(arrays, common, strict=True))
+
+
+def mapped(function: cs.Function, arguments: Sequence[Array], shape: tuple[int, ...]) -> list[Number]:
+    """Results of a CasADi function of scalars for arguments that broadcast to the shape."""
+    points = int(np.prod(shape))
+    if points == 0:
+        return [np.zeros(shape) for _ in range(function.n_out())]
+    rows = [np.broadcast_to(x, shape).reshape(1, points) for x in arguments]
+    found = function.map(points).call(rows)
+    return [plain(x.full().reshape(shape)) for x in found]

@@ -5,8 +5,9 @@ Equations, symbols and range of validity: README.md beside this file.
 
 import casadi as cs
 
-from fmus.contact.kalker import coefficient
-from fmus.contact.polach import creep_force, friction_coefficient, stress_gradient
+from fmus.contact.coefficients import coefficients
+from fmus.contact.friction import friction_coefficient
+from fmus.contact.laws.polach import creep_force, stress_gradient
 from fmus.integrate import rodas3
 from fmus.model import Model
 from fmus.port import Port
@@ -103,9 +104,9 @@ class Testrig(Model):
         w = cs.hypot(m.r_r * m.omega_r - m.r_w * m.omega_w, W_MIN)
         s = w / cs.hypot(m.r_r * m.omega_r, V_MIN)
         mu = friction_coefficient(w, m.mu0, m.A, m.B)
-        c11 = coefficient("c11", m.a / m.b, m.nu)
-        eps = stress_gradient(s, m.a, m.b, c11, m.N, mu, m.G)
-        return -creep_force(eps, m.N, mu, m.k_A, m.k_S) * xi_x / s
+        c11 = coefficients(m.a / m.b, m.nu).c11
+        eps = stress_gradient(s, m.a, m.b, c11, mu * m.N, m.G)
+        return -creep_force(eps, mu * m.N, m.k_A, m.k_S) * xi_x / s
 
     def _motor_torque(m) -> Expr:
         omega_syn = 2 * cs.pi * m.f_sync / m.pole_pairs
