@@ -82,30 +82,30 @@ def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Seque
     x = cs.vertcat(*(symbols[s.name] for s in states))
     own = cs.vertcat(*(symbols[p.name] for p in parameters))
     foreign = cs.vertcat(*(symbols[n] for n in (*description.inputs, *description.parameters)))
-    z = cs.vertcat(unseen, x, foreign, own)
-    f = cs.Function("f", [site.motion, x, z], [cs.vertcat(*(site.rates[s.name] for s in states))])
-    values = cs.Function("values", [site.motion, x, z], [cs.vertcat(*(site.symbols[n] for n in told))])
+    z, rest = cs.vertcat(unseen, x, foreign, own), cs.vertcat(foreign, own)
+    f = cs.Function("f", [site.motion, x, rest], [cs.vertcat(*(site.rates[s.name] for s in states))])
+    values = cs.Function("values", [site.motion, x, rest], [cs.vertcat(*(site.symbols[n] for n in told))])
     m0, m1, dt = (
         cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 1))
     )
     half = _moved_on(m0, dt / 2)
-    middle = values(half, _after(f, x, z, m0, half, dt / 2), z)
+    middle = values(half, _after(f, x, rest, m0, half, dt / 2), rest)
     return Laws(
         states,
         parameters,
         told,
         cs.Function("push", [m0, z, dt], [cs.cse(middle)]),
-        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(_after(f, x, z, m0, m1, dt))]),
+        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(_after(f, x, rest, m0, m1, dt))]),
     )
 
 
-def _after(f: cs.Function, x: Expr, z: Expr, m0: Expr, m1: Expr, dt: Expr) -> Expr:
-    """States x after dt by a Runge-Kutta step."""
+def _after(f: cs.Function, x: Expr, rest: Expr, m0: Expr, m1: Expr, dt: Expr) -> Expr:
+    """States x after dt by a Runge-Kutta step, all else held."""
     middle = (m0 + m1) / 2
-    k1 = f(m0, x, z)
-    k2 = f(middle, x + dt / 2 * k1, z)
-    k3 = f(middle, x + dt / 2 * k2, z)
-    k4 = f(m1, x + dt * k3, z)
+    k1 = f(m0, x, rest)
+    k2 = f(middle, x + dt / 2 * k1, rest)
+    k3 = f(middle, x + dt / 2 * k2, rest)
+    k4 = f(m1, x + dt * k3, rest)
     return x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
