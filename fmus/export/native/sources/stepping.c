@@ -1,0 +1,72 @@
+/* A communication step in internal steps, divided where the method's own error estimate asks for it.
+
+   Every communication step begins afresh: how the last one was divided is forgotten, so that a restart
+   from the same values repeats a run to the last bit. */
+
+#define SHORTEST 1e-7       /* of the communication step; below this a step has failed */
+#define TIME_TOLERANCE 1e-9 /* of the communication step */
+#define LATE_TOLERANCE 1e-3 /* of the communication step, between the importer's clock and this one */
+#define SAFETY 0.9
+#define GROWTH 4.0
+#define CUT 0.1
+#define ORDER 3
+
+static double least(double a, double b) { return b < a ? b : a; }
+static double most(double a, double b) { return b > a ? b : a; }
+
+/* How many steps of at most `longest` make up a duration. */
+static double number_of_parts(double duration, double longest) {
+    double rest = fmod(duration, longest);
+    double whole = floor((duration - rest) / longest + 0.5);
+    return most(1.0, rest > 0 ? whole + 1.0 : whole);
+}
+
+static bool all_finite(const double *x) {
+    for (int i = 0; i < N_STATES; i++)
+        if (!isfinite(x[i])) return false;
+    return true;
+}
+
+/* Advance the states; false, with the states as they were, where no step is short enough. */
+static bool advance(Instance *m, double duration) {
+    double *x = m->now.values, done = 0.0, error = 0.0;
+    double h_now = duration / number_of_parts(duration * (1 - TIME_TOLERANCE), LONGEST_STEP);
+    memcpy(m->before, x, sizeof m->before);
+    forget_results(m);
+    while (duration - done > TIME_TOLERANCE * duration) {
+        h_now = least(least(h_now, LONGEST_STEP), duration - done);
+        bind(m, x);
+        m->arg[3] = &h_now;
+        m->res[0] = m->next;
+        m->res[1] = &error;
+        bool failed = step(m->arg, m->res, m->iw, m->w, 0) != 0;
+        if (!failed && error <= 1.0 && all_finite(m->next)) { /* the error may be blind to NaN */
+            memcpy(x, m->next, sizeof m->next);
+            done += h_now;
+            if (error > 0) h_now *= least(GROWTH, SAFETY * pow(error, -1.0 / ORDER));
+        } else {
+            bool known = !failed && 1.0 < error && error < 1e300;
+            h_now *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;
+            if (h_now < SHORTEST * duration) {
+                memcpy(x, m->before, sizeof m->before);
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static Status do_step(Instance *m, const char *call, double time, double duration) {
+    if (!allowed(m, call, STEP)) return ERROR;
+    if (!isfinite(time)) return refuse(m, ERROR, "%s: time %g s is not finite", call, time);
+    if (!(duration > 0 && isfinite(duration)))
+        return refuse(m, ERROR, "%s: step size %g s is not positive and finite", call, duration);
+    double gap = fabs(time - m->now.time);
+    if (!m->any_time && gap > LATE_TOLERANCE * duration + TIME_TOLERANCE * fabs(time))
+        return refuse(m, ERROR, "%s: begins at %.9g s, but the instance is at %.9g s", call, time, m->now.time);
+    if (!advance(m, duration))
+        return refuse(m, DISCARD, "%s: no step is short enough after t = %g s", call, time);
+    m->now.time = time + duration;
+    m->any_time = false;
+    return OK;
+}
