@@ -1,0 +1,141 @@
+"""Copies of an FMU that make one step each from states of their own: x+ = f(x, u, theta) for many x."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from estimator.access.loop import Loop, PythonLoop
+from estimator.access.pointers import Functions, forget, functions, reason, saved_in_initialisation
+from estimator.access.recipe import Recipe, Way
+from estimator.record import Array
+from fmus.host.archive import Archive
+from fmus.host.fmu import Fmu, FmuError
+
+
+class Refused(FmuError):
+    """An FMU refused a step or a value; the sentence says which and what it gave as the reason."""
+
+
+class Copies:
+    """Instances of one FMU and what is set and read in each.
+
+    way: how a state gets in. free_time: any step may begin at any time, so that one instance serves all
+    rows; otherwise each row has its own and time only moves on. constants: set once and for all.
+    """
+
+    def __init__(
+        self,
+        archive: Archive,
+        way: Way,
+        put: Sequence[str],
+        get: Sequence[str],
+        constants: Mapping[str, float],
+        t0: float = 0.0,
+        free_time: bool = False,
+        compiled: bool = True,
+    ) -> None:
+        self.way, self.put, self.get, self.t0 = way, tuple(put), tuple(get), t0
+        self.constants = {n: v for n, v in constants.items() if n not in put}
+        self._archive, self._compiled = archive, compiled
+        self._one = free_time or way is not Way.SET
+        self._fmus: list[Fmu] = []
+        self._saved: list[int] = []
+        self._loop: Loop | None = None
+        self._rows, self._now = 0, t0
+        self._stack = ExitStack()
+
+    def advance(self, values: Array, t: float, dt: float) -> Array:
+        """What `get` names after a step from t by dt [s], (k, n_get), from values (k, n_put) of `put`.
+
+        Raises Refused where the FMU does not make the step.
+        """
+        return self._run(values, t, dt)
+
+    def evaluate(self, values: Array, t: float) -> Array:
+        """What `get` names at the very values (k, n_put), without a step."""
+        return self._run(values, t, 0.0)
+
+    def close(self) -> None:
+        """Free all instances."""
+        for fmu, state in zip(self._fmus, self._saved, strict=False):
+            if not fmu._instance._fatal:
+                forget(fmu, state)
+        self._saved.clear()
+        self._fmus.clear()
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _run(self, values: Array, t: float, dt: float) -> Array:
+        loop = self._ready(values, t)
+        out = np.empty((len(values), len(self.get)))
+        failed = loop.run(values, out, self.t0 if self.way is Way.RESUME else t, dt)
+        if failed >= 0:
+            self._refuse(values[failed // 8], failed // 8, failed % 8, t)
+        if not self._one:
+            self._now = t + dt
+        return out
+
+    def _ready(self, values: Array, t: float) -> Loop:
+        """The loop over as many instances as there are rows, at time t."""
+        late = not self._one and abs(t - self._now) > 1e-9 * max(1.0, abs(t))
+        if self._loop is None or len(values) > self._rows or late:
+            self._start(values, t)
+        if self._loop is None:
+            raise RuntimeError("no loop was made")
+        return self._loop
+
+    def _start(self, values: Array, t: float) -> None:
+        rows = max(len(values), self._rows)
+        wanted = 1 if self._one else rows
+        while len(self._fmus) < wanted:
+            self._fmus.append(self._stack.enter_context(Fmu(self._archive)))
+        first = {**self.constants, **dict(zip(self.put, values[0].tolist(), strict=True))}
+        if self.way is Way.RESUME and not self._saved:
+            self._saved = [saved_in_initialisation(fmu, first, self.t0) for fmu in self._fmus]
+        elif self.way is not Way.RESUME:
+            for fmu in self._fmus:
+                fmu.restart(t, **first)
+        f = functions([self._fmus[0]] * rows if self._one else self._fmus)
+        self._loop = self._looped(f, rows)
+        self._rows, self._now = rows, t
+
+    def _looped(self, f: Functions, rows: int) -> Loop:
+        one = self._fmus[0]
+        recipe = Recipe(
+            self.way,
+            np.array(one.references(self.put), dtype=np.uint32),
+            np.array(one.references(self.get), dtype=np.uint32),
+            np.array(one.references(self.constants), dtype=np.uint32),
+            np.array(list(self.constants.values()), dtype=float),
+            self.t0,
+        )
+        return loop_of(f, recipe, self._saved * rows, self._compiled)
+
+    def _refuse(self, row: Array, number: int, status: int, t: float) -> None:
+        """Raise Refused and begin anew at the next call: the copy that failed may be in any state."""
+        fmu = self._fmus[0 if self._one else number]
+        why = reason(fmu, status)
+        at = ", ".join(f"{n} = {v:.4g}" for n, v in zip(self.put, row, strict=True))
+        self._loop = None
+        raise Refused(f"{fmu.name}: a step at t = {t:g} s from {at}: {why}")
+
+
+def loop_of(f: Functions, recipe: Recipe, saved: Sequence[int], compiled: bool) -> Loop:
+    """The compiled loop where numba is installed and it is asked for, else the one in Python."""
+    if compiled:
+        try:
+            from estimator.access.jitted import JittedLoop
+        except ImportError:
+            return PythonLoop(f, recipe, saved)
+        return JittedLoop(f, recipe, saved)
+    return PythonLoop(f, recipe, saved)

@@ -1,0 +1,84 @@
+"""The loop over copies in Python, by raw calls on C arrays made once."""
+
+from collections.abc import Sequence
+from ctypes import c_double, c_void_p
+from typing import Protocol
+
+import numpy as np
+
+from estimator.access.pointers import Functions, entrance, getter, setter, stepper
+from estimator.access.recipe import Recipe, Way
+from estimator.record import Array
+from fmus.host.instance import WARNING
+
+
+class Loop(Protocol):
+    """Does a recipe to copies of an FMU, one row of values each."""
+
+    def run(self, values: Array, out: Array, t: float, dt: float) -> int:
+        """Fill `out` (k, n_get) from `values` (k, n_set); dt = 0 reads without a step.
+
+        Returns -1, or 8 times the number of the copy that refused plus the status that it gave.
+        """
+
+
+class PythonLoop:
+    """One copy after the other; for FMUs that run in Python, and where numba is not installed."""
+
+    def __init__(self, f: Functions, recipe: Recipe, saved: Sequence[int] = ()) -> None:
+        self._copies = [_Copy(f, recipe, i, saved) for i in range(len(f.components))]
+
+    def run(self, values: Array, out: Array, t: float, dt: float) -> int:
+        """See Loop."""
+        for i, (row, copy) in enumerate(zip(values, self._copies, strict=False)):
+            status = copy.run(row, out[i], t, dt)
+            if status > WARNING:
+                return 8 * i + status
+        return -1
+
+
+class _Copy:
+    """One instance with its memory."""
+
+    def __init__(self, f: Functions, recipe: Recipe, number: int, saved: Sequence[int]) -> None:
+        component = f.components[number]
+        constants = recipe.constants if recipe.way is Way.RESTART else np.empty(0)
+        refs = recipe.set_refs
+        if len(constants):
+            refs = np.concatenate([refs, recipe.constant_refs])
+        memory, self._out = (c_double * len(refs))(), (c_double * len(recipe.get_refs))()
+        self._in = np.ctypeslib.as_array(memory)
+        self._in[len(recipe.set_refs) :] = constants
+        self._mine, self._found = self._in[: len(recipe.set_refs)], np.ctypeslib.as_array(self._out)
+        self._set = setter(f, component, refs, memory)
+        self._get = getter(f, component, recipe.get_refs, self._out)
+        self._step, self._enter = stepper(f, component), entrance(f, component)
+        self._prepare = {Way.SET: self._set, Way.RESUME: self._resume, Way.RESTART: self._restart}[recipe.way]
+        self._calls, self._component, self._t0 = f.calls, c_void_p(component), recipe.t0
+        self._saved = c_void_p(saved[number]) if saved else None
+        self._time = recipe.t0
+
+    def run(self, row: Array, out: Array, t: float, dt: float) -> int:
+        self._mine[:] = row
+        self._time = t
+        status = self._prepare()
+        if status <= WARNING and dt > 0:
+            status = self._step(t, dt)
+        if status <= WARNING:
+            status = self._get()
+            out[:] = self._found
+        return status
+
+    def _resume(self) -> int:
+        status: int = self._calls["restore"](self._component, self._saved)
+        if status <= WARNING:
+            status = self._set()
+        return int(self._calls["exit"](self._component)) if status <= WARNING else status
+
+    def _restart(self) -> int:
+        status: int = self._calls["reset"](self._component)
+        if status <= WARNING:
+            status = self._set()
+        if status <= WARNING:
+            status = self._enter(self._time)
+        return int(self._calls["exit"](self._component)) if status <= WARNING else status

@@ -1,0 +1,81 @@
+"""Does a filter believe what it should? NIS, NEES and whiteness of innovations, with their bands."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from estimator.record import Array
+
+LAGS = 20  # samples over which innovations must not remember
+
+
+@dataclass(frozen=True)
+class Band:
+    """A statistic with the interval in which it lies with the probability asked for."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def within(self) -> bool:
+        """Whether it lies there."""
+        return bool(self.low <= self.value <= self.high)
+
+
+def squares(error: Array, covariance: Array) -> Array:
+    """Normalised squares e' P^-1 e of errors (..., n) with covariances (..., n, n), (...)."""
+    solved = np.linalg.solve(covariance, error[..., None])[..., 0]
+    found: Array = np.einsum("...i,...i->...", error, solved)
+    return found
+
+
+def mean_band(found: Array, freedom: Array, probability: float = 0.95) -> Band:
+    """Mean of independent normalised squares (N,), each of `freedom` (N,) degrees, and its band.
+
+    For innovations this is the NIS, for errors of the estimate over runs of different seeds the NEES
+    (Bar-Shalom, Li, Kirubarajan 2001, 5.4). Without samples all is nan.
+    """
+    n = len(found)
+    if n == 0:
+        return Band(np.nan, np.nan, np.nan)
+    total = float(np.sum(freedom))
+    low, high = (float(chi2.ppf(p, total)) / n for p in ((1 - probability) / 2, (1 + probability) / 2))
+    return Band(float(np.mean(found)), low, high)
+
+
+def share_within(found: Array, freedom: Array, probability: float = 0.95) -> float:
+    """Share of normalised squares (N,) within their own central band; the probability where all is well."""
+    if len(found) == 0:
+        return np.nan
+    low, high = (chi2.ppf(p, freedom) for p in ((1 - probability) / 2, (1 + probability) / 2))
+    return float(np.mean((found >= low) & (found <= high)))
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Memory of a normalised innovation: correlation (L,) by lag, p value of Ljung and Box's test."""
+
+    correlation: Array
+    p_value: float
+    limit: float  # 95 % of the correlations of white noise are smaller
+
+    @property
+    def largest(self) -> float:
+        """The largest correlation by size."""
+        return float(np.max(np.abs(self.correlation), initial=0.0))
+
+
+def whiteness(innovation: Array, lags: int = LAGS) -> Whiteness:
+    """Of innovations (N,) over their standard deviations, by Ljung and Box, Biometrika 65 (1978) 297."""
+    e = innovation[np.isfinite(innovation)]
+    n = len(e)
+    lags = min(lags, n // 4)
+    if lags < 1 or not np.any(e):
+        return Whiteness(np.empty(0), np.nan, np.nan)
+    e = e - e.mean()
+    power = float(e @ e)
+    rho = np.array([float(e[k:] @ e[:-k]) / power for k in range(1, lags + 1)])
+    statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
+    return Whiteness(rho, float(chi2.sf(statistic, lags)), 1.96 / np.sqrt(n))

@@ -1,0 +1,111 @@
+"""A filter's way through a record: what it believed at each sample, and how well it foresaw the next."""
+
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from estimator.estimate import Diverged, Estimate
+from estimator.record import Array, BoolArray
+
+TOLD = 200  # samples between two reports of progress
+
+
+class Steps(Protocol):
+    """Any filter."""
+
+    now: Estimate
+    names: tuple[str, ...]
+
+    def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
+        """See estimator.estimate.Filter."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What a filter is fed with: measured outputs, nan where there are none, and inputs."""
+
+    t: Array  # (N,) s, increasing
+    u: Array  # (N, n_u) at t
+    held: Array  # (N - 1, n_u) acting between
+    y: Array  # (N, m)
+
+    def first(self, n: int) -> "Samples":
+        """The first n samples."""
+        return Samples(self.t[:n], self.u[:n], self.held[: n - 1], self.y[:n])
+
+
+def samples(t: Array, u: Array, y: Array, every: int = 1) -> Samples:
+    """Each `every`-th sample of a record; inputs act between them with their mean by the trapezoidal rule."""
+    at = np.arange(0, len(t), every)
+    area = np.vstack([np.zeros(u.shape[1]), np.cumsum((u[1:] + u[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
+    held = np.diff(area[at], axis=0) / np.diff(t[at])[:, None]
+    return Samples(t[at], u[at], held, y[at])
+
+
+@dataclass(frozen=True)
+class History:
+    """All that is kept of N samples; `estimates` only where smoothing needs them."""
+
+    names: tuple[str, ...]
+    t: Array  # (N,)
+    x: Array  # (N, n)
+    std: Array  # (N, n)
+    innovation: Array  # (N, m) over its standard deviation, nan where nothing was measured
+    nis: Array  # (N,) normalised squares of what was used
+    freedom: Array  # (N,) how many channels that were
+    gated: BoolArray  # (N, m)
+    log_likelihood: float
+    last: Estimate
+    broken: str  # why the filter stopped early, empty where it did not
+    estimates: Sequence[Estimate] = ()
+
+
+def filtered(
+    filter: Steps, s: Samples, tell: Callable[[float], None] = lambda _: None, keep: bool = False
+) -> History:
+    """Take a filter through samples; one that diverges stops with what it has. tell: hears the share done."""
+    rows, kept, last, broken = _Rows(len(filter.names), s.y.shape[1]), [], filter.now, ""
+    for k, t in enumerate(s.t):
+        try:
+            if k == 0:
+                last = filter.step(s.u[0], s.y[0])
+            else:
+                last = filter.step(s.u[k], s.y[k], float(t - s.t[k - 1]), s.held[k - 1])
+        except Diverged as error:
+            broken = str(error)
+            break
+        rows.add(last)
+        if keep:
+            kept.append(last)
+        if k % TOLD == 0:
+            tell(k / len(s.t))
+    return rows.history(filter.names, last, broken, kept)
+
+
+class _Rows:
+    """Rows of a history that grows."""
+
+    def __init__(self, n: int, m: int) -> None:
+        self._n, self._m, self._rows, self._facts = n, m, array("d"), array("d")
+
+    def add(self, e: Estimate) -> None:
+        self._rows.extend((e.t, *e.x.tolist(), *np.sqrt(np.diag(e.P)).tolist()))
+        std = np.sqrt(np.diag(e.S)) if e.S.size else np.nan
+        self._rows.extend((e.innovation / std).tolist())
+        self._rows.extend(e.gated.tolist())
+        self._facts.extend((e.nis, float(e.used.sum()), e.log_likelihood))
+
+    def history(
+        self, names: tuple[str, ...], last: Estimate, broken: str, kept: Sequence[Estimate]
+    ) -> History:
+        n, m = self._n, self._m
+        rows = np.array(self._rows).reshape(-1, 1 + 2 * n + 2 * m)
+        nis, freedom, likelihood = np.array(self._facts).reshape(-1, 3).T
+        t, x, std, innovation, gated = np.split(rows, np.cumsum([1, n, n, m]), axis=1)
+        return History(
+            names, t[:, 0], x, std, innovation, nis, freedom, gated > 0, float(likelihood.sum()),
+            last, broken, tuple(kept),
+        )  # fmt: skip

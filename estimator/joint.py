@@ -1,0 +1,235 @@
+"""An FMU as the system of a filter: x holds chosen states, parameters, and inputs that are not known."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from estimator.access.copies import Copies, Refused
+from estimator.access.probe import Access, probe
+from estimator.access.recipe import Way
+from estimator.estimate import Diverged, Estimate
+from estimator.record import Array
+from estimator.shaping import UnknownInput
+from estimator.transform import Transform
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.archive import Archive
+
+
+@dataclass(frozen=True)
+class UnknownParameter:
+    """A parameter to estimate: what is believed of it before, and how far it wanders.
+
+    start, std in its unit; walk: what it gains in a second, in its unit.
+    """
+
+    name: str
+    start: float
+    std: float
+    transform: Transform
+    walk: float = 0.0
+
+    @property
+    def z(self) -> float:
+        """Its coordinate at the start."""
+        return self.transform.z(self.start)
+
+    def in_z(self, std: float) -> float:
+        """A small deviation of the parameter at the start as one of its coordinate."""
+        return std / self.transform.slope(self.z)
+
+
+@dataclass(frozen=True)
+class UnknownState:
+    """A state to estimate: what is believed of its start, and the noise that drives it, unit/sqrt(s)."""
+
+    name: str
+    start: float
+    std: float
+    noise: float = 0.0
+
+
+class Joint:
+    """A System (see estimator.estimate) through any FMU.
+
+    x = states, coordinates of the parameters (`transform`), states of the unknown inputs. The FMU's other
+    states are carried: they move with the mean. y = outputs. Close it after use.
+    way: forces an access that the probe would not choose, for comparison; compiled: False for Python only.
+    """
+
+    def __init__(
+        self,
+        fmu: str | Path | Archive,
+        outputs: Sequence[str],
+        states: Sequence[UnknownState],
+        parameters: Sequence[UnknownParameter] = (),
+        unknown: Sequence[UnknownInput] = (),
+        inputs: Sequence[str] = (),
+        constants: Mapping[str, float] | None = None,
+        dt: float = 1e-3,
+        t0: float = 0.0,
+        way: Way | None = None,
+        compiled: bool = True,
+    ) -> None:
+        self._stack = ExitStack()
+        self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
+        self.outputs, self.inputs = tuple(outputs), tuple(inputs)
+        self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
+        fed = [n for w in unknown for n in w.feeds]
+        mine = [s.name for s in states]
+        self.names = (*mine, *(p.name for p in parameters), *(n for w in unknown for n in w.states))
+        known = self.archive.description.states
+        self.others = tuple(n for n in known if n not in mine)
+        self._constants = dict(constants or {})
+        put = [*mine, *self.others, *(p.name for p in parameters), *inputs, *fed]
+        get = [*mine, *self.others, *(n for n in outputs if n not in (*mine, *self.others))]
+        self._check(put, get)
+        self._places(put, get)
+        try:
+            self._open(put, get, dt, t0, way, compiled)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def start(self, t: float = 0.0) -> Estimate:
+        """What is believed before the first sample at t."""
+        x = [*(s.start for s in self.states), *(p.z for p in self.parameters)]
+        variance = [*(s.std**2 for s in self.states), *(p.in_z(p.std) ** 2 for p in self.parameters)]
+        for w in self.unknown:
+            x += [0.0] * len(w.states)
+            variance += w.variance.tolist()
+        return Estimate(t, np.array(x), np.diag(variance), carried=self._first_carried)
+
+    def noise(self, dt: float) -> Array:
+        """Covariance (n, n) of what comes into x in a step of dt [s]."""
+        Q = np.zeros((len(self.names),) * 2)
+        walks = [*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)]
+        np.fill_diagonal(Q[: len(walks), : len(walks)], np.square(walks) * dt)
+        at = len(walks)
+        for w in self.unknown:
+            size = len(w.states)
+            Q[at : at + size, at : at + size] = w.discrete(dt)[1]
+            at += size
+        return Q
+
+    def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
+        """See System. Unknown inputs act over a step with the mean of both its ends, as known ones do."""
+        values, after = self._values(X, u, carried), np.empty_like(X)
+        at = self._n_states + self._n_parameters
+        after[:, self._n_states : at] = X[:, self._n_states : at]
+        for w, columns in zip(self.unknown, self._fed, strict=True):
+            size = len(w.states)
+            F, _ = w.discrete(dt)
+            before = X[:, at : at + size]
+            after[:, at : at + size] = before @ F.T
+            held = (before + after[:, at : at + size]) / 2
+            for column, state in columns:
+                values[:, column] = held[:, state]
+            at += size
+        found = self._asked(lambda: self.copies.advance(values, t, dt))
+        after[:, : self._n_states] = found[:, : self._n_states]
+        return after, found[0, self._n_states : self._n_all].copy()
+
+    def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
+        """See System; the FMU is asked only for what is not a state."""
+        if self._direct is not None:
+            return X[:, self._direct]
+        values = self._values(X, u, carried)
+        at = self._n_states + self._n_parameters
+        for w, columns in zip(self.unknown, self._fed, strict=True):
+            for column, state in columns:
+                values[:, column] = X[:, at + state]
+            at += len(w.states)
+        return self._asked(lambda: self.copies.evaluate(values, t))[:, self._seen]
+
+    def settled(self, x: Array) -> Array:
+        """See System: cuts off what is bounded by clipping."""
+        for i, p in enumerate(self.parameters, self._n_states):
+            if p.transform.kind == "clip":
+                x = x.copy()
+                x[i] = p.transform.settled(x[i])
+        return x
+
+    def values(self, x: Array, std: Array) -> tuple[Array, Array]:
+        """What x (N, n) and its deviations (N, n) mean in the FMU's units, (N, n) each."""
+        x, std = x.copy(), std.copy()
+        for i, p in enumerate(self.parameters, self._n_states):
+            std[:, i] = p.transform.spread(x[:, i], std[:, i])
+            x[:, i] = p.transform.theta(x[:, i])
+        return x, std
+
+    def close(self) -> None:
+        """Free the copies, and the unpacked file where it is this one's own."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _places(self, put: list[str], get: list[str]) -> None:
+        """Where things stand in the rows of values that go into the FMU and come out of it."""
+        self._n_states, self._n_parameters = len(self.states), len(self.parameters)
+        self._n_all, self._n_put = self._n_states + len(self.others), len(put)
+        at = self._n_all + self._n_parameters
+        self._at_inputs = slice(at, at + len(self.inputs))
+        self._fed = [[(put.index(n), state) for n, state in w.feeds.items()] for w in self.unknown]
+        self._seen = [get.index(n) for n in self.outputs]
+        direct = all(i < self._n_states for i in self._seen)
+        self._direct = self._seen if direct else None
+
+    def _open(
+        self, put: list[str], get: list[str], dt: float, t0: float, way: Way | None, compiled: bool
+    ) -> None:
+        variables = self.archive.description.variables
+        first = {n: variables[n].start or 0.0 for n in put} | {
+            n: v for n, v in self._constants.items() if n in put
+        }
+        first |= {s.name: s.start for s in self.states} | {p.name: p.start for p in self.parameters}
+        self._first_carried = np.array([first[n] for n in self.others])
+        constants = {n: v for n, v in self._constants.items() if n not in put}
+        self.access: Access = probe(self.archive, put, get, constants, first, t0, dt, compiled)
+        late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
+        if late:
+            raise BadInput(
+                f"{self.archive.path}: output '{late[0]}' is worked out in steps only, not from the states; "
+                "leave it out of [outputs] or measure a state"
+            )
+        chosen = self.access.way if way is None else way
+        free = self.access.free_time if chosen is self.access.way else False
+        self.copies = self._stack.enter_context(
+            Copies(self.archive, chosen, put, get, constants, t0, free, compiled)
+        )
+
+    def _check(self, put: list[str], get: list[str]) -> None:
+        d = self.archive.description
+        for name in (*put, *get, *self._constants):
+            if name not in d.variables:
+                raise BadInput(f"{d.name}: has no variable '{name}'; {did_you_mean(name, d.variables)}")
+        twice = sorted({n for n in put if put.count(n) > 1})
+        if twice:
+            raise BadInput(f"{d.name}: '{twice[0]}' is named twice among what is set; name it once")
+
+    def _values(self, X: Array, u: Array, carried: Array) -> Array:
+        n = self._n_states
+        values = np.empty((len(X), self._n_put))
+        values[:, :n] = X[:, :n]
+        values[:, n : self._n_all] = carried
+        for i, parameter in enumerate(self.parameters):
+            values[:, self._n_all + i] = parameter.transform.theta(X[:, n + i])
+        values[:, self._at_inputs] = u
+        return values
+
+    @staticmethod
+    def _asked(call: Callable[[], Array]) -> Array:
+        try:
+            return call()
+        except Refused as error:
+            raise Diverged(str(error)) from error

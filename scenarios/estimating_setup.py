@@ -1,0 +1,124 @@
+"""From an experiment to the system of its filter: samples, unknowns, noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.access.copies import Copies
+from estimator.access.recipe import Way
+from estimator.closeloop.noise import DIFFERENCE
+from estimator.history import Samples, samples
+from estimator.joint import Joint, UnknownParameter, UnknownState
+from estimator.needed import needed
+from estimator.process_noise import motion
+from estimator.record import Array, Record
+from estimator.shaping import UnknownInput
+from fmus.errors import BadInput
+from fmus.host.archive import Archive
+from fmus.host.fmu import Fmu, FmuError
+from scenarios.estimating_options import Options
+from scenarios.estimating_unknowns import check_options, inputs_of, parameters_of, states_of, usual
+from scenarios.experiment import Experiment
+
+
+@dataclass(frozen=True)
+class Setup:
+    """An experiment as a filter sees it. scale: (n_states,) motion per sqrt(s), for noise not declared."""
+
+    experiment: Experiment
+    options: Options
+    samples: Samples
+    noise: Array  # (m,) deviations of the measured outputs
+    declared_noise: tuple[bool, ...]
+    constants: dict[str, float]
+    states: tuple[UnknownState, ...]
+    parameters: tuple[UnknownParameter, ...]
+    unknown: tuple[UnknownInput, ...]
+    scale: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    free_run: Array  # (N, m) outputs with the values that the filter starts from, nan where it fails
+
+    def joint(self, archive: Archive, part: float) -> Joint:
+        """The system, with states driven by `part` of their motion where no noise is declared for them."""
+        given = self.options.process_std
+        states = [
+            replace(s, noise=given.get(s.name, part * scale))
+            for s, scale in zip(self.states, self.scale.tolist(), strict=True)
+        ]
+        s = self.samples
+        return Joint(
+            archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,
+            dt=float(np.median(np.diff(s.t))), t0=float(s.t[0]),
+        )  # fmt: skip
+
+
+def set_up(e: Experiment, options: Options, record: Record, archive: Archive) -> Setup:
+    """Everything that is to be known before filtering; BadInput where names or values do not fit."""
+    d = archive.description
+    run = record.runs[0]
+    check_options(e, options, d)
+    every = 1
+    if e.estimate and e.estimate.rate:
+        every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
+    s = samples(run.t, run.u, run.y, every)
+    if len(s.t) < 2:
+        raise BadInput(f"{e.file}: [estimate] rate = {e.estimate and e.estimate.rate:g} leaves one sample")
+    noise = noise_of(record)
+    constants = {**e.parameters, **e.initial}
+    parameters = tuple(parameters_of(e, options, d))
+    unknown = tuple(inputs_of(e, options))
+    values = constants | {p.name: p.start for p in parameters}
+    names = tuple(e.estimate.states) if e.estimate else ()
+    states = names or _needed(archive, values, s, record)
+    run_of = _free_run(archive, values, s, record, states)
+    nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
+    return Setup(
+        e, options, s, noise, tuple(np.isfinite(record.noise_std)), constants,
+        tuple(states_of(e, options, d, record, noise, states)), parameters, unknown,
+        motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
+        record.inputs, record.outputs, run_of[:, : len(record.outputs)],
+    )  # fmt: skip
+
+
+def noise_of(record: Record) -> Array:
+    """Deviation of each output's noise (m,): as declared, else what third differences of it leave."""
+    found = record.noise_std.copy()
+    for j in np.flatnonzero(np.isnan(found)):
+        seen = record.runs[0].y[:, j]
+        seen = seen[np.isfinite(seen)]
+        rough = np.convolve(seen, DIFFERENCE, "valid")
+        measured = 1.4826 * float(np.median(np.abs(rough))) / float(np.linalg.norm(DIFFERENCE))
+        found[j] = max(measured, 1e-9 * float(np.std(seen)), 1e-300)
+    return found
+
+
+def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: Record) -> tuple[str, ...]:
+    """The states that the measured outputs depend on, by plain restarts."""
+    d = archive.description
+    states = d.states
+    if not states:
+        return ()
+    scale = np.array([usual(d.variables[n], values.get(n)) for n in states])
+    put = [*states, *record.inputs]
+    first = [values.get(n, d.variables[n].start or 0.0) for n in states]
+    constants = {n: v for n, v in values.items() if n not in put}
+    get = [*states, *(n for n in record.outputs if n not in states)]
+    with Copies(archive, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
+        row = np.array([*first, *s.u[0].tolist()])
+        dt = float(np.median(np.diff(s.t)))
+        return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), dt))
+
+
+def _free_run(
+    archive: Archive, values: Mapping[str, float], s: Samples, record: Record, states: tuple[str, ...]
+) -> Array:
+    """Outputs and states (N, m + n) of a run with what is believed at the start; nan where the FMU fails."""
+    names = [*record.outputs, *states]
+    inputs = {n: s.held[:, j] for j, n in enumerate(record.inputs)}
+    with Fmu(archive) as fmu:
+        try:
+            return fmu.simulate(s.t, inputs, names, dict(values))
+        except FmuError:
+            return np.full((len(s.t), len(names)), np.nan)
