@@ -177,6 +177,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("out", type=Path, help="folder in which the record's folder is made")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--name", default="vehicle-truth")
+    parser.add_argument("--duration", type=float, default=60.0, help="s")
     parser.add_argument("--effect", choices=[*TYPICAL], default="none")
     parser.add_argument("--location", default="secondary", help="a suspension, a body, or an output")
     parser.add_argument("--track", choices=["spectrum", "rough", "measured"], default="spectrum")
@@ -189,7 +190,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     profile = {"spectrum": spectrum_rails, "rough": rough_rails, "measured": measured_rails}[a.track]
     effects = single(a.effect, a.location, **settings)
     rng = np.random.default_rng(a.seed)
-    print(write_record(a.out, a.name, rng, parameters_true=true, effects=effects, profile=profile))
+    path = write_record(
+        a.out, a.name, rng, duration=a.duration, parameters_true=true, effects=effects, profile=profile
+    )
+    print(path)
 
 
 if __name__ == "__main__":
