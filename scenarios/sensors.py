@@ -112,13 +112,13 @@ def _stamps(t: Array, sensor: Sensor) -> Array:
 
 def _reading(t: Array, true: Array, stamps: Array, sensor: Sensor, name: str, seed: int) -> Array:
     """The samples of a sensor, (n,), nan where lost."""
-    noise, loss = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, *name.encode()]).spawn(2))
+    rng = np.random.default_rng([seed, *name.encode()])
     sampled = (stamps - sensor.clock_offset) / (1 + sensor.clock_skew)
     x = sensor.gain * _at(t, true, sampled - sensor.delay)
     x += sensor.bias + sensor.drift * (sampled - t[0])
-    x += sensor.noise * noise.standard_normal(x.size)
+    x += sensor.noise * rng.standard_normal(x.size)
     x = _digitised(x, sensor)
-    lost = loss.random(x.size) < sensor.dropout
+    lost = rng.random(x.size) < sensor.dropout
     for begin, end in sensor.gaps:
         lost |= (stamps >= begin) & (stamps <= end)
     return np.where(lost, np.nan, x)

@@ -14,8 +14,8 @@ from scenarios.track.rails import Array, Quantity
 
 Negative = Annotated[float, Field(strict=True, allow_inf_nan=False, lt=0)]
 BOUNDS = (0.05, 4.0)  # of the tails: from far lighter to far heavier than Gaussian
-SPILT = 1e-4  # of the power that may stand elsewhere in the spectrum at the end
-ROUNDS = 24  # each leaves about half of the power that the stretching spills over the band
+SPILT = 1e-6  # of the power that may stand elsewhere in the spectrum at the end
+ROUNDS = 80  # some ten are usual; each leaves about half of the power that the stretching spills
 
 
 class Statistics(Table):
@@ -47,16 +47,16 @@ def fit(x: Array, wanted: Statistics) -> Array:
     kept, until little stretching is left to do. Raises BadInput where that does not come to an end.
     """
     u = (x - x.mean()) / x.std()
-    if wanted.max is not None or wanted.min is not None:
-        waves = np.abs(np.fft.rfft(u))
-        for _ in range(ROUNDS):
-            phases = np.angle(np.fft.rfft(_stretched(u, wanted)))
-            u = np.fft.irfft(waves * np.exp(1j * phases), u.size)
-        u = _stretched(u, wanted)
-        spilt = np.sum((np.abs(np.fft.rfft(u)) - waves) ** 2) / np.sum(waves**2)
-        if spilt > SPILT:
-            raise BadInput(_out_of_reach(u, wanted))
-    return np.asarray(wanted.sd * u, dtype=np.float64)
+    if wanted.max is None and wanted.min is None:
+        return np.asarray(wanted.sd * u, dtype=np.float64)
+    waves = np.abs(np.fft.rfft(u))
+    for _ in range(ROUNDS):
+        y = _stretched(u, wanted)
+        stretched = np.fft.rfft(y)
+        if np.sum((np.abs(stretched) - waves) ** 2) < SPILT * np.sum(waves**2):
+            return np.asarray(wanted.sd * y, dtype=np.float64)
+        u = np.fft.irfft(waves * np.exp(1j * np.angle(stretched)), u.size)
+    raise BadInput(_out_of_reach(u, wanted))
 
 
 def _stretched(u: Array, wanted: Statistics) -> Array:

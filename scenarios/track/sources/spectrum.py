@@ -1,6 +1,7 @@
 """Synthetic irregularities from the spectrum of a standard or one's own."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, ClassVar, Literal, Self
@@ -113,9 +114,14 @@ class SpectrumSource(Source):
 
     @property
     def requested(self) -> Spectra:
-        """The spectra that are realised, before any statistics."""
-        wanted = self.quantities
-        return MappingProxyType({n: s for n, s in self._offered().items() if wanted is None or n in wanted})
+        """The spectra that are realised; where a quantity has statistics, with its variance in the band."""
+        found: dict[Quantity, Spectrum] = {}
+        for name, spectrum in self._offered().items():
+            if self.quantities is None or name in self.quantities:
+                target = self.targets.get(name)
+                scale = target.sd**2 / float(spectrum.variance(*self.band)) if target else 1.0
+                found[name] = replace(spectrum, A=scale * spectrum.A)
+        return MappingProxyType(found)
 
     @property
     def targets(self) -> Mapping[Quantity, Statistics]:
