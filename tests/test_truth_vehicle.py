@@ -156,7 +156,8 @@ def sound():
 @pytest.mark.parametrize("kind", [k for k in TYPICAL if k != "none" and not k.startswith("sensor_")])
 def test_each_effect_shows_well_above_the_noise(kind, sound):
     location = "body" if kind in ("harmonic_excitation", "constant_force", "step_force") else "secondary_rl"
-    settings = {"step_force": {"constant_time": 2.0}}.get(kind, {})
+    short = {"step_force": {"constant_time": 2.0}, "bump_stop": {"bump_gap": 1e-3}}
+    settings = short.get(kind, {})
     _, ill = true_run(np.random.default_rng(6), duration=4.0, effects=single(kind, location, **settings))
     shows = {n: (ill.output(n) - sound.output(n)).std() / noise for n, noise in NOISE.items()}
     assert max(shows.values()) > 1.0
