@@ -1,5 +1,7 @@
 """Creep laws: laws of physics, the linear limit, an independent truth, and Kalker's full theory (CONTACT)."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import casadi as cs
@@ -10,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+import fmus.contact
 from fmus.contact import creep_forces, kalker
 from fmus.contact.friction import friction_coefficient
 from fmus.contact.laws import LAWS, selected_law
@@ -356,6 +359,19 @@ def test_functions_say_their_arguments_and_results():
         made = law().function()
         assert tuple(made.name_in()) == ARGUMENTS
         assert tuple(made.name_out()) == RESULTS
+
+
+def test_a_law_is_there_without_tables_and_their_libraries():
+    code = "import fmus.contact.laws, sys; sys.exit('pandas' in sys.modules or 'scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_public_names_are_found_where_they_are_defined():
+    for name, module in fmus.contact.PUBLIC.items():
+        assert getattr(fmus.contact, name).__module__ == f"fmus.contact.{module}"
+        assert name in dir(fmus.contact)
+    with pytest.raises(AttributeError, match="no attribute 'creep_force'"):
+        fmus.contact.creep_force  # noqa: B018
 
 
 HERE = {"a": 6e-3, "b": 4e-3, "N": 8e4, "mu": 0.3, "G": G, "nu": 0.28}
