@@ -14,7 +14,19 @@ from scipy.signal import csd, welch
 from scipy.stats import chi2
 
 from fmus.errors import BadInput
-from scenarios.track import SPECTRA, Spectrum, Track, inputs, journey, profile_figure, read_source, read_track
+from fmus.models import MODELS
+from fmus.variables import Input
+from scenarios.track import (
+    INPUTS,
+    SPECTRA,
+    Spectrum,
+    Track,
+    inputs,
+    journey,
+    profile_figure,
+    read_source,
+    read_track,
+)
 from scenarios.track.defects import DEFECTS
 from scenarios.track.figures import spectrum_figure
 from scenarios.track.rails import PLANES, QUANTITIES
@@ -164,6 +176,14 @@ def test_the_wheelset_feels_alignment_gauge_and_speed():
     assert_allclose(found["y_irr"](t), track.at(s).alignment)
     assert_allclose(found["gauge_irr"](t), track.at(s).gauge)
     assert_allclose(found["V"](t), np.interp(t, *VARYING))
+
+
+@pytest.mark.parametrize("model", sorted(INPUTS))
+def test_inputs_are_those_of_the_model(model):
+    if model not in MODELS:
+        pytest.skip(f"there is no model '{model}' here")
+    known = {v.name for v in MODELS[model]().of(Input)}
+    assert inputs(waves(), 20.0, model).keys() <= known
 
 
 def test_models_that_know_no_track():
@@ -380,6 +400,8 @@ def test_the_spectrum_asked_for_follows_the_standard_deviation():
     assert source.requested["level"].Omega_c == low["level"].Omega_c
     assert source.requested["gauge"] == low["gauge"]
     assert_allclose(source.track(HERE).rails.level[:-1].std(), 2e-3, rtol=1e-9)
+    by_rails = read_source(GOOD | {"statistics": {"z_left": {"sd": 1e-3}, "z_right": {"sd": 2e-3}}})
+    assert set(by_rails.requested) == {"alignment", "gauge"}
 
 
 @pytest.mark.parametrize("extremes", [{"max": 1e-3}, {"max": 20e-3, "min": -20e-3}])
@@ -495,13 +517,13 @@ def test_a_file_over_distance(tmp_path):
     assert_array_equal(track.rails.cross_level, 0)
 
 
-def over_time(V) -> dict:
+def over_time(**speed) -> dict:
     table = {key: value for key, value in FILE.items() if key != "distance"}
-    return table | {"time": {"column": "t", "unit": "s"}, "V": V}
+    return table | {"time": {"column": "t", "unit": "s"}, **speed}
 
 
 def test_a_file_over_time_at_a_constant_speed(tmp_path):
-    track = read_track(over_time(20.0), write(tmp_path, record()))
+    track = read_track(over_time(V=20.0), write(tmp_path, record()))
     assert_allclose(track.distance, RECORD.distance, atol=1e-9)
 
 
@@ -512,7 +534,7 @@ def test_a_file_over_time_with_its_speed(tmp_path):
         "kind": "file",
         "data": "track.csv",
         "time": {"column": "t", "unit": "s"},
-        "V": {"column": "v", "unit": "km/h"},
+        "speed": {"column": "v", "unit": "km/h"},
         "columns": {"level": {"column": "level", "unit": "mm"}},
     }
     track = read_track(table, write(tmp_path, columns))
@@ -545,14 +567,16 @@ def spoilt(**changes) -> dict:
             "line 6: column 'level' holds 'nan'|line 6: column 'level' holds no",
         ),
         (
-            over_time({"column": "level", "unit": "m/s"}),
+            over_time(speed={"column": "level", "unit": "m/s"}),
             record(),
             "speed column 'level' is not greater than 0",
         ),
         (FILE, {k: v[:1] for k, v in record().items()}, "has one row of data; a track needs at least two"),
-        (FILE | {"V": 20.0}, record(), "[track] needs 'V' with [time], and only then"),
+        (FILE | {"V": 20.0}, record(), "[track] needs either 'V' or [speed] with [time]"),
+        (over_time(), record(), "[track] needs either 'V' or [speed] with [time], and only then"),
+        (over_time(V=-1.0), record(), "key 'track.V' must be greater than 0, not '-1.0'"),
         (FILE | {"time": {"column": "t", "unit": "s"}}, record(), "needs either [distance] or [time]"),
-        (FILE | {"columns": {}}, record(), "key 'track.columns'"),
+        (FILE | {"columns": {}}, record(), "key 'track.columns' must hold at least one entry"),
         (FILE | {"columns": {"y_left": {"column": "yl", "unit": "mm"}}}, record(), "without 'y_right'"),
     ],
 )
@@ -595,7 +619,8 @@ OWN = {"A": 2e-7, "Omega_c": 0.8, "Omega_r": 0.02}
         ({"quantities": ["levl"]}, "key 'track.quantities[0]' must be one of alignment, gauge, level"),
         ({"spectrum": None, "own": {"level": OWN}, "quantities": ["gauge"]}, "'gauge' has no spectrum"),
         ({"seed": -1}, "key 'track.seed' must be greater than or equal to 0, not '-1'"),
-        ({"seed": 1.5}, "key 'track.seed' must be a integer"),
+        ({"seed": 1.5}, "key 'track.seed' must be a whole number, not '1.5'"),
+        ({"quantities": "level"}, "key 'track.quantities' must be a list, not 'level'"),
         ({"wavelengths": [0.0, 5.0]}, "[track] 'wavelengths' must be greater than 0"),
         ({"wavelengths": [5.0, 3.0]}, "key 'track.wavelengths' must increase"),
         ({"length": 20.0}, "[track] 'length' 20 m is shorter than the longest wave 25 m"),

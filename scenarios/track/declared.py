@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import chain
+from types import MappingProxyType
 from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
@@ -11,6 +12,17 @@ from fmus.errors import BadInput, did_you_mean
 from scenarios.declaration import Table
 
 T = TypeVar("T", bound=Table)
+
+# our words for problems by pydantic's name
+SAID = MappingProxyType(
+    {
+        "dict_type": "must be a table",
+        "model_type": "must be a table",
+        "tuple_type": "must be a list",
+        "int_type": "must be a whole number",
+        "too_short": "must hold at least one entry",
+    }
+)
 
 
 def read_table(cls: type[T], table: object, key: str) -> T:
@@ -48,9 +60,7 @@ def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
     if kind == "value_error":
         ours = str(problem["ctx"]["error"])
         return f"[{key}] {ours}" if isinstance(value, dict) else f"key '{key}' {ours}"
-    said = problem["msg"].replace("Input should", "must").replace("a valid ", "a ")
-    if kind in ("dict_type", "model_type"):
-        said = "must be a table"
+    said = SAID.get(kind) or problem["msg"].replace("Input should", "must").replace("a valid ", "a ")
     return f"key '{key}' {said}, not {str(value)[:60]!r}"
 
 

@@ -71,7 +71,7 @@ def spectrum_figure(
     for quantity in shown:
         _spectrum_panel(axes[quantity], track, quantity, (requested or {}).get(quantity), wavelengths)
         name_axes(axes[quantity], "Ω in rad/m", "S in m²/(rad/m)", TITLES[quantity])
-    legend(figure, axes[shown[0]])
+    legend(figure, max((axes[q] for q in shown), key=lambda ax: len(ax.lines)))
     made: Figure = figure
     return made
 

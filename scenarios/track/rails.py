@@ -1,6 +1,6 @@
 """Deviations of the two rails from straight and level, and the quantities of track geometry in them."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import astuple, dataclass
 from typing import Literal, TypeAlias, get_args
 
@@ -78,9 +78,9 @@ def rails_of(given: Mapping[Quantity, Array], like: Array) -> Rails:
     return Rails(*sides)
 
 
-def check_direction(given: object, rails: tuple[str, str], means: tuple[str, str]) -> None:
+def check_direction(given: Collection[str], rails: tuple[str, str], means: tuple[str, str]) -> None:
     """One direction needs both its rails, or one or both of mean and difference, or nothing."""
-    names = [name for name in (*rails, *means) if name in given]  # type: ignore[operator]  # a set of names
+    names = [name for name in (*rails, *means) if name in given]
     if set(names) & set(rails) and set(names) & set(means):
         raise ValueError(
             f"'{names[0]}' and '{names[-1]}' describe the same direction; give the rails "

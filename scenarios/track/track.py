@@ -129,12 +129,12 @@ class Track:
 
     @property
     def start(self) -> float:
-        """Where its irregularities begin, m."""
+        """The first of its distances, m."""
         return float(self.distance[0])
 
     @property
     def end(self) -> float:
-        """Where its irregularities end, m."""
+        """The last of its distances, m."""
         return float(self.distance[-1])
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from scenarios.declaration import Number, Table
 from scenarios.track.rails import Array, Quantity, Rails, rails_of
 
-DRAWN = 201  # points over a defect, an odd number so that its centre is among them
+DRAWN = 201  # points over a defect
+MARGIN = 1.25  # of its reach; with these points its centre and both its ends are among them
 
 
 class Defect(Table, ABC):
@@ -34,7 +35,7 @@ class Defect(Table, ABC):
     @property
     def knots(self) -> Array:
         """Distances [m] that show the defect when joined by lines."""
-        return self.position + np.linspace(-self.reach, self.reach, DRAWN)
+        return self.position + MARGIN * np.linspace(-self.reach, self.reach, DRAWN)
 
     def at(self, distance: Array) -> Rails:
         """Deviations [m] at distances [m] of any shape."""

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from scenarios.declaration import Positive
-from scenarios.track.defects.defect import Defect
+from scenarios.track.defects.defect import MARGIN, Defect
 from scenarios.track.rails import Array, Quantity
 
 
@@ -47,7 +47,7 @@ class CyclicTop(Defect):
     @property
     def knots(self) -> Array:
         """Points enough for each of the dips."""
-        return self.position + np.linspace(-self.reach, self.reach, 40 * self.cycles + 1)
+        return self.position + MARGIN * np.linspace(-self.reach, self.reach, 50 * self.cycles + 1)
 
 
 def _waves(x: Array, wavelength: float, cycles: int) -> tuple[Array, Array]:

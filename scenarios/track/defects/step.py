@@ -24,13 +24,14 @@ class Step(Defect):
 
     @property
     def reach(self) -> float:
-        """Its own position and what is just before it."""
-        return 1e-3
+        """What is drawn of the two heights."""
+        return 1.0
 
     @property
     def knots(self) -> Array:
-        """The two sides of the step."""
-        return np.array([np.nextafter(self.position, -np.inf), self.position])
+        """The two sides of the step, and some way along either height."""
+        before = np.nextafter(self.position, -np.inf)
+        return np.array([before - self.reach, before, self.position, self.position + self.reach])
 
 
 class Ramp(Defect):

@@ -31,7 +31,7 @@ class Column(Axis):
 
 
 class MeasuredSource(Source):
-    """Columns of a data file over `distance`, or over `time` at a speed `V` (a column, or a number in m/s).
+    """Columns of a data file over `distance`, or over `time` at a speed `V` [m/s] or a column of `speed`.
 
     The first row is at distance 0.
     """
@@ -40,15 +40,18 @@ class MeasuredSource(Source):
     data: str
     distance: Axis | None = None
     time: Axis | None = None
-    V: Positive | Axis | None = None
+    V: Positive | None = None
+    speed: Axis | None = None
     columns: Annotated[dict[Quantity, Column], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if (self.distance is None) == (self.time is None):
             raise ValueError("needs either [distance] or [time], the axis of the data")
-        if (self.time is None) != (self.V is None):
-            raise ValueError("needs 'V' with [time], and only then: the speed makes time a distance")
+        if (self.V is not None) + (self.speed is not None) != (self.time is not None):
+            raise ValueError(
+                "needs either 'V' or [speed] with [time], and only then: it makes time a distance"
+            )
         for rails, means in PLANES:
             check_direction(self.columns.keys(), rails, means)
         return self
@@ -69,15 +72,16 @@ class MeasuredSource(Source):
         if len(table) < 2:
             raise BadInput(f"{file}: has one row of data; a track needs at least two")
         axis = next(axis for axis in (self.distance, self.time) if axis is not None)
-        x = _values(file, table, axis, "m" if self.V is None else "s")
+        x = _values(file, table, axis, "s" if self.time else "m")
         _check_increasing(file, table, axis, x)
-        if not isinstance(self.V, Axis):
-            return np.asarray((x - x[0]) * (1.0 if self.V is None else self.V), dtype=np.float64)
-        speed = _values(file, table, self.V, "m/s")
+        if self.speed is None:
+            return np.asarray((x - x[0]) * (self.V or 1.0), dtype=np.float64)
+        speed = _values(file, table, self.speed, "m/s")
         if (speed <= 0).any():
             line = _line(table, speed <= 0)
             raise BadInput(
-                f"{file} line {line}: speed column '{self.V.column}' is not greater than 0; cut such rows out"
+                f"{file} line {line}: speed column '{self.speed.column}' is not greater than 0; "
+                "cut such rows out"
             )
         return np.asarray(cumulative_trapezoid(speed, x, initial=0), dtype=np.float64)
 

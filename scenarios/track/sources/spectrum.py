@@ -96,13 +96,18 @@ class SpectrumSource(Source):
         for name in self.quantities or ():
             if name not in offered:
                 raise ValueError(f"'{name}' has no spectrum; {did_you_mean(name, offered)}")
-        realised = set(self.requested)
+        realised = set(self._realised())
         for rails, means in PLANES:
             for target in {*rails, *means} & self.targets.keys():
                 if not realised & ({target} if target in means else {*means}):
                     raise ValueError(
                         f"'{target}' has statistics but no spectrum among the quantities realised"
                     )
+
+    def _realised(self) -> Spectra:
+        """Those of the offered spectra that are asked for, before any statistics."""
+        wanted = self.quantities
+        return {n: s for n, s in self._offered().items() if wanted is None or n in wanted}
 
     def _offered(self) -> Spectra:
         if self.spectrum is not None:
@@ -114,12 +119,17 @@ class SpectrumSource(Source):
 
     @property
     def requested(self) -> Spectra:
-        """The spectra that are realised; where a quantity has statistics, with its variance in the band."""
+        """The spectra that the track has to have.
+
+        Where a quantity has statistics, with its variance in the band; where the rails of its direction
+        have, none, for theirs are mixtures.
+        """
+        mixed = {mean for rails, means in PLANES if self.targets.keys() & set(rails) for mean in means}
         found: dict[Quantity, Spectrum] = {}
-        for name, spectrum in self._offered().items():
-            if self.quantities is None or name in self.quantities:
-                target = self.targets.get(name)
-                scale = target.sd**2 / float(spectrum.variance(*self.band)) if target else 1.0
+        for name, spectrum in self._realised().items():
+            target = self.targets.get(name)
+            scale = target.sd**2 / float(spectrum.variance(*self.band)) if target else 1.0
+            if name not in mixed:
                 found[name] = replace(spectrum, A=scale * spectrum.A)
         return MappingProxyType(found)
 
@@ -138,7 +148,7 @@ class SpectrumSource(Source):
         samples = 2 * int(np.ceil(self.length / (2 * (self.step or self.wavelengths[0] / FINE))))
         waves: dict[Quantity, Array] = {
             name: realise(spectrum, self.length, samples, self.band, generator(self.seed, name))
-            for name, spectrum in self.requested.items()
+            for name, spectrum in self._realised().items()
         }
         rails = _with_statistics(rails_of(waves, np.zeros(samples)), self.targets)
         distance = self.length * np.arange(samples + 1) / samples
