@@ -4,10 +4,15 @@ In data: a resonance that the model lacks, and more inertia below it.
 """
 
 import casadi as cs
+import numpy as np
 
 from fmus.effects.force_law import Array, ForceLaw
 from fmus.effects.spectrum import frequencies
 from fmus.variables import Expr, Parameter, State
+
+LOWEST, HIGHEST = 0.3, 100.0  # Hz, of modes that are looked for; above the last no model's step follows
+PER_SAMPLE = 0.3  # cycles, the most that a record can show
+APART = 1.2  # ratio of the frequencies that are tried
 
 
 class FlexibleMode(ForceLaw):
@@ -26,7 +31,7 @@ class FlexibleMode(ForceLaw):
     places = ("rests", "turns")
     told = ("v_0",)
     m = Parameter("{F}.s2/{q}", min=0.0, doc="modal mass")
-    f = Parameter("Hz", 10.0, min=0.01, max=100.0, doc="natural frequency on a fixed base")
+    f = Parameter("Hz", 10.0, min=0.01, max=HIGHEST, doc="natural frequency on a fixed base")
     D = Parameter("1", 0.05, min=0.0, max=2.0, doc="damping ratio on a fixed base")
     v_0 = Parameter("{q}/s", doc="velocity of mass and base at the start")
     e = State("{F}.s2", doc="modal mass times its deflection", nominal=0.1)
@@ -47,5 +52,8 @@ class FlexibleMode(ForceLaw):
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
-        """See ForceLaw.shapes: strongest lines of the force's spectrum over time."""
-        return [{"f": f, "v_0": float(v[0])} for f in frequencies(t, v, force) if 0.01 < f < 100.0]
+        """See ForceLaw.shapes: lines of the force's spectrum over time, and frequencies between them."""
+        highest = min(PER_SAMPLE / float(np.median(np.diff(t))), HIGHEST)
+        grid = np.geomspace(LOWEST, highest, int(np.log(highest / LOWEST) / np.log(APART)) + 1)
+        found = [f for f in frequencies(t, v, force) if LOWEST < f < highest]
+        return [{"f": float(f), "v_0": float(v[0])} for f in (*found, *grid)]

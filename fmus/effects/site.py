@@ -15,6 +15,12 @@ from fmus.variables import Expr, Input, Parameter, State, Variable
 
 CLOCK = State("s", doc="time since the start, for what depends on it", nominal=10.0, name="clock")
 WAY = State("m", doc="way since the start, for what depends on it", nominal=100.0, name="way")
+SORTS = {  # what a location of each sort is called
+    "port": "location",
+    "component": "component",
+    "parameter": "tunable parameter",
+    "input": "input beside its ports",
+}
 SPEED = "V"  # the input whose integral is the way
 
 
@@ -103,7 +109,7 @@ class Site:
 
     def _place_of(self, effect: type[Effect], location: str, known: dict[str, Any]) -> Any:
         if location not in known:
-            what = "location" if effect.acts_on == "port" else f"{effect.acts_on}"
+            what = SORTS[effect.acts_on]
             raise BadInput(f"{self.name} has no {what} '{location}'; {did_you_mean(location, known)}")
         if self.places_known and not effect.fits(known[location]):
             raise BadInput(
