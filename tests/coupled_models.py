@@ -52,6 +52,25 @@ class Mass(Model):
         return {"x": m.v, "v": (m.F - m.k * m.x) / m.m}
 
 
+class Pair(Model):
+    """Two outputs, each of which follows one of two inputs at once, above a constant."""
+
+    name = "Pair"
+    step_size = 1e-2
+
+    x = State("1", doc="constant")
+    u1 = Input("1", doc="first input")
+    u2 = Input("1", doc="second input")
+    y1 = Output("1", doc="first output")
+    y2 = Output("1", doc="second output")
+
+    def derivatives(m):
+        return {"x": 0 * m.x}
+
+    def outputs(m):
+        return {"y1": 2 * m.u1 + m.x, "y2": 3 * m.u2 + m.x}
+
+
 COUPLED = [("a.F", "b.F"), ("b.x", "a.x_other"), ("b.v", "a.v_other")]
 STATES = ["a.x", "a.v", "b.x", "b.v"]
 START = {"a.x": 1.0, "a.v": 0.0, "b.x": -0.5, "b.v": 0.3}

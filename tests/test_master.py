@@ -1,6 +1,7 @@
 """The master: coupled FMUs against the whole system, order by order; events, steps, refusals, Ctrl-C."""
 
 import dataclasses
+import re
 import signal
 from itertools import pairwise
 
@@ -9,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
+from fmus.errors import BadInput
 from fmus.export.pythonfmu import build_python
 from fmus.host.archive import Archive
 from fmus.host.connections import Connection
@@ -16,7 +18,8 @@ from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmu import Fmu, FmuError
 from fmus.host.instance import MESSAGES, CallFailed
 from fmus.host.master import Master
-from tests.coupled_models import COUPLED, START, STATES, Mass, Sprung, Whole
+from tests.coupled_models import COUPLED, START, STATES, Mass, Pair, Sprung, Whole
+from tests.packed import with_description
 
 INTERNAL = 1e-9  # of our models' Runge-Kutta steps of 1 ms, against the solution
 STEPS = (0.02, 0.01, 0.005)
@@ -222,6 +225,27 @@ def test_start_values_pass_through_the_outputs(parts):
             assert master.run(0.01).data["a.F"].iloc[0] == pytest.approx(10 * 1.5 - 0.5 * 0.3)
 
 
+FOLLOWS = """
+@property
+def x(self):
+    return self.u + 1.0
+
+@x.setter
+def x(self, value):
+    pass
+"""
+
+
+def test_start_values_that_run_in_a_circle(foreign):
+    """It calls an output that follows its input a state."""
+    liar = foreign("pass", FOLLOWS)
+    with (
+        Master({"p": liar, "q": liar}, [("p.x", "q.u"), ("q.x", "p.u")], step=0.1) as master,
+        pytest.raises(FmuError, match="start values of the connected FMUs run in a circle"),
+    ):
+        master.run(1.0)
+
+
 LOOP = [
     Connection("a.F", "b.x_other", 0.05, gain_unit="m/N"),
     Connection("b.F", "a.x_other", 0.05, gain_unit="m/N"),
@@ -249,6 +273,38 @@ def test_a_delay_cuts_a_loop(parts):
         exact = np.cos(np.outer(data["time"], np.sqrt(w2))) * (modes.T @ start) @ modes.T
         found.append(np.abs(data[["a.x", "b.x"]].to_numpy() - exact).max())
     assert_allclose(orders(np.array(found)), 1, atol=0.15)
+
+
+PASSES = b"""<Outputs><Unknown index="1" dependencies=""/><Unknown index="4" dependencies="2"/>
+<Unknown index="5" dependencies="3"/></Outputs>"""
+
+
+@pytest.mark.parametrize("order", ["jacobi", "gauss_seidel"])
+@pytest.mark.parametrize("extrapolation", ["hold", "linear"])
+def test_values_go_through_an_fmu_twice_at_one_time(parts, tmp_path, order, extrapolation):
+    """p.y1 -> q.u1, q.y1 -> p.u2, p.y2 -> b.F: no loop by the stated dependencies, and no lag."""
+    plain = build_python(Pair(), tmp_path)
+    pair = with_description(plain, tmp_path / "stated.fmu", rb"<Outputs>.*?</Outputs>", PASSES, re.DOTALL)
+    links = [("p.y1", "q.u1"), ("q.y1", "p.u2"), Connection("p.y2", "b.F", gain_unit="N")]
+    inputs = {"p.u1": "sin(3 * t)"}
+    with Master(
+        {"b": parts["b"], "q": pair, "p": pair},
+        links,
+        step=0.05,
+        inputs=inputs,
+        order=order,
+        extrapolation=extrapolation,
+        initial={"p.x": 0.5},
+        record=["p.y2", "p.u1", "p.u2", "b.F"],
+    ) as master:
+        d = master.run(1.0).data
+    expected = 2 * np.sin(3 * d["time"]) + 0.5
+    assert_allclose(d["p.u1"], np.sin(3 * d["time"]), rtol=1e-15, atol=1e-15)
+    assert_allclose(d["p.u2"], 2 * expected, rtol=1e-15)
+    assert_allclose(d["p.y2"], 3 * 2 * expected + 0.5, rtol=1e-14)
+    assert_allclose(d["b.F"], d["p.y2"], rtol=1e-15)
+    with pytest.raises(BadInput, match="algebraic loop"):
+        Master({"q": plain, "p": plain}, links[:2], step=0.05)
 
 
 def test_a_delay_costs_nothing_where_the_loop_was_only_assumed(foreign):
@@ -289,6 +345,14 @@ def test_a_refused_step_is_made_in_parts_by_all(foreign, parts, order):
     fine = refused(foreign, parts, "False", 0.01, order=order, extrapolation="linear")
     assert_array_equal(halved["time"], fine["time"])
     assert_allclose(halved, fine, rtol=1e-9, atol=1e-12)
+
+
+def test_a_refused_step_with_steps_of_different_length(foreign, parts):
+    halved = refused(foreign, parts, "True", 0.04, steps={"b": 0.16}, extrapolation="linear")
+    fine = refused(foreign, parts, "False", 0.005, extrapolation="linear")
+    assert_array_equal(halved["time"], fine["time"])
+    slow = np.arange(0, len(fine), 4)
+    assert_allclose(halved.iloc[slow], fine.iloc[slow], atol=0.05)
 
 
 def test_a_step_refused_once_goes_back_no_further_than_itself(foreign, parts):

@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import isfinite, lcm
+from math import isfinite
 from typing import TypeAlias
 
-from fmus.errors import BadInput
+from fmus.errors import BadInput, did_you_mean
 from fmus.host.connections import Address
+from fmus.host.description import FmuDescription
 
-SAME = 1e-9  # of the clock's step: times closer than this are one
+FINEST = 10**9  # parts of the clock's step that are told apart
 
 Place: TypeAlias = int | Fraction  # in steps of the clock
 Event: TypeAlias = tuple[float, Mapping[Address, float]]
@@ -72,9 +73,8 @@ class Clock:
 
     def _place(self, time: float) -> Place:
         """A time in steps of the clock, a whole number where it is one but for rounding."""
-        exact = Fraction(repr(time)) / Fraction(repr(self.step))
-        whole = round(exact)
-        return whole if abs(exact - whole) <= SAME else exact
+        place = Fraction(round(Fraction(repr(time)) / Fraction(repr(self.step)) * FINEST), FINEST)
+        return place.numerator if place.denominator == 1 else place
 
     def _check(self, stop: Place) -> None:
         for name, multiple, splits in zip(self.names, self.multiples, self.splits, strict=True):
@@ -89,12 +89,8 @@ class Clock:
         self, places: list[Place], times: list[float], stops: set[Place]
     ) -> tuple[list[tuple[int, ...]], list[tuple[float, ...]]]:
         """Members due at each instant but the last, and the steps that they then make."""
-        turns = [
-            tuple(i for i, m in enumerate(self.multiples) if r % m == 0) for r in range(lcm(*self.multiples))
-        ]
-        everyone = turns[0]
         due = [
-            everyone if place in stops or place.denominator > 1 else turns[place.numerator % len(turns)]
+            tuple(i for i, m in enumerate(self.multiples) if place in stops or place % m == 0)
             for place in places
         ]
         then, steps = [len(places) - 1] * len(self.names), []  # when each is due next, going back in time
@@ -108,3 +104,27 @@ class Clock:
         """A member's step between two instants; whole ones are all alike, to the last bit."""
         whole = places[then] - places[now] == self.multiples[i]
         return self.multiples[i] * self.step if whole else times[then] - times[now]
+
+
+def clock(
+    fmus: Mapping[str, FmuDescription], step: float, steps: Mapping[str, float], record_step: float | None
+) -> Clock:
+    """The clock of FMUs with a common step and steps of their own, s; BadInput where they do not fit."""
+    for name in steps:
+        if name not in fmus:
+            raise BadInput(f"step of '{name}': there is no FMU of that name; {did_you_mean(name, fmus)}")
+    lengths = {name: float(steps.get(name, step)) for name in fmus}
+    for name, length in lengths.items():
+        if not (isfinite(length) and length > 0):
+            raise BadInput(f"step of '{name}': {length:g} s is no step; give a positive one")
+    shortest = min(lengths.values())
+    multiples = [_multiple(length, shortest, f"step of '{name}'") for name, length in lengths.items()]
+    every = _multiple(shortest if record_step is None else record_step, shortest, "record_step")
+    return Clock(list(fmus), shortest, multiples, [d.variable_step for d in fmus.values()], every)
+
+
+def _multiple(length: float, shortest: float, where: str) -> int:
+    ratio = length / shortest
+    if not (isfinite(ratio) and round(ratio) >= 1 and abs(ratio - round(ratio)) <= ratio / FINEST):
+        raise BadInput(f"{where}: {length:g} s is no multiple of the shortest step, {shortest:g} s")
+    return round(ratio)

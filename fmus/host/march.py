@@ -88,7 +88,12 @@ class March:
                 self._tell(tell)
 
     def free(self) -> None:
-        """Free saved states."""
+        """Free saved states and the FMUs for other use."""
+        self._forget()
+        for m in self.crew.members:
+            m.hand_back()
+
+    def _forget(self) -> None:
         for m, saved in self._saved:
             m.forget(saved)
         self._saved = []
@@ -115,9 +120,9 @@ class March:
                 m.settled.settle(m.read())
 
     def _pass_on(self, m: Member) -> Values:
-        given = m.feed(0.0, 0.0, 0)
+        m.feed(0.0, 0.0, 0)
         m.settled.settle(m.read())
-        return given
+        return m.inputs
 
     def _stepped(self, n: int) -> bool:
         """Step on from an instant; False where that must be tried again from a saved state before it."""
@@ -166,7 +171,7 @@ class March:
             self._halve(part, saved, depth + 1, refused)
 
     def _save(self, n: int) -> None:
-        self.free()
+        self._forget()
         try:
             for m in self.crew.members:
                 self._saved.append((m, m.save()))
@@ -182,6 +187,7 @@ class March:
         _restore(self._saved)
         self.recorder.keep(self._saved_rows)
         self._next_save, self._careful_until = n, n + CAREFUL
+        self.time = self.plan.times[self._saved_at]
         return self._saved_at
 
     def _tell(self, tell: Tell) -> None:

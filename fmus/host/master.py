@@ -1,20 +1,19 @@
 """The master: several FMUs, connected by name, run on one clock."""
 
-import signal as os_signal
-import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from math import isfinite
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from math import inf, isfinite
+from numbers import Real
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Literal, Self
 
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
-from fmus.host.clock import SAME, Clock, Event
+from fmus.host.clock import Event, clock
 from fmus.host.connections import Address, Connection, Directory, links
-from fmus.host.description import FmuDescription
 from fmus.host.fmu import Fmu
+from fmus.host.interrupt import stopped_by_ctrl_c
 from fmus.host.march import March, Tell
 from fmus.host.recording import Recorder, Recording
 from fmus.host.samples import EXTRAPOLATIONS
@@ -69,7 +68,7 @@ class Master:
             self._sources = _opened(fmus, self._own)
             self._descriptions = {name: source.description for name, source in self._sources.items()}
             self._directory = Directory(self._descriptions)
-            self._clock = _clock(self._descriptions, step, steps or {}, record_step)
+            self._clock = clock(self._descriptions, step, steps or {}, record_step)
             found = links(connections, self._directory)
             self._signals = self._inputs(inputs or {}, {link.target: str(link.source) for link in found})
             self._record = self._recorded(record)
@@ -101,7 +100,7 @@ class Master:
             }
             march = March(self._wiring.crew(fmus), plan, Recorder(names, units))
             stack.callback(march.free)
-            with _stopped_by_ctrl_c(march):
+            with stopped_by_ctrl_c(march):
                 march.initialise(self._start)
                 march.run(tell)
         return march.recorder.recording(march.time if march.stopped and march.time < plan.times[-1] else None)
@@ -141,16 +140,16 @@ class Master:
         start: dict[str, dict[str, float]] = {name: {} for name in self._sources}
         for name, value in parameters.items():
             address = self._directory.settable(name, f"parameter '{name}'", "parameter")
-            start[address.fmu][address.variable] = _finite(value, f"parameter '{name}'")
+            start[address.fmu][address.variable] = self._number(address, value, f"parameter '{name}'")
         for name, value in initial.items():
             address, variable = self._directory.find(name, f"initial '{name}'")
             if variable.initial not in ("exact", "approx") or variable.causality not in ("output", "local"):
                 states = ", ".join(self._descriptions[address.fmu].states) or "none"
                 raise BadInput(f"initial '{name}': is no state; those of '{address.fmu}' are {states}")
-            start[address.fmu][address.variable] = _finite(value, f"initial '{name}'")
+            start[address.fmu][address.variable] = self._number(address, value, f"initial '{name}'")
         for address, s in self._signals.items():
             if s.constant is not None:
-                start[address.fmu][address.variable] = s.constant
+                start[address.fmu][address.variable] = self._number(address, s.constant, f"input '{address}'")
         return start
 
     def _event(self, time: float, values: Mapping[str, float]) -> Event:
@@ -165,8 +164,20 @@ class Master:
                 raise BadInput(
                     f"{where}: '{name}' is a {kind} parameter, not a tunable one; give it in 'parameters'"
                 )
-            found[address] = _finite(value, f"{where}: '{name}'")
+            found[address] = self._number(address, value, f"{where}: '{name}'")
         return float(time), found
+
+    def _number(self, address: Address, value: float, where: str) -> float:
+        """A value that the FMU's own limits allow."""
+        if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
+            raise BadInput(f"{where}: {value!r} is no finite number; give one")
+        v = self._descriptions[address.fmu].variables[address.variable]
+        low, high = -inf if v.min is None else v.min, inf if v.max is None else v.max
+        if not low <= value <= high:
+            raise BadInput(
+                f"{where}: {value:g} is outside {low:g} to {high:g}, the limits that the FMU states"
+            )
+        return float(value)
 
 
 def _opened(fmus: Mapping[str, str | Path | Archive | Fmu], own: ExitStack) -> dict[str, Archive | Fmu]:
@@ -187,60 +198,3 @@ def _opened(fmus: Mapping[str, str | Path | Archive | Fmu], own: ExitStack) -> d
             raise BadInput(f"FMU '{name}': is in use under another name; give a file that allows two")
         found[name] = given
     return found
-
-
-def _clock(
-    fmus: Mapping[str, FmuDescription], step: float, steps: Mapping[str, float], record_step: float | None
-) -> Clock:
-    for name in steps:
-        if name not in fmus:
-            raise BadInput(f"step of '{name}': there is no FMU of that name; known are {', '.join(fmus)}")
-    lengths = {name: float(steps.get(name, step)) for name in fmus}
-    for name, length in lengths.items():
-        if not (isfinite(length) and length > 0):
-            raise BadInput(f"step of '{name}': {length:g} s is no step; give a positive one")
-    shortest = min(lengths.values())
-    multiples = [_multiple(length, shortest, f"step of '{name}'") for name, length in lengths.items()]
-    every = _multiple(shortest if record_step is None else record_step, shortest, "record_step")
-    return Clock(list(fmus), shortest, multiples, [d.variable_step for d in fmus.values()], every)
-
-
-def _multiple(length: float, shortest: float, where: str) -> int:
-    ratio = length / shortest
-    if not (isfinite(ratio) and round(ratio) >= 1 and abs(ratio - round(ratio)) <= SAME * ratio):
-        raise BadInput(f"{where}: {length:g} s is no multiple of the shortest step {shortest:g} s")
-    return round(ratio)
-
-
-def _finite(value: float, where: str) -> float:
-    number = float(value)
-    if not isfinite(number):
-        raise BadInput(f"{where}: {number} is not finite; give a number")
-    return number
-
-
-@contextmanager
-def _stopped_by_ctrl_c(march: March) -> Iterator[None]:
-    """End a run at the next instant, as an FMU in Python would take the exception for its own failure.
-
-    A second Ctrl-C breaks off a step that does not end.
-    """
-
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        if march.stopped:
-            raise KeyboardInterrupt
-        march.stopped = True
-
-    ours = (
-        threading.current_thread() is threading.main_thread()
-        and os_signal.getsignal(os_signal.SIGINT) is os_signal.default_int_handler
-    )
-    if ours:
-        os_signal.signal(os_signal.SIGINT, stop)
-    try:
-        yield
-    except KeyboardInterrupt:
-        march.stopped = True
-    finally:
-        if ours:
-            os_signal.signal(os_signal.SIGINT, os_signal.default_int_handler)

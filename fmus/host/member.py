@@ -23,13 +23,14 @@ class Layout:
     """What a member sets and reads, in the order of its arrays.
 
     inputs: those connected, then those of `signals`. outputs: the first `early` ones are read right after
-    a step, the rest once the inputs at the new time are set.
+    a step, the rest once the inputs at the new time are set. delayed: some are sources of delayed links.
     """
 
     inputs: Sequence[str]
     signals: Sequence[Signal]
     outputs: Sequence[str]
     early: int
+    delayed: bool
 
 
 class Member:
@@ -44,7 +45,9 @@ class Member:
         self._all, self._pull = self._instance.puller(references)
         self._step = self._instance.stepper()
         self.wires: list[tuple[Samples, list[Wire]]] = []  # by source
-        self.settled, self.raw = Samples(), Samples()  # with the inputs of their time, and of the step before
+        self.settled = Samples()  # by the inputs of their time
+        self.raw = Samples() if layout.delayed else self.settled  # by those of the step that led there
+        self._samples = (self.settled,) if self.raw is self.settled else (self.settled, self.raw)
         self.time, self._row = 0.0, 0
         self._given: Array = np.empty((0, len(layout.signals)))
 
@@ -60,24 +63,28 @@ class Member:
     def leave(self) -> None:
         """End initialisation; what is known then are the first values."""
         self._safely(self._instance.leave)
-        self._know(self.look())
+        self.hear()
 
     def hear(self) -> None:
         """In initialisation: the outputs before any input came from another member are the first values."""
-        self._know(self.read())
+        values = self.read()
+        for samples in self._samples:
+            samples.start(values)
 
-    def _know(self, values: Values) -> None:
-        self.raw.start(values)
-        self.settled.start(values)
+    @property
+    def inputs(self) -> Values:
+        """The inputs as they were set last."""
+        values: Values = self._u[:]
+        return values
 
-    def feed(self, t: float, end: float, ahead: int | None = None) -> Values:
-        """Set the inputs for a time t in a step until `end`, s; returns them.
+    def feed(self, t: float, end: float, ahead: int | None = None) -> None:
+        """Set the inputs for a time t in a step until `end`, s.
 
         ahead: half steps from the begin of its step to t where t is one of the times it was begun with.
         """
         u = self._u
         if not len(u):
-            return []
+            return
         for samples, wires in self.wires:
             a, b, w = self._line(samples, t, end)
             if w:
@@ -98,8 +105,6 @@ class Member:
         status = self._push()
         if status > WARNING:
             raise self._error("setting inputs", status)
-        values: Values = u[:]
-        return values
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt, s; StepRefused where a shorter step may do."""
@@ -133,27 +138,27 @@ class Member:
     def lead(self) -> None:
         """Take the outputs after a step as those ahead of the others."""
         values = self.look()
-        self.raw.lead(values, self.time)
-        self.settled.lead(values, self.time)
+        for samples in self._samples:
+            samples.lead(values, self.time)
 
     def arrive(self, t: float, stepped: bool) -> None:
         """All have come to t, s. stepped: to the end of a step as planned."""
         self.time = t
         self._row += 2 * stepped
-        self.raw.arrive(t)
-        self.settled.arrive(t)
+        for samples in self._samples:
+            samples.arrive(t)
 
     def jump(self) -> None:
         """Something changed at once."""
-        self.raw.jump()
-        self.settled.jump()
+        for samples in self._samples:
+            samples.jump()
 
     def change(self, values: Mapping[str, float]) -> None:
         """Set tunable parameters and look at what that changed."""
         self._safely(self._instance.set, self._fmu.references(values), list(values.values()))
-        seen = self.look()
-        self.raw.settle(seen)
-        self.settled.settle(seen)
+        seen = self.read()
+        for samples in self._samples:
+            samples.settle(seen)
 
     @property
     def dead(self) -> bool:
@@ -163,18 +168,22 @@ class Member:
     def save(self) -> tuple[Any, ...]:
         """All that `restore` needs to go back to now."""
         state = self._safely(self._instance.state)
-        return state, self.time, self._row, Samples().assign(self.raw), Samples().assign(self.settled)
+        return state, self.time, self._row, [Samples().assign(samples) for samples in self._samples]
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to when it was saved."""
-        state, self.time, self._row, raw, settled = saved
+        state, self.time, self._row, kept = saved
         self._safely(self._instance.restore, state)
-        self.raw.assign(raw)
-        self.settled.assign(settled)
+        for samples, known in zip(self._samples, kept, strict=True):
+            samples.assign(known)
 
     def forget(self, saved: tuple[Any, ...]) -> None:
         """Free what was saved."""
         self._safely(self._instance.forget, saved[0])
+
+    def hand_back(self) -> None:
+        """Tell the time to whoever gave the FMU."""
+        self._fmu.time = self.time
 
     def _safely(self, call: Any, *args: Any) -> Any:
         try:

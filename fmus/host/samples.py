@@ -11,7 +11,8 @@ Extrapolation = Callable[["Samples", float, float], Line]
 class Samples:
     """Values at the time before, now and, once the FMU has stepped on while others have not, ahead.
 
-    The lists are replaced, never changed, so that a copy of this object keeps them.
+    What is not known yet at a time stays as it was. The lists are replaced, never changed, so that a copy
+    of this object keeps them.
     """
 
     __slots__ = ("ahead", "before", "now", "t_ahead", "t_before", "t_now")
@@ -28,7 +29,7 @@ class Samples:
 
     def lead(self, values: Values, t: float) -> None:
         """The FMU has stepped on to t, s."""
-        self.ahead, self.t_ahead = values, t
+        self.ahead, self.t_ahead = values + self.now[len(values) :], t
 
     def arrive(self, t: float) -> None:
         """The others have come to t, s, too."""

@@ -48,8 +48,8 @@ class Wiring:
 
     def _layout(self, name: str, signals: Mapping[Address, Signal]) -> Layout:
         used = [link.source for link in self._links if link.source.fmu == name]
-        early = [link.source for link in self._links if link.delayed and link.source.fmu == name]
-        early += [a for a in used if a not in self._late]
+        delayed = [link.source for link in self._links if link.delayed and link.source.fmu == name]
+        early = delayed + [a for a in used if a not in self._late]
         recorded = [a for a in self._record if a.fmu == name]
         if not any(a.fmu == name for a in self._late):
             early += recorded
@@ -62,6 +62,7 @@ class Wiring:
             signals=list(given.values()),
             outputs=[a.variable for a in outputs],
             early=len(early),
+            delayed=bool(delayed),
         )
 
     def _wanted(self) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
