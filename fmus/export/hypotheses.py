@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 
 from fmus.effects import EFFECTS, offers
@@ -15,6 +16,7 @@ from fmus.model import Model
 from fmus.models import model_class
 
 Effects = tuple[tuple[str, str], ...]  # (kind, location)
+LONGEST = 100  # characters of a folder's name, well below what file systems take
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,10 @@ class ForeignBuilder:
 
 
 def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:
-    target = folder / "+".join(["base", *(f"{k}@{at}" for k, at in effects)]) / "model.fmu"
+    name = "+".join(["base", *(f"{k}@{at}" for k, at in effects)])
+    if len(name) > LONGEST:
+        name = f"{len(effects)}_effects_{sha256(name.encode()).hexdigest()[:16]}"
+    target = folder / name / "model.fmu"
     if not target.exists():
         part = target.with_name(f"{os.getpid()}.fmu")
         build(part)
