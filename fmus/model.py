@@ -8,7 +8,7 @@ come every FMU, the model description, the parameter tables and the Jacobians.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -134,14 +134,15 @@ def _compiled(name: str, model: Model, symbols: list[Expr], expression: Expr, re
     given = [cs.MX.sym(n, s.shape) for n, s in zip(names, symbols, strict=True)]
     known = list(zip(symbols, given, strict=True))
 
-    def worked_out(part: Expr) -> Expr:
-        needed = [(s, m) for s, m in known if cs.depends_on(part, s)]
-        return cs.Function("part", [s for s, _ in needed], [cs.cse(part)])(*(m for _, m in needed))
+    def worked_out(parts: Sequence[Expr]) -> list[Expr]:
+        needed = [(s, m) for s, m in known if cs.depends_on(cs.vertcat(*parts), s)]
+        inner = cs.Function("part", [s for s, _ in needed], cs.cse(list(parts)))
+        return list(inner.call([m for _, m in needed]))
 
     for call in model.calls:
-        results = call.function.call([worked_out(a) for a in call.arguments])
+        results = call.function.call(worked_out(call.arguments))
         known += zip(call.results, results, strict=True)
-    return cs.Function(name, given, [worked_out(expression)], names, [result])
+    return cs.Function(name, given, worked_out([expression]), names, [result])
 
 
 def _complete(model: Model, what: str, given: dict[str, Expr], names: list[str]) -> dict[str, Expr]:

@@ -74,15 +74,42 @@ def coefficients(a_over_b: Expr, nu: Expr) -> Kalker:
     )
 
 
+@cache
+def looked_up() -> cs.Function:
+    """The same as a function (a/b, nu) -> (c11, c22, c23, c33), several times cheaper.
+
+    It looks the rows up where `coefficients`, an expression of scalars, must work all of them out.
+    """
+    a_over_b, nu = cs.SX.sym("a_over_b"), cs.SX.sym("nu")
+    columns = cs.SX.sym("columns", _table().shape[1])
+    beyond = cs.Function("beyond", [a_over_b, nu], list(coefficients(a_over_b, nu)))
+    to_place = cs.Function("place", [a_over_b], [_place(a_over_b)])
+    over_nu = cs.Function("over_nu", [columns, nu], _over_nu(cs.vertsplit(columns), nu))
+    rows = cs.interpolant("rows", "linear", [list(PLACES)], _table().ravel())
+    r, n = cs.MX.sym("a_over_b"), cs.MX.sym("nu")
+    within = cs.Function("within", [r, n], over_nu.call([rows(to_place(r)), n]))
+    choice = cs.Function.conditional("kalker", [within], beyond)
+    slender = cs.fmax(cs.fmin(r, 1 / r) < SLENDER, 0)
+    return cs.Function("kalker", [r, n], choice.call([slender, r, n]), ["a_over_b", "nu"], Kalker._fields)
+
+
+def _place(a_over_b: Expr) -> Expr:
+    """Where in the table's rows a ratio lies, at most at its ends."""
+    place = cs.if_else(a_over_b <= 1, a_over_b, 2 - 1 / a_over_b)
+    return cs.fmin(cs.fmax(place, PLACES[0]), PLACES[-1])
+
+
 def _between_rows(a_over_b: Expr, nu: Expr) -> list[Expr]:
     """The four coefficients in the table, beyond its end its outer rows."""
-    table = _table()
-    place = cs.if_else(a_over_b <= 1, a_over_b, 2 - 1 / a_over_b)
-    place = cs.fmin(cs.fmax(place, PLACES[0]), PLACES[-1])
+    table, place = _table(), _place(a_over_b)
     # a broken line is a sum of ramps, one from each row on; all columns share them
     ramps = cs.vertcat(*(cs.fmax(place - row, 0) for row in PLACES[:-1]))
     bends = np.diff(np.diff(table, axis=0) / np.diff(PLACES)[:, None], axis=0, prepend=0.0)
-    columns = [table[0, j] + cs.dot(bends[:, j], ramps) for j in range(table.shape[1])]
+    return _over_nu([table[0, j] + cs.dot(bends[:, j], ramps) for j in range(table.shape[1])], nu)
+
+
+def _over_nu(columns: list[Expr], nu: Expr) -> list[Expr]:
+    """The coefficients by the parabola through 1/c at the table's Poisson's ratios."""
     t = nu / NU[1]
     found = []
     for low, middle, high in zip(*(columns[j::3] for j in range(3)), strict=True):

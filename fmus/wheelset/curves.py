@@ -1,0 +1,85 @@
+"""The contact of one wheel over its shift towards the flange, as one CasADi function.
+
+Both sides of a track with like rails use the same curves: the left wheel at the wheelset's shift, the
+right one at the shift with its sign turned.
+"""
+
+from dataclasses import asdict, dataclass
+from functools import cache
+
+import casadi as cs
+import numpy as np
+
+from fmus.contact.arguments import Array
+from fmus.contact.normal import hertz, virtual_penetration
+from fmus.contact.table import SEARCHES, contact_table
+
+G, NU, LOAD = 8e10, 0.28, 55e3  # Pa, 1, N: the patches are tabulated for these and scale from here
+E = 2 * G * (1 + NU)
+SPACING = 5e-5  # m between tabulated shifts
+CUBIC = 3
+FIELDS = ("growth", "delta", "lift", "a_hertz", "b_hertz", "a_virtual", "b_virtual", "lift_slope")
+
+
+@dataclass(frozen=True)
+class Track:
+    """Wheel and rail profiles, by name or point file, and how they stand; see contact_table. SI."""
+
+    wheel: str = "S1002"
+    rail: str = "60E1"
+    cant: float = 1 / 40
+    gauge: float = 1.435
+    back_to_back: float = 1.36
+    r0: float = 0.46
+
+    @property
+    def half_distance(self) -> float:
+        """Half the distance of the tape circles, m."""
+        return self.back_to_back / 2 + 0.07
+
+
+@cache
+def contact_curves(track: Track) -> cs.Function:
+    """Function (contact_search, shift of a wheel towards its flange, m) -> column of FIELDS.
+
+    growth: rolling radius less the nominal one, m; delta: contact angle, rad; lift: height, m, by which
+    the wheel carries its side, and lift_slope its derivative; a, b: semi-axes, m, by Hertz and by virtual
+    penetration, for LOAD, G and NU. Cubic B-splines with the tabulated values as coefficients: twice
+    continuously differentiable, and without overshoot where a rigid contact jumps. Beyond the table the
+    last contact holds.
+    """
+    curves = [_curves(track, search) for search in SEARCHES]
+    return cs.Function.conditional("contact", curves[:-1], curves[-1])
+
+
+def _curves(track: Track, search: str) -> cs.Function:
+    shifts, values = _tabulated(track, search)
+    # one row more at each end, so that the outermost shifts too have their full share of the basis
+    rows = np.vstack([values[0], values, values[-1]])
+    knots = shifts[0] + SPACING * np.arange(-3, len(shifts) + 3)
+    q = cs.MX.sym("q")
+    inside = cs.fmin(cs.fmax(q, shifts[0]), shifts[-1])
+    spline = cs.bspline(inside, cs.DM(rows.ravel()), [list(knots)], [CUBIC], rows.shape[1], {})
+    slope = cs.jacobian(spline[FIELDS.index("lift")], q)
+    return cs.Function(search, [q], [cs.vertcat(spline, slope)], ["shift"], ["contact"])
+
+
+def _tabulated(track: Track, search: str) -> tuple[Array, Array]:
+    """Shifts (n,), m, and FIELDS without the slope there (n, 7), of the left wheel."""
+    where = {**asdict(track), "N": LOAD, "search": search, "E": E, "nu": NU}
+    reach = contact_table(**where).index[-1]
+    steps = int(reach / SPACING)
+    shifts = SPACING * np.arange(-steps, steps + 1)
+    table = contact_table(**where, shifts=shifts)
+    A, B = table["A_left"].to_numpy(), table["B_left"].to_numpy()
+    virtual = virtual_penetration(A, B, hertz(A, B, LOAD, E, NU)[2])
+    columns = (
+        table["r_left"] - track.r0,
+        table["delta_left"],
+        table["z"] + track.half_distance * table["phi"],
+        table["a_left"],
+        table["b_left"],
+        *virtual,
+    )
+    values: Array = np.column_stack([np.asarray(c, dtype=float) for c in columns])
+    return np.asarray(shifts, dtype=float), values

@@ -1,0 +1,244 @@
+"""Plan-view wheelset with a laterally suspended mass, on straight track (thesis 3.5.1).
+
+Equations, symbols and range of validity: README.md beside this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as cs
+
+from fmus.contact.coefficients import looked_up
+from fmus.contact.friction import friction_coefficient
+from fmus.contact.laws import selected_law
+from fmus.contact.table import FLANGE_ANGLE
+from fmus.effects.effect import Effect
+from fmus.model import Model
+from fmus.port import Port
+from fmus.variables import Expr, Input, Output, Parameter, State, rate
+from fmus.wheelset.curves import FIELDS, LOAD, NU, G, Track, contact_curves
+
+TABLE = "thesis Table 3.4"
+DRY = "thesis Table 4.1, dry"
+CHOICE = "this model"
+V_MIN = 0.1  # m/s, below which creepages are those at this speed
+SIDES = {"left": 1.0, "right": -1.0}  # sign of y
+
+
+class Wheel(NamedTuple):
+    """What acts on one wheel, and its motion over the rail; creep forces in the contact's own axes."""
+
+    F_x: Expr
+    F_y: Expr
+    M_z: Expr
+    xi_x: Expr
+    xi_y: Expr
+    xi_s: Expr
+    r: Expr
+    delta: Expr
+    a: Expr
+    b: Expr
+
+
+class Wheelset(Model):
+    """Plan-view wheelset with a laterally suspended mass: lateral and yaw motion on straight track."""
+
+    name = "Wheelset"
+    step_size = 1e-3
+
+    y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)
+    psi = State("rad", doc="yaw of the wheelset", nominal=1e-3)
+    y_dot = State("m/s", doc="lateral velocity of the wheelset", nominal=0.02)
+    psi_dot = State("rad/s", doc="yaw rate of the wheelset", nominal=0.02)
+    y_m = State("m", doc="lateral displacement of the suspended mass", nominal=1e-3)
+    y_m_dot = State("m/s", doc="lateral velocity of the suspended mass", nominal=0.02)
+
+    y_irr = Input("m", doc="lateral alignment of the track, mean of both rails", nominal=1e-3)
+    y_irr_dot = Input("m/s", doc="rate of the alignment along the run", nominal=0.02)
+    gauge_irr = Input("m", doc="gauge widening", nominal=1e-3)
+    V = Input("m/s", 40.0, min=0.0, doc="speed of travel", nominal=1.0)
+    F_y_ext = Input("N", doc="port: lateral force on the wheelset", nominal=1e3)
+    M_z_ext = Input("N.m", doc="port: yaw moment on the wheelset", nominal=1e3)
+    F_ym_ext = Input("N", doc="port: lateral force on the suspended mass", nominal=1e3)
+
+    r0 = Parameter("m", 0.46, min=0.05, doc="nominal rolling radius", source=TABLE)
+    s = Parameter("m", 0.75, min=0.05, doc="half the distance of the tape circles", source=TABLE)
+    F_n = Parameter("N", 55e3, min=1.0, doc="wheel load", source=TABLE)
+    d = Parameter("m", 1.0, min=0.0, doc="half the distance of the suspension's centres", source=TABLE)
+    m_w = Parameter("kg", 1813.0, min=1.0, doc="mass of the wheelset", source=TABLE)
+    m_m = Parameter("kg", 6241.0, min=1.0, doc="suspended mass", source=TABLE)
+    I_wy = Parameter("kg.m2", 112.0, min=0.0, doc="rolling inertia of the wheelset", source=TABLE)
+    I_wz = Parameter("kg.m2", 1120.0, min=1.0, doc="yaw inertia of the wheelset", source=TABLE)
+    G = Parameter("Pa", G, min=1e6, doc="shear modulus of wheel and rail", source=TABLE)
+    nu = Parameter("1", NU, min=0.0, max=0.5, doc="Poisson's ratio of wheel and rail", source="Kalker 1990")
+    k_y = Parameter("N/m", 2e6, min=0.0, doc="lateral stiffness of the primary suspension", source=TABLE)
+    k_x = Parameter("N/m", 4e6, min=0.0, doc="longitudinal stiffness of the suspension", source=TABLE)
+    b_y = Parameter("N.s/m", 1e3, min=0.0, doc="lateral damping of the suspension", source=TABLE)
+    b_x = Parameter("N.s/m", 1e3, min=0.0, doc="longitudinal damping of the suspension", source=TABLE)
+    mu0 = Parameter("1", 0.5, min=1e-4, max=2.0, doc="friction coefficient at no slip", source=DRY)
+    A = Parameter("1", 0.4, min=0.0, max=1.0, doc="limit over maximum friction", source=DRY)
+    B = Parameter("s/m", 0.6, min=0.0, doc="decrease of friction with slip velocity", source=DRY)
+    k_A = Parameter("1", 1.0, min=0.0, doc="Polach factor in the area of adhesion", source=DRY)
+    k_S = Parameter("1", 0.4, min=0.0, doc="Polach factor in the area of slip", source=DRY)
+    f11 = Parameter("N", min=0.0, doc="longitudinal creep coefficient, 0: Kalker's", source=CHOICE)
+    f22 = Parameter("N", min=0.0, doc="lateral creep coefficient, 0: Kalker's", source=CHOICE)
+    f23 = Parameter("N.m", min=0.0, doc="lateral creep coefficient of spin, 0: Kalker's", source=CHOICE)
+    f33 = Parameter("N.m2", min=0.0, doc="moment creep coefficient of spin, 0: Kalker's", source=CHOICE)
+    creep_law = Parameter(
+        "1", 4.0, min=0.0, max=4.0, fixed=True, source=CHOICE,
+        doc="0 linear, 1 Shen, 2 FASTSIM, 3 Polach without spin, 4 Polach",
+    )  # fmt: skip
+    contact_search = Parameter(
+        "1", 1.0, min=0.0, max=1.0, doc="0 rigid, 1 quasi-elastic", source=CHOICE, fixed=True
+    )
+    patch = Parameter(
+        "1", 0.0, min=0.0, max=1.0, doc="0 Hertz, 1 virtual penetration", source=CHOICE, fixed=True
+    )
+
+    y_ddot = rate(y_dot, "m/s2", "lateral acceleration of the wheelset")
+    psi_ddot = rate(psi_dot, "rad/s2", "yaw acceleration of the wheelset")
+    y_m_ddot = rate(y_m_dot, "m/s2", "lateral acceleration of the suspended mass")
+    # vars() of a class body is its namespace: what both wheels have is written once
+    vars().update(
+        {
+            f"{name}_{side}": Output(unit, doc=f"{what} of the {side} wheel", nominal=nominal)
+            for side in SIDES
+            for name, unit, what, nominal in (
+                ("F_x", "N", "longitudinal creep force", 1e3),
+                ("F_y", "N", "lateral creep force", 1e3),
+                ("M_z", "N.m", "spin moment", 10.0),
+                ("xi_x", "1", "longitudinal creepage", 1e-3),
+                ("xi_y", "1", "lateral creepage", 1e-3),
+                ("xi_s", "1/m", "spin creepage", 0.1),
+                ("r", "m", "rolling radius", 1.0),
+                ("delta", "rad", "contact angle", 0.1),
+                ("a", "m", "semi-axis of the contact along rolling", 1e-2),
+                ("b", "m", "semi-axis of the contact across rolling", 1e-2),
+            )
+        }
+    )
+    phi = Output("rad", doc="roll of the wheelset", nominal=1e-4)
+    flange_contact = Output("1", doc="1 where a flange touches: beyond it the model is not valid")
+
+    def __init__(
+        self,
+        effects: Iterable[tuple[type[Effect], str]] = (),
+        probes: bool = False,
+        track: Track = Track(),  # noqa: B008  frozen
+    ) -> None:
+        """effects, probes: see Model; track: the profiles and how they stand."""
+        self.track = track
+        super().__init__(effects, probes)
+
+    def derivatives(m) -> dict[str, Expr]:
+        """See Model.derivatives."""
+        F_y, M_z = m._contact_forces()
+        F_Sy = -2 * m.k_y * (m.y - m.y_m) - 2 * m.b_y * (m.y_dot - m.y_m_dot)
+        M_Sz = -2 * m.d**2 * (m.k_x * m.psi + m.b_x * m.psi_dot)
+        Omega = m.V / m.r0
+        return {
+            "y": m.y_dot,
+            "psi": m.psi_dot,
+            "y_dot": (F_y + F_Sy + m.F_y_ext) / m.m_w,
+            "psi_dot": (M_z + M_Sz - m.I_wy * Omega * m._roll[1] + m.M_z_ext) / m.I_wz,
+            "y_m": m.y_m_dot,
+            "y_m_dot": (-F_Sy + m.F_ym_ext) / m.m_m,
+        }
+
+    def outputs(m) -> dict[str, Expr]:
+        """See Model.outputs."""
+        found = {
+            f"{name}_{side}": value
+            for side, wheel in m._wheels.items()
+            for name, value in wheel._asdict().items()
+        }
+        steepest = cs.fmax(*(wheel.delta for wheel in m._wheels.values()))
+        return {**found, "phi": m._roll[0], "flange_contact": steepest > FLANGE_ANGLE}
+
+    def ports(m) -> dict[str, Port]:
+        """Wheelset and suspended mass on their coordinates, the suspension between them, the contact."""
+        return {
+            "wheelset_lateral": Port(m.y, m.y_dot, {"F_y_ext": 1.0}),
+            "wheelset_yaw": Port(m.psi, m.psi_dot, {"M_z_ext": 1.0}, "rotation"),
+            "primary_lateral": Port(m.y - m.y_m, m.y_dot - m.y_m_dot, {"F_y_ext": 1.0, "F_ym_ext": -1.0}),
+            "primary_yaw": Port(m.psi, m.psi_dot, {"M_z_ext": 1.0}, "rotation"),
+            "suspended_mass": Port(m.y_m, m.y_m_dot, {"F_ym_ext": 1.0}),
+            "contact": Port(m.y - m.y_irr, m.y_dot - m.y_irr_dot, {"F_y_ext": 1.0}),
+        }
+
+    @cached_property
+    def _shifts(m) -> dict[str, Expr]:
+        """Shift of each wheel towards its flange."""
+        return {side: sign * (m.y - m.y_irr) - m.gauge_irr / 2 for side, sign in SIDES.items()}
+
+    @cached_property
+    def _curves(m) -> dict[str, dict[str, Expr]]:
+        """Contact of each wheel, by the fields of the curves."""
+        curves = contact_curves(m.track)
+        found = {}
+        for side, shift in m._shifts.items():
+            (contact,) = m.call(curves, m.contact_search, shift)
+            found[side] = dict(zip(FIELDS, cs.vertsplit(contact), strict=True))
+        return found
+
+    @cached_property
+    def _roll(m) -> tuple[Expr, Expr]:
+        """Roll of the wheelset and its rate: both wheels carry their sides over the tape distance."""
+        base = 2 * m.track.half_distance
+        left, right = m._curves["left"], m._curves["right"]
+        rate_of_shift = m.y_dot - m.y_irr_dot
+        phi = (left["lift"] - right["lift"]) / base
+        return phi, (left["lift_slope"] + right["lift_slope"]) * rate_of_shift / base
+
+    @cached_property
+    def _wheels(m) -> dict[str, Wheel]:
+        return {side: m._wheel(side, sign) for side, sign in SIDES.items()}
+
+    def _wheel(m, side: str, sign: float) -> Wheel:
+        """Creepages (eq. 3.100, 3.101, with spin over V once) and creep forces of one wheel."""
+        at = m._curves[side]
+        phi_dot = m._roll[1]
+        r, delta = m.r0 + at["growth"], at["delta"]
+        V = cs.fmax(m.V, V_MIN)
+        xi_x = 1 - r / m.r0 - sign * m.s * m.psi_dot / V
+        xi_y = (m.y_dot + r * phi_dot) / V - m.psi
+        xi_s = m.psi_dot / V - sign * delta / m.r0
+        # a patch grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu)
+        scale = (m.F_n / LOAD * (G / (1 - NU)) / (m.G / (1 - m.nu))) ** (1 / 3)
+        virtual = m.patch > 0.5
+        a, b = (scale * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"]) for x in ("a", "b"))
+        mu = friction_coefficient(m.V * cs.sqrt(xi_x**2 + xi_y**2), m.mu0, m.A, m.B)
+        c11, c22, c23, c33 = m._coefficients(a, b)
+        F_x, F_y, M_z = m.call(
+            selected_law(),
+            m.creep_law, a, b, m.F_n, mu, m.G, c11, c22, c23, c33, xi_x, xi_y, xi_s, m.k_A, m.k_S,
+        )  # fmt: skip
+        return Wheel(F_x, F_y, M_z, xi_x, xi_y, xi_s, r, delta, a, b)
+
+    def _coefficients(m, a: Expr, b: Expr) -> list[Expr]:
+        """Kalker's coefficients, or for the linear law those that are given."""
+        kalker = m.call(looked_up(), a / b, m.nu)
+        area = m.G * a * b
+        given = (m.f11 / area, m.f22 / area, m.f23 / area**1.5 * m.G**0.5, m.f33 / area**2 * m.G)
+        linear = m.creep_law < 0.5
+        return [
+            cs.if_else(cs.logic_and(linear, own > 0), own, table)
+            for own, table in zip(given, kalker, strict=True)
+        ]
+
+    def _contact_forces(m) -> tuple[Expr, Expr]:
+        """Lateral force and yaw moment of both contacts (eq. 3.93 to 3.96, 3.102, 3.103)."""
+        phi, F, M = m._roll[0], 0.0, 0.0
+        for side, sign in SIDES.items():
+            w = m._wheels[side]
+            slope = w.delta + sign * phi  # of the contact plane over the track
+            across = w.F_y * cs.cos(slope)
+            F_x = w.F_x - across * m.psi
+            F_y = w.F_x * m.psi + across - sign * m.F_n * cs.sin(slope)
+            R_x, R_y = -(sign * m.s + w.r * phi) * m.psi, sign * m.s + w.r * phi
+            F += F_y
+            M += R_x * F_y - R_y * F_x + w.M_z * cs.cos(slope)
+        return F, M
