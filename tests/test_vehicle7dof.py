@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import least_squares
 from scipy.signal import cont2discrete
 
@@ -19,7 +19,7 @@ from fmus.model import equations
 from fmus.variables import Input, Output, Parameter, State
 from fmus.vehicle7dof.model import CORNERS, FORCES, Vehicle7dof
 from tests.everything import start, values
-from tests.truth.vehicle import NOISE, Vehicle, run_over, simulate, single, spectrum_rails
+from tests.truth.vehicle import NOISE, Vehicle, matrices, run_over, simulate, single, spectrum_rails
 
 MODEL = Vehicle7dof()
 MADE = equations(MODEL)
@@ -108,6 +108,27 @@ def test_modes_with_two_springs_on_each_bogie_side():
 def test_modes_with_one_spring_on_each_bogie_side():
     frequency, _ = modes(n_primary=1.0)
     assert_allclose(frequency, [0.7547, 1.0054, 1.2189, 5.6350, 5.6422, 6.9527, 6.9672], rtol=1e-4)
+
+
+sizes = st.fixed_dictionaries(
+    {f.name: st.floats(0.5, 2.0).map(lambda x, at=f.default: x * at) for f in fields(Vehicle)}
+)
+
+
+@given(sizes)
+def test_matrices_are_those_assembled_from_incidence_vectors(size):
+    A, B, *_ = system(**size)
+    m, u = matrices(Vehicle(**size)), len(CORNERS)
+    for found, expected in (
+        (A[7:, :7], -m.K),
+        (A[7:, 7:], -m.B),
+        (B[7:, :u], m.T_k),
+        (B[7:, u : 2 * u], m.T_b),
+        (B[7:, 2 * u :], np.eye(7)),
+    ):
+        assert_allclose(m.M @ found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    assert_array_equal(A[:7], np.eye(14)[7:])
+    assert not B[:7].any()
 
 
 @given(motions, rails)
