@@ -1,7 +1,8 @@
 """Dual filter: one filter for the states and one for the parameters, each trusting the other's mean.
 
 Wan and Nelson, in Haykin (ed.), Kalman Filtering and Neural Networks, 2001, ch. 5. Cheaper than a joint
-filter where there are many parameters, but blind to the correlation of states and parameters.
+filter where there are many parameters, but blind to the correlation of states and parameters: a parameter
+is learnt only from what it does within one step, so that states which it moves should be measured.
 """
 
 from dataclasses import replace

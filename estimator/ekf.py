@@ -9,6 +9,8 @@ from estimator.estimate import Adaptation, Covariance, Estimate, Filter, Gate, S
 from estimator.linear import central, slopes
 from estimator.record import Array, BoolArray
 
+LEAST = 1e-3  # of a value
+
 
 @runtime_checkable
 class Differentiable(Protocol):
@@ -36,7 +38,6 @@ class Ekf(Filter):
     ) -> None:
         super().__init__(system, start, Q, R, dt, gate, adapt)
         self._own = system if isinstance(system, Differentiable) else None
-        self._scale = np.sqrt(np.diag(start.P))  # differences stay small against what is believed at first
         self._H = np.empty((len(self.R), len(start.x)))
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
@@ -45,7 +46,7 @@ class Ekf(Filter):
             moved, carried = self.system.f(now.x[None], u, t, dt, now.carried)
             F = self._own.dfdx(now.x, u, t, dt, now.carried)
         else:
-            points, away = central(now.x, self._scale)
+            points, away = central(now.x, _scale(now.x, now.P))
             moved, carried = self.system.f(points, u, t, dt, now.carried)
             F = slopes(moved, away)
         C = now.P @ F.T
@@ -55,7 +56,7 @@ class Ekf(Filter):
         if self._own:
             seen, self._H = self.system.h(x[None], u, t, carried), self._own.dhdx(x, u, t, carried)
         else:
-            points, away = central(x, self._scale)
+            points, away = central(x, _scale(x, P))
             seen = self.system.h(points, u, t, carried)
             self._H = slopes(seen, away)
         return seen[0], symmetric(self._H @ P @ self._H.T)
@@ -65,3 +66,8 @@ class Ekf(Filter):
     ) -> tuple[Array, Array]:
         found: tuple[Array, Array] = joseph(x, P, np.ascontiguousarray(self._H[used]), innovation, R)
         return found
+
+
+def _scale(x: Array, P: Array) -> Array:
+    """What differences are small against: what is believed of x, and not less than rounding allows."""
+    return np.maximum(np.sqrt(np.diag(P)), LEAST * np.abs(x))

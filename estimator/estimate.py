@@ -240,17 +240,16 @@ def checked(x: Array, P: Array, names: Sequence[str], t: float) -> Array:
         factor: Array = cholesky(P)
     except np.linalg.LinAlgError:
         return _semidefinite_factor(P, names, t)
-    return factor
+    return factor if factor[-1, -1] > 0 else _semidefinite_factor(P, names, t)  # nan spreads to there
 
 
 def _semidefinite_factor(P: Array, names: Sequence[str], t: float) -> Array:
     spread = np.diag(P)
-    bad = ~(np.isfinite(spread) & (spread > 0))
+    bad = ~(np.isfinite(P).all(axis=1) & (spread > 0))
     if bad.any():
         i = int(np.argmax(bad))
-        raise Diverged(
-            f"at t = {t:g} s the variance of '{names[i]}' is {spread[i]:.3g}; the covariance broke"
-        )
+        what = f"is {spread[i]:.3g}" if not spread[i] > 0 else "goes with one that is not finite"
+        raise Diverged(f"at t = {t:g} s the variance of '{names[i]}' {what}; the covariance broke")
     size = np.sqrt(spread)
     values, vectors = np.linalg.eigh(P / np.outer(size, size))
     if values[0] < -ROUNDING:

@@ -7,7 +7,7 @@ import numpy as np
 from estimator.estimate import NONE, System
 from estimator.record import Array
 
-NUDGE = 1e-4  # of a state's scale, for differences
+NUDGE = 1e-3  # of a state's scale, for differences
 
 
 @dataclass(frozen=True)

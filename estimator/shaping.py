@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from estimator.record import Array
 
+LONG = 0.3  # of a radian, a step from which on differences of variances keep their digits
 DAMPING = sqrt(0.5)  # flat up to the frequency, falling beyond it
 
 
@@ -42,9 +43,7 @@ class Shaped:
 
     def discrete(self, dt: float) -> tuple[Array, Array]:
         """Transition (2, 2) over dt [s] and covariance (2, 2) of what comes in, both exact."""
-        omega = 2 * pi * self.frequency
-        A = np.array([[0.0, 1.0], [-(omega**2), -2 * self.damping * omega]])
-        return _sampled(A.tobytes(), 4 * self.damping * omega**3 * self.std**2, dt)
+        return _sampled(2 * pi * self.frequency, self.damping, self.std, dt)
 
 
 @dataclass(frozen=True)
@@ -79,11 +78,18 @@ UnknownInput = Shaped | Wandering
 
 
 @lru_cache(maxsize=256)
-def _sampled(matrix: bytes, intensity: float, dt: float) -> tuple[Array, Array]:
-    """Van Loan's method, IEEE Trans. Autom. Control 23 (1978) 395, for noise on the last state."""
-    A = np.frombuffer(matrix).reshape(2, 2)
-    noise = np.array([[0.0, 0.0], [0.0, intensity]])
-    both = expm(np.block([[-A, noise], [np.zeros((2, 2)), A.T]]) * dt)
+def _sampled(omega: float, damping: float, std: float, dt: float) -> tuple[Array, Array]:
+    """Short steps by Van Loan's method, IEEE Trans. Autom. Control 23 (1978) 395.
+
+    Over long ones its exponential overflows; there the variance of the stationary process says what is lost.
+    """
+    A = np.array([[0.0, 1.0], [-(omega**2), -2 * damping * omega]])
+    if omega * dt * max(1.0, damping) > LONG:
+        F = np.asarray(expm(A * dt), dtype=np.float64)
+        P = std**2 * np.diag([1.0, omega**2])
+        return F, P - F @ P @ F.T
+    noise = np.array([[0.0, 0.0], [0.0, 4 * damping * omega**3 * std**2]])
+    both = np.asarray(expm(np.block([[-A, noise], [np.zeros((2, 2)), A.T]]) * dt), dtype=np.float64)
     F = both[2:, 2:].T
     Q = F @ both[:2, 2:]
     return F, (Q + Q.T) / 2

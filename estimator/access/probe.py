@@ -21,6 +21,7 @@ NUDGE = 0.01  # of a value, or of its nominal, by which it is perturbed
 LATER = 7.25  # s, a time at which a model that does not look at the clock does the same
 RUN = 24  # steps before the second point
 ALIKE = 1.3  # costs closer than this are no reason to leave the plainer way
+ORDERS = ((1, 2, 1), (2, 1, 2), (0, 1, 1), (1, 0, 2))  # of the points: what stays behind from one shows
 TIMED = 5  # evaluations of which the fastest counts
 
 
@@ -74,6 +75,7 @@ def probe(
         trial = Trial(fmu, tuple(put), tuple(get), dict(constants), t0, dt)
         points, late = trial.points(dict(start), states)
         timeless = trial.ignores_time(points[1])
+        answers = [points if timeless else trial.again(points, k) for k in range(len(ORDERS))]
     refused: dict[Way, str] = {}
     honest: dict[Way, tuple[float, bool]] = {}
     for way in Way:
@@ -81,7 +83,7 @@ def probe(
             refused[way] = "it saves no state" if timeless else "its equations look at the clock"
             continue
         try:
-            honest[way] = _tried(archive, way, trial, points, compiled, d.once_per_process)
+            honest[way] = _tried(archive, way, trial, answers, compiled, d.once_per_process)
         except (FmuError, Dishonest) as error:
             refused[way] = str(error)
     if not honest:
@@ -90,6 +92,9 @@ def probe(
     way = next(w for w in Way if w in honest and honest[w][0] <= ALIKE * least)
     refused |= {w: f"no faster ({1e6 * c:.2g} µs)" for w, (c, _) in honest.items() if w is not way}
     return Access(way, honest[way][1], frozenset(late), refused, honest[way][0])
+
+
+Answers = Sequence[Sequence[Point]]  # at each of some times, those at each point
 
 
 class Dishonest(Exception):
@@ -147,6 +152,10 @@ class Trial:
         moved = self._perturbed(middle)
         return [first, second, self.answer(moved, later)], late
 
+    def again(self, points: Sequence[Point], steps: int) -> list[Point]:
+        """The answers at the same points some steps later."""
+        return [self.answer(p.values, self.t0 + (RUN + steps) * self.dt) for p in points]
+
     def ignores_time(self, point: Point) -> bool:
         """Whether a restart at another time gives the same bits."""
         other = self.answer(point.values, self.t0 + LATER)
@@ -167,7 +176,7 @@ def _gap(a: float, b: float) -> float:
 
 
 def _tried(
-    archive: Archive, way: Way, trial: Trial, points: Sequence[Point], compiled: bool, alone: bool
+    archive: Archive, way: Way, trial: Trial, answers: Answers, compiled: bool, alone: bool
 ) -> tuple[float, bool]:
     """Cost of a way [s a copy] and whether its time is free; Dishonest or FmuError where it is not honest."""
     for free in _times(way, alone):
@@ -175,12 +184,12 @@ def _tried(
             archive, way, trial.put, trial.get, trial.constants, trial.t0, free_time=free, compiled=compiled
         ) as copies:
             try:
-                _compare(copies, trial, points)
+                _compare(copies, trial, answers)
             except (Refused, Dishonest):
                 if free and way is Way.SET and not alone:
                     continue
                 raise
-            return _cost(copies, trial, points), free
+            return _cost(copies, trial, answers[0]), free
     raise Dishonest("it needs an instance each and allows one only")
 
 
@@ -192,18 +201,16 @@ def _times(way: Way, alone: bool) -> Iterator[bool]:
         yield False
 
 
-def _compare(copies: Copies, trial: Trial, points: Sequence[Point]) -> None:
-    """Step from each point and undo, in an order in which anything that stays behind shows."""
-    a, b, c = points
-    for order in ((b, c, b), (c, b, c), (a, b, b), (b, a, c)):
-        values = np.array([p.values for p in order])
-        t = trial.t0 + RUN * trial.dt
-        found = copies.evaluate(values, t), copies.advance(values, t, trial.dt)
-        for what, rows, expected in zip(
-            ("before", "after"), found, ([p.before for p in order], [p.after for p in order]), strict=True
-        ):
-            wrong = np.argwhere(rows != np.array(expected))
-            if len(wrong) and not np.isnan(np.array(expected)[tuple(wrong[0])]):
+def _compare(copies: Copies, trial: Trial, answers: Answers) -> None:
+    """Step after step from changing points, to the bit what restarts gave there."""
+    for k, (order, points) in enumerate(zip(ORDERS, answers, strict=True)):
+        values = np.array([points[i].values for i in order])
+        t = trial.t0 + (RUN + k) * trial.dt
+        found = {"before": copies.evaluate(values, t), "after": copies.advance(values, t, trial.dt)}
+        for what, rows in found.items():
+            expected = np.array([getattr(points[i], what) for i in order])
+            wrong = np.argwhere((rows != expected) & ~np.isnan(expected))
+            if len(wrong):
                 name = trial.get[int(wrong[0][1])]
                 raise Dishonest(f"'{name}' {what} a step is not what a restart gives")
 
@@ -211,7 +218,7 @@ def _compare(copies: Copies, trial: Trial, points: Sequence[Point]) -> None:
 def _cost(copies: Copies, trial: Trial, points: Sequence[Point]) -> float:
     """Seconds for one copy and step: the fastest of some trials at increasing times."""
     values = np.array([p.values for p in points])
-    t, times = trial.t0 + (RUN + 1) * trial.dt, []
+    t, times = trial.t0 + (RUN + len(ORDERS)) * trial.dt, []
     for _ in range(TIMED):
         begun = time.perf_counter()
         copies.advance(values, t, trial.dt)
