@@ -1,6 +1,7 @@
 """Effects in models: off at zero, at their places what the laws say, refused where senseless."""
 
 import sys
+from pathlib import Path
 
 import casadi as cs
 import numpy as np
@@ -288,3 +289,14 @@ def test_each_effect_says_where_it_comes_from_and_what_it_looks_like():
 
 def test_all_that_fits_is_offered():
     assert len(fitting("testrig")) == len(offers(MODELS["testrig"]()))
+
+
+def test_the_documentation_names_every_kind_with_its_parameters_and_source():
+    text = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    assert set(rows) == {*CONTRACT.split(), "sensor_bias", "sensor_gain", "sensor_delay", "sensor_drift"}
+    for kind, effect in EFFECTS.items():
+        law = effect.__doc__.strip().splitlines()[0].rstrip(".").replace("|", "\\|")
+        assert f"`{law}`" in rows[kind]
+        assert all(f"`{p.name}`" in rows[kind] for p in effect.parameters("translation"))
+        assert f"- `{kind}`: {effect.source}." in text

@@ -34,9 +34,9 @@ class InputDelay(InputEffect):
     T = Parameter("s", 0.1, min=0.02, doc="delay")
     u_0 = Parameter("{u}", doc="input before the start")
     x1 = State("{u}", doc="share of the input since the start, filtered", nominal=1.0)
-    x2 = State("{u}", doc="its derivative by t/T", nominal=1.0)
-    x3 = State("{u}", doc="its second derivative by t/T", nominal=1.0)
-    x4 = State("{u}", doc="its third derivative by t/T", nominal=1.0)
+    x2 = State("{u}", doc="its derivative by t/T", nominal=7 / 3)
+    x3 = State("{u}", doc="its second derivative by t/T", nominal=14.0)
+    x4 = State("{u}", doc="its third derivative by t/T", nominal=210.0)
 
     def passed(self, u: Expr) -> Expr:
         """See InputEffect.passed."""

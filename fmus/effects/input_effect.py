@@ -89,8 +89,14 @@ class InputEffect(Effect):
 
     @classmethod
     def _memory(cls, site: Site, place: str, suffix: str) -> dict[str, Expr]:
-        states = cls.states(site.variables[f"{place}{suffix}"].unit)
-        return {s.name: site.add(replace(s, name=cls.name_at(place, s.name + suffix))) for s in states}
+        u = site.variables[f"{place}{suffix}"]
+        size = u.nominal or 1.0
+        return {
+            s.name: site.add(
+                replace(s, name=cls.name_at(place, s.name + suffix), nominal=size * (s.nominal or 1.0))
+            )
+            for s in cls.states(u.unit)
+        }
 
     @classmethod
     def _go_on(cls, site: Site, place: str, suffix: str, rates: dict[str, Expr]) -> None:
