@@ -1,94 +1,35 @@
-"""The vehicle: modes, symmetry, energy, each corner by hand, and the independent truth."""
+"""The vehicle: modes, symmetry, energy, and each corner by hand."""
 
-import tomllib
 from dataclasses import fields
-from pathlib import Path
 
-import casadi as cs
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
-from scipy.optimize import least_squares
-from scipy.signal import cont2discrete
+from numpy.testing import assert_allclose
 
-from fmus.effects import EFFECTS
 from fmus.host.fmu import Fmu
-from fmus.model import equations
-from fmus.variables import Input, Output, Parameter, State
-from fmus.vehicle7dof.model import CORNERS, FORCES, Vehicle7dof
-from tests.everything import start, values
-from tests.truth.vehicle import NOISE, Vehicle, matrices, run_over, simulate, single, spectrum_rails
-
-MODEL = Vehicle7dof()
-MADE = equations(MODEL)
-STATES, INPUTS, PARAMETERS, OUTPUTS = (
-    [v.name for v in MODEL.of(k)] for k in (State, Input, Parameter, Output)
+from fmus.vehicle7dof.model import CORNERS, FORCES
+from tests.truth.vehicle import Vehicle
+from tests.vehicle_equations import (
+    BOGIE,
+    END,
+    INERTIA,
+    OUTPUTS,
+    SIDE,
+    STATES,
+    P,
+    accelerations,
+    each_corner,
+    forces,
+    healths,
+    modes,
+    motions,
+    outputs,
+    pushes,
+    rails,
+    settled,
 )
-P = dict(zip(PARAMETERS, start(MODEL, Parameter).tolist(), strict=True))
-INERTIA = dict(zip(FORCES, ("m1", "J_y1", "J_x1", "m2", "J_x2", "m2", "J_x2"), strict=True))
-VEHICLE_C = Path(__file__).parents[2] / "shared" / "data" / "experiments" / "vehicle-c"
-SIDE = {"fl": 1, "fr": -1, "rl": 1, "rr": -1}  # y over its half width
-END = {"fl": 1, "fr": 1, "rl": -1, "rr": -1}  # x over the distance of its bogie
-BOGIE = {"fl": 2, "fr": 2, "rl": 3, "rr": 3}
-each_corner = pytest.mark.parametrize("c", CORNERS)
-
-small = st.floats(-1e-2, 1e-2)
-motions = st.fixed_dictionaries(dict.fromkeys(STATES, small))
-rails = st.fixed_dictionaries({f"u_{c}{end}": small for c in CORNERS for end in ("", "_dot")})
-pushes = st.fixed_dictionaries({name: st.floats(-1e4, 1e4) for name in FORCES.values()})
-healths = st.fixed_dictionaries(
-    {f"h_{e}_{c}": st.floats(0.1, 3.0) for e in ("k1", "b1", "k2", "b2") for c in CORNERS}
-)
-
-
-def vectors(x, u, p):
-    return (
-        [x.get(n, 0.0) for n in STATES],
-        [u.get(n, 0.0) for n in INPUTS],
-        list((P | p).values()),
-    )
-
-
-def outputs(x=None, u=None, **parameters):
-    """Outputs by name at states and inputs by name, those not given at 0."""
-    return dict(zip(OUTPUTS, values(MADE.h, *vectors(x or {}, u or {}, parameters)), strict=True))
-
-
-def accelerations(x=None, u=None, **parameters):
-    """Accelerations by coordinate."""
-    found = outputs(x, u, **parameters)
-    return {q: found[f"{q}_ddot"] for q in FORCES}
-
-
-def forces(x=None, u=None, **parameters):
-    """Mass times acceleration by coordinate."""
-    p = P | parameters
-    return {q: a * p[INERTIA[q]] for q, a in accelerations(x, u, **parameters).items()}
-
-
-def system(**parameters):
-    """A, B of x' = A x + B u and C, D of the outputs."""
-    x, u = (cs.SX.sym(n, len(names)) for n, names in (("x", STATES), ("u", INPUTS)))
-    p = list((P | parameters).values())
-    dot, y = MADE.f(x, u, p), MADE.h(x, u, p)
-    parts = [cs.jacobian(of, by) for of in (dot, y) for by in (x, u)]
-    return [np.array(m.full()) for m in cs.Function("parts", [x, u], parts)(0, 0)]
-
-
-def settled(u, **parameters):
-    """Coordinates at rest under constant inputs by name."""
-    A, B, *_ = system(**parameters)
-    x = np.linalg.solve(A, -B @ vectors({}, u, {})[1])
-    return dict(zip(STATES, x.tolist(), strict=True))
-
-
-def modes(**parameters):
-    """Undamped frequency, Hz, and damping ratio of each mode, slowest first."""
-    poles = np.linalg.eigvals(system(**parameters)[0])
-    poles = sorted(poles[poles.imag > 0], key=abs)
-    return np.array([(abs(s) / 2 / np.pi, -s.real / abs(s)) for s in poles]).T
 
 
 def test_parameters_are_those_of_the_thesis_and_of_the_truth():
@@ -108,27 +49,6 @@ def test_modes_with_two_springs_on_each_bogie_side():
 def test_modes_with_one_spring_on_each_bogie_side():
     frequency, _ = modes(n_primary=1.0)
     assert_allclose(frequency, [0.7547, 1.0054, 1.2189, 5.6350, 5.6422, 6.9527, 6.9672], rtol=1e-4)
-
-
-sizes = st.fixed_dictionaries(
-    {f.name: st.floats(0.5, 2.0).map(lambda x, at=f.default: x * at) for f in fields(Vehicle)}
-)
-
-
-@given(sizes)
-def test_matrices_are_those_assembled_from_incidence_vectors(size):
-    A, B, *_ = system(**size)
-    m, u = matrices(Vehicle(**size)), len(CORNERS)
-    for found, expected in (
-        (A[7:, :7], -m.K),
-        (A[7:, 7:], -m.B),
-        (B[7:, :u], m.T_k),
-        (B[7:, u : 2 * u], m.T_b),
-        (B[7:, 2 * u :], np.eye(7)),
-    ):
-        assert_allclose(m.M @ found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
-    assert_array_equal(A[:7], np.eye(14)[7:])
-    assert not B[:7].any()
 
 
 @given(motions, rails)
@@ -322,142 +242,3 @@ def test_a_health_factor_changes_its_element_alone(c, element, x, u, health):
     assert_allclose([moved[q] for q in FORCES], [up.get(q, 0.0) for q in FORCES], atol=1e-9 + size)
     same = [n for n in OUTPUTS if n.startswith("d_")]
     assert [ill[n] for n in same] == [sound[n] for n in same]
-
-
-LAWS = {
-    "coulomb_friction": {"F_c": 800.0},
-    "bump_stop": {"k": 2e6, "gap": 2e-3},
-    "cubic_stiffness": {"k_3": 1e10},
-    "hysteresis": {"F_h": 500.0},
-    "stiffness_change": {"change": -0.5},
-}
-
-
-@pytest.mark.parametrize("suspension", ["secondary", "primary"])
-@pytest.mark.parametrize("kind", LAWS)
-def test_a_law_at_a_suspension_is_the_same_law_at_its_four_corners(suspension, kind):
-    effect, rng = EFFECTS[kind], np.random.default_rng(8)
-    own = {p.name: p.start for p in effect.parameters("translation")} | LAWS[kind]
-    corners = [f"{suspension}_{c}" for c in CORNERS]
-    for _ in range(5):
-        x = {n: rng.uniform(-1e-2, 1e-2) for n in STATES}
-        u = {n: rng.uniform(-1e-2, 1e-2) for n in INPUTS if n.startswith("u_")}
-        found = []
-        for places in ([suspension], corners):
-            model = Vehicle7dof([(effect, place) for place in places])
-            p = P | {effect.name_at(place, n): value for place in places for n, value in own.items()}
-            # states that the effect brought (a clock, memories) are at the same value everywhere
-            point = [x.get(v.name, 100.0) for v in model.of(State)], [u.get(n, 0.0) for n in INPUTS]
-            dot = values(equations(model).f, *point, [p[v.name] for v in model.of(Parameter)])
-            found.append(dot[: len(STATES)])
-        assert_allclose(*found, rtol=1e-9, atol=1e-9)
-        sound = values(MADE.f, *vectors(x, u, {}))
-        assert np.abs(found[0] - sound).max() > 1e-3
-
-
-def test_the_probe_of_a_suspension_pushes_at_all_corners_and_shows_their_mean():
-    probed = Vehicle7dof(probes=True)
-    made, p = equations(probed), [P[v.name] for v in probed.of(Parameter)]
-    x = dict(zip(STATES, np.random.default_rng(9).uniform(-1e-2, 1e-2, 14).tolist(), strict=True))
-
-    def at(**u):
-        inputs = [u.get(v.name, 0.0) for v in probed.of(Input)]
-        names = [v.name for v in probed.of(Output)]
-        return dict(zip(names, values(made.h, [*x.values()], inputs, p), strict=True))
-
-    together = at(secondary_force=500.0)
-    apart = at(**{f"secondary_{c}_force": 500.0 for c in CORNERS})
-    for q in FORCES:
-        assert together[f"{q}_ddot"] == pytest.approx(apart[f"{q}_ddot"], rel=1e-12)
-    for what, end in (("displacement", ""), ("velocity", "_dot")):
-        mean = np.mean([together[f"d_s_{c}{end}"] for c in CORNERS])
-        assert together[f"secondary_{what}"] == pytest.approx(mean, rel=1e-12)
-
-
-RATES = [f"{q}_dot" for q in FORCES]
-
-
-def over(track, fmu, start_values):
-    """Rates of the coordinates (N, 7) in a free run of an FMU over a track."""
-    names = [f"u_{c}{end}" for end in ("", "_dot") for c in CORNERS]
-    u = np.hstack([track.u, track.u_dot])
-    held = dict(zip(names, ((u[1:] + u[:-1]) / 2).T, strict=True))
-    with Fmu(fmu) as vehicle:
-        return vehicle.simulate(track.t, held, RATES, start_values)
-
-
-def truly(track, effects):
-    true = simulate(track, effects=effects)
-    return np.column_stack([true.output(n) for n in RATES])
-
-
-@pytest.fixture(scope="module")
-def track_and_sound():
-    """Four seconds of track at 20 m/s, and what the true vehicle without any effect does there."""
-    t = np.arange(3201) * 1.25e-3
-    track = run_over(spectrum_rails(np.random.default_rng(3), 80.0), t, 20.0, 19.0)
-    return track, truly(track, single("none", ""))
-
-
-@pytest.mark.parametrize(
-    ("kind", "location", "settings", "start_values"),
-    [
-        ("none", "", {}, {}),
-        ("coulomb_friction", "secondary", {}, {"F_c": 800.0, "v_s": 1e-3}),
-        ("bump_stop", "secondary_fl", {"bump_gap": 1.5e-3}, {"k": 2e6, "gap": 1.5e-3}),
-        ("free_play", "primary_rr", {}, {"k": 2 * 1220e3, "gap": 5e-4}),
-        ("quadratic_damping", "primary", {}, {"c": 3e5}),
-        ("stiffness_change", "secondary_rl", {}, {"change": -0.5}),
-    ],
-)
-def test_an_effect_moves_the_fmu_as_it_moves_the_independent_truth(
-    built, track_and_sound, kind, location, settings, start_values
-):
-    track, sound = track_and_sound
-    true = truly(track, single(kind, location, **settings)) if location else sound
-    chosen = (f"{kind}@{location}",) if location else ()
-    own = {f"{kind}_{location}_{n}": v for n, v in start_values.items()}
-    run = over(track, built("vehicle7dof", *chosen), own)
-    # inputs held over 1.25 ms are off by (w dt)^2/12 = 6e-4 at 11 Hz
-    assert ((run - true).std(axis=0) < 1e-3 * run.std(axis=0)).all()
-    if location:
-        assert ((true - sound).std(axis=0) > 2e-2 * sound.std(axis=0)).any()
-
-
-@pytest.mark.skipif(not VEHICLE_C.is_dir(), reason="the shared records are not on this machine")
-def test_a_record_without_discrepancy_is_explained_by_calibration_alone():
-    said = tomllib.loads((VEHICLE_C / "experiment.toml").read_text(encoding="utf-8"))
-    data = np.genfromtxt(VEHICLE_C / "data.csv", delimiter=",", names=True)
-    u = np.column_stack([data[n] if n in said["inputs"] else np.zeros_like(data["time"]) for n in INPUTS])
-    y = np.column_stack([data[n] for n in NOISE])
-    noise = np.array([said["outputs"][n]["noise_std"] for n in NOISE])
-    fit = data["time"] < said["split"]["test"][0]
-    declared = {n: said["parameters"][n] for n in said["calibrate"]}
-
-    def residual(factors):
-        """Measured minus simulated over noise, inputs linear between samples."""
-        theta = {n: f * p for f, (n, p) in zip(factors, declared.items(), strict=True)}
-        return (y - linear_run(data["time"], u, NOISE, **(said["parameters"] | theta))) / noise
-
-    found = least_squares(lambda f: residual(f)[fit].ravel(), np.ones(4), diff_step=1e-4)
-    for factor, (low, high), p in zip(found.x, said["calibrate"].values(), declared.values(), strict=True):
-        assert low < factor * p < high
-    left = np.sqrt(np.mean(residual(found.x)[~fit] ** 2, axis=0))
-    # 4800 samples tell a standard deviation to 1 %; four times that
-    assert_allclose(left, 1.0, atol=0.04)
-    # and the record can tell: springs a few percent off show
-    assert np.sqrt(np.mean(residual(np.ones(4))[~fit] ** 2, axis=0)).max() > 3
-
-
-def linear_run(t, u, names, **parameters):
-    """Outputs (N, n) of the model from rest, exact for inputs that run linearly between even samples."""
-    A, B, C, D = system(**parameters)
-    states, shown = {n: i for i, n in enumerate(STATES)}, {n: i for i, n in enumerate(OUTPUTS)}
-    C_y = np.array([np.eye(len(STATES))[states[n]] if n in states else C[shown[n]] for n in names])
-    D_y = np.array([0 * D[0] if n in states else D[shown[n]] for n in names])
-    A_d, B_d, C_d, D_d, _ = cont2discrete((A, B, C_y, D_y), t[1] - t[0], "foh")
-    x, driven, y = np.zeros(len(A)), u @ B_d.T, u @ D_d.T
-    for k in range(len(t)):
-        y[k] += C_d @ x
-        x = A_d @ x + driven[k]
-    return y
