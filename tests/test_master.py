@@ -214,6 +214,7 @@ def test_one_file_several_times_and_fmus_that_are_open(parts):
         with Master({"one": fmu, "two": archive}, push, step=0.01, initial=start) as master:
             assert master.run(0.5).data.equals(alike)
         assert fmu["x"] == alike["one.x"].iloc[-1]
+        assert fmu.time == 0.5
 
 
 def test_start_values_pass_through_the_outputs(parts):
@@ -344,6 +345,15 @@ def test_a_refused_step_is_made_in_parts_by_all(foreign, parts, order):
     halved = refused(foreign, parts, "True", 0.04, order=order, extrapolation="linear")
     fine = refused(foreign, parts, "False", 0.01, order=order, extrapolation="linear")
     assert_array_equal(halved["time"], fine["time"])
+    assert_allclose(halved, fine, rtol=1e-9, atol=1e-12)
+
+
+def test_parts_of_a_step_keep_outputs_that_follow_inputs_up_to_date(foreign, parts):
+    """One FMU refuses, others with such outputs halve their steps with it: as if these had been asked for."""
+    halved, fine = (
+        states({**parts, "p": picky(foreign, when)}, step, extrapolation="linear", record_step=0.04)[1]
+        for when, step in (("True", 0.04), ("False", 0.01))
+    )
     assert_allclose(halved, fine, rtol=1e-9, atol=1e-12)
 
 
