@@ -48,7 +48,8 @@ def test_effects_built_in_change_nothing_until_they_are_switched_on(built, name)
     for path in (built(name), built(name, "all")):
         with Fmu(path) as fmu:
             fmu.restart()
-            outputs.append(run(fmu, rows))
+            own = [name in model.variables for name in fmu.description.outputs]
+            outputs.append(run(fmu, rows)[:, own])
     # exact in f and h; a step solves with another order of the same operations
     assert_allclose(outputs[1], outputs[0], rtol=1e-9, atol=1e-12)
 
