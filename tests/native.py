@@ -11,10 +11,16 @@ from xml.etree import ElementTree
 import pytest
 
 from fmus.export.native.build import build_native
+from fmus.model import equations
 from fmus.models import MODELS
-from tests.everything import fitting
+from tests.everything import EVERY_MODEL, fitting
 
 every_version = pytest.mark.parametrize("fmi", [2, 3])
+# tables and choices between laws make long programs: their models take a while to compile
+QUICK = [name for name in EVERY_MODEL if equations(MODELS[name]()).f.is_a("SXFunction")]
+every_native = pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in EVERY_MODEL]
+)
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-ffp-contract=off"]
 DEFINED = ["-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX"]
 

@@ -20,9 +20,9 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
 from fmus.variables import Input, Output, Parameter, State
-from tests.native import DEFINED, STRICT, compiler, description, every_version, native, unpacked
+from tests.native import DEFINED, STRICT, compiler, description, every_native, every_version, native, unpacked
 from tests.packed import repacked
-from tests.runs import every_model, run, stirred
+from tests.runs import run, stirred
 
 LIFE = Path(__file__).parent / "c" / "native_life.c"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -69,7 +69,7 @@ def shows_only_the_interface(path, fmi):
 
 
 @ELF
-@every_model
+@every_native
 @every_version
 def test_a_linux_library_shows_fmi_alone_and_needs_an_old_libc_alone(name, fmi, tmp_path):
     path = library(native(name, fmi=fmi), tmp_path)
@@ -135,7 +135,7 @@ def lived(program, *before):
     return done.stdout + done.stderr
 
 
-@every_model
+@every_native
 @every_version
 def test_address_and_undefined_behaviour_sanitizers_find_nothing(name, fmi, tmp_path):
     flags = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -146,7 +146,7 @@ def test_address_and_undefined_behaviour_sanitizers_find_nothing(name, fmi, tmp_
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
-@every_model
+@every_native
 @every_version
 def test_valgrind_finds_nothing_in_a_hundred_instances(name, fmi, tmp_path):
     check = ["valgrind", "--leak-check=full", "--show-leak-kinds=all", "--error-exitcode=9"]
@@ -166,7 +166,7 @@ def _own(source):
     return [p.name for p in source.iterdir() if not re.match(r"fmi[23][A-Z]", p.name)]
 
 
-@every_model
+@every_native
 @pytest.mark.parametrize("effects", [(), pytest.param(("all",), marks=pytest.mark.slow)], ids=["bare", "all"])
 def test_there_are_no_globals(name, effects, tmp_path):
     """Nothing can be written but what an instance holds: sections of data and of zeros are empty."""

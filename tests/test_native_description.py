@@ -28,8 +28,8 @@ from fmus.models import MODELS
 from fmus.units import base_exponents
 from fmus.variables import Input, Output, Parameter, Rate, State
 from tests.everything import near_start, values
-from tests.native import description, every_version, native
-from tests.runs import every_model, heavier, names
+from tests.native import description, every_native, every_version, native
+from tests.runs import heavier, names
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 SCHEMA = {  # file in the FMU: its schema
@@ -64,7 +64,7 @@ def unknowns(path, fmi, kind):
     }
 
 
-@every_model
+@every_native
 @every_version
 def test_the_standard_has_nothing_to_object(name, fmi):
     path = native(name, fmi=fmi)
@@ -80,14 +80,14 @@ def test_all_effects_change_nothing_in_that(fmi):
     assert problems(native("drive", "all", fmi=fmi)) == []
 
 
-@every_model
+@every_native
 @every_version
 def test_it_grades_as_fit_for_use_here(name, fmi):
     found = grade(native(name, fmi=fmi))
     assert [c for c in found.checks if c.passed is not True] == []
 
 
-@every_model
+@every_native
 @every_version
 def test_description_says_all_that_the_model_declares(name, fmi):
     model, found = MODELS[name](), variables(native(name, fmi=fmi), fmi)
@@ -108,7 +108,7 @@ def test_description_says_all_that_the_model_declares(name, fmi):
         assert shown["variability"] == (tunable if isinstance(v, Parameter) else "continuous")
 
 
-@every_model
+@every_native
 @every_version
 def test_every_state_has_its_derivative(name, fmi):
     model, path = MODELS[name](), native(name, fmi=fmi)
@@ -126,7 +126,7 @@ def test_every_state_has_its_derivative(name, fmi):
         assert found[n]["causality"] == ("output" if n in names(model, Output) else "local")
 
 
-@every_model
+@every_native
 @every_version
 def test_dependencies_are_complete(name, fmi):
     """What is not listed does not matter: moved alone, it changes no output."""
@@ -214,7 +214,7 @@ def test_names_and_units_of_derivatives_never_clash():
     )
 
 
-@every_model
+@every_native
 @every_version
 def test_units_and_display_units_are_defined(name, fmi):
     path = native(name, fmi=fmi)
@@ -270,7 +270,7 @@ def test_probes_are_terminals_of_every_port(tmp_path):
     assert [t.get("name") for t in root.iter("Terminal")] == list(MODELS["testrig"]().ports())
 
 
-@every_model
+@every_native
 @every_version
 def test_page_and_icon_are_inside(name, fmi):
     path = native(name, fmi=fmi)

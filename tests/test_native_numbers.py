@@ -11,14 +11,17 @@ from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fmus.export.native.build import build_native
+from fmus.export.pythonfmu import build_python
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
-from fmus.model import equations
+from fmus.integrate import rodas3
+from fmus.model import Model, equations
 from fmus.models import MODELS
 from fmus.variables import Input, Output, Parameter, State
 from tests.everything import EVERY_MODEL, near_start, values
-from tests.native import every_version, native
-from tests.runs import DT, every_model, names, start_of, stirred
+from tests.native import every_native, every_version, native
+from tests.runs import DT, names, start_of, stirred
 
 LONG = 0.05  # s, many internal steps
 # every effect at every place of a large model is a large program to compile
@@ -40,7 +43,7 @@ def history(path, model, dt, seed, steps=30):
     return np.array(found)
 
 
-@every_model
+@every_native
 @pytest.mark.parametrize("dt", [DT, LONG])
 def test_native_python_and_both_versions_agree_to_the_last_bit(built, name, dt):
     model = MODELS[name]()
@@ -59,7 +62,61 @@ def test_builds_with_effects_agree(built, name):
     assert_allclose(history(native(name, "all"), model, DT, 5, steps=10), expected, rtol=1e-9, atol=1e-15)
 
 
-@every_model
+class Tabled(Model):
+    """A mass on a spring from a table, with a choice between two dampers: functions called in equations."""
+
+    name = "Tabled"
+    step_size = 0.01
+    method = rodas3
+    x = State("m", 0.3, doc="place", nominal=1.0)
+    v = State("m/s", doc="speed", nominal=1.0)
+    u = Input("N", doc="force", nominal=1.0)
+    law = Parameter("1", 1.0, min=0.0, max=1.0, doc="damper: 0 linear, 1 quadratic", fixed=True)
+    F = Output("N", doc="force of the spring")
+
+    def _forces(self):
+        grid = np.linspace(-3, 3, 25)
+        spring = cs.interpolant("spring", "bspline", [grid], np.sinh(grid))
+        v = cs.SX.sym("v")
+        dampers = [cs.Function(f"d{i}", [v], [e]) for i, e in enumerate((0.5 * v, v * cs.fabs(v)))]
+        chosen = cs.Function.conditional("damper", dampers[:1], dampers[1])
+        return self.call(spring, self.x)[0], self.call(chosen, self.law, self.v)[0]
+
+    def derivatives(self):
+        spring, damper = self._forces()
+        return {"x": self.v, "v": self.u - spring - damper}
+
+    def outputs(self):
+        return {"F": self._forces()[0]}
+
+
+@pytest.mark.parametrize("law", [0.0, 1.0])
+def test_functions_called_in_equations_are_compiled_too(law, tmp_path):
+    model, dt = Tabled(), 0.05
+    rows = stirred(model, np.random.default_rng(2), 20)
+    ends = []
+    builds = (
+        build_python(model, tmp_path / "p"),
+        *(build_native(model, tmp_path / str(n), n) for n in (2, 3)),
+    )
+    for path in builds:
+        with Fmu(path) as fmu:
+            fmu.restart(law=law)
+            ends.append([[fmu.step(dt, **row), *fmu.read(["x", "v", "F"])][1:] for row in rows])
+    assert_allclose(ends[1], ends[0], rtol=1e-9, atol=1e-15)
+    assert_array_equal(ends[1], ends[2])
+    point = np.array([0.3, 0.7, 0.1, law])
+    with exchanged(builds[2], 3, {"x": 0.3, "v": 0.7, "u": 0.1, "law": law}) as (fmu, refs):
+        slope = [refs["v_dot"]]
+        along = [fmu.getDirectionalDerivative(slope, [refs[n]], [1.0])[0] for n in ("x", "v", "u")]
+        back = fmu.getAdjointDerivative(slope, [refs[n] for n in ("x", "v", "u")], [1.0], nSensitivity=3)
+    damping = 0.5 if law == 0 else 2 * point[1]
+    # 1e-3: the table is a spline through points of the sinh
+    assert_allclose(along, [-np.cosh(point[0]), -damping, 1.0], atol=1e-3)
+    assert_allclose(back, along, rtol=1e-12)
+
+
+@every_native
 @pytest.mark.parametrize("parts", [1, 2.5, 3, 7.000000001])
 def test_a_step_is_divided_as_in_python(built, name, parts):
     """Lengths about multiples of the internal step, where one more or less would show."""
@@ -68,7 +125,7 @@ def test_a_step_is_divided_as_in_python(built, name, parts):
     assert_allclose(runs[1], runs[0], rtol=1e-9, atol=1e-15)
 
 
-@every_model
+@every_native
 @every_version
 def test_model_exchange_by_cvode_gives_the_run_of_co_simulation(name, fmi):
     model = MODELS[name]()
@@ -117,7 +174,7 @@ def exchanged(path, fmi, start_values):
         fmu.freeInstance()
 
 
-@every_model
+@every_native
 @every_version
 def test_partial_derivatives_are_those_of_the_equations(name, fmi):
     model, rng = MODELS[name](), np.random.default_rng(9)
@@ -148,7 +205,7 @@ def jacobian_of(model, point):
     return cs.Function("J", [v], [cs.jacobian(h, v)])(point).full()
 
 
-@every_model
+@every_native
 @every_version
 def test_model_exchange_shows_the_equations(name, fmi):
     model = MODELS[name]()

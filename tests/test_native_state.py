@@ -27,8 +27,8 @@ from fmus.host.instance import CallFailed
 from fmus.models import MODELS
 from fmus.variables import Input, Output, Parameter, State
 from tests.everything import near_start
-from tests.native import every_version, native
-from tests.runs import DT, every_model, names, run, start_of, stirred
+from tests.native import every_native, every_version, native
+from tests.runs import DT, names, run, start_of, stirred
 
 
 def wrongs(model):
@@ -64,7 +64,7 @@ def wrongs(model):
     return found
 
 
-@every_model
+@every_native
 @every_version
 def test_what_cannot_be_done_is_refused_with_its_reason_and_changes_nothing(name, fmi):
     model = MODELS[name]()
@@ -95,7 +95,7 @@ def test_a_run_away_is_discarded_and_leaves_the_state(fmi):
         fmu.step(1e-3)
 
 
-@every_model
+@every_native
 @every_version
 def test_a_saved_state_is_all_there_is(name, fmi):
     """Saved, restored, as bytes, into an instance that never ran: bitwise, parameters and all."""
@@ -138,7 +138,7 @@ def test_a_damaged_or_foreign_state_is_refused(fmi):
 
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10_000), middle=st.integers(1, 9))
-@every_model
+@every_native
 @every_version
 def test_a_run_goes_on_from_the_values_it_shows(name, fmi, seed, middle):
     model, rng = MODELS[name](), np.random.default_rng(seed)
@@ -151,7 +151,7 @@ def test_a_run_goes_on_from_the_values_it_shows(name, fmi, seed, middle):
         assert_array_equal(run(other, rows[middle:]), run(fmu, rows[middle:]))
 
 
-@every_model
+@every_native
 @every_version
 def test_a_hundred_instances_do_not_meet(name, fmi):
     model = MODELS[name]()

@@ -22,6 +22,7 @@ from fmus.export.pythonfmu import ZIP_DATE
 from fmus.model import Equations, Model, equations
 
 HERE = Path(__file__).parent
+NO_TOKEN = f"{{{uuid.UUID(int=0)}}}"  # until the content is known
 DESCRIBED = {2: description2, 3: description3}
 ICONS = {  # path in the FMU: file here
     2: {"model.png": "icon.png"},
@@ -65,18 +66,14 @@ def build_native(
 
 
 def _content(model: Model, made: Equations, about: Table, fmi: int) -> dict[str, bytes]:
-    """All files but the libraries, by path; the token goes with their content."""
-    with_nothing = _described(made, about, fmi, "")
-    parts = [version("railfmi").encode(), *(with_nothing[path] for path in sorted(with_nothing))]
+    """All files but the libraries, by path; the token is a hash of what the sources and descriptions say."""
+    code = {f"sources/{n}": text.encode() for n, text in sources(about, made, fmi, NO_TOKEN).items()}
+    files = DESCRIBED[fmi](about, NO_TOKEN) | code
+    parts = [version("railfmi").encode(), *(files[path] for path in sorted(files))]
     token = f"{{{uuid.UUID(hashlib.sha256(bytes(1).join(parts)).hexdigest()[:32])}}}"
-    files = _described(made, about, fmi, token)
+    files = {path: data.replace(NO_TOKEN.encode(), token.encode()) for path, data in files.items()}
     files["documentation/index.html"] = page(model, about, fmi).encode()
     return files | {path: (HERE / name).read_bytes() for path, name in ICONS[fmi].items()}
-
-
-def _described(made: Equations, about: Table, fmi: int, token: str) -> dict[str, bytes]:
-    code = {f"sources/{n}": text.encode() for n, text in sources(about, made, fmi, token).items()}
-    return DESCRIBED[fmi](about, token) | code
 
 
 def _binaries(libraries: dict[Platform, Path], fmi: int) -> dict[str, bytes]:

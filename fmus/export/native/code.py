@@ -15,6 +15,7 @@ from fmus.variables import Expr
 
 HERE = Path(__file__).parent
 WRAPPER = ("fmu.c", "instance.h", "instance.c", "values.c", "stepping.c", "states.c", "derivatives.c")
+INTERFACE = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 STANDARD = {  # headers of the standard, under its 2-clause BSD licence, as FMPy brings them
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
     3: ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
@@ -34,7 +35,7 @@ class Work:
 def sources(table: Table, made: Equations, fmi: int, token: str) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others."""
     code, work = _equations(table.name, made)
-    wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, f"fmi{fmi}.c")}
+    wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
     return {**wrapper, **standard, "equations.c": code, "model.h": _header(table, work, fmi, token)}

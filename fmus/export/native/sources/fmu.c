@@ -37,4 +37,5 @@
 #include "fmi2.c"
 #else
 #include "fmi3.c"
+#include "fmi3_absent.c"
 #endif
