@@ -49,6 +49,7 @@ def nearest(kind, name, true, values, motion, rng):
         ("free_play", "gap", "k", 0.2, 0.8, 2.0),
         ("hysteresis", "q_y", "F_h", 0.1, 0.9, 2.0),
         ("stribeck_friction", "v_b", "F_b", 0.1, 0.7, 2.5),
+        ("coulomb_friction", "v_s", "F_c", 0.02, 0.4, 2.5),
     ],
 )
 @given(seed=SEEDS, where=st.floats(0, 1))
@@ -57,7 +58,7 @@ def test_what_shows_in_the_motion_is_guessed(kind, name, amplitude, low, high, f
     """The true value between two quantiles of the magnitude of displacement or velocity."""
     rng = np.random.default_rng(seed)
     motion = wandering(rng)
-    magnitude = np.abs(motion[1] if kind == "stribeck_friction" else motion[0])
+    magnitude = np.abs(motion[1] if kind.endswith("_friction") else motion[0])
     true = float(np.quantile(magnitude, low + where * (high - low)))
     values = {amplitude: 100.0, name: true}
     assert nearest(kind, name, true, values, motion, rng) < factor

@@ -112,6 +112,8 @@ def _law(effect: type[ForceLaw], missing: MissingForce, values: dict[str, float]
 
 def _shapes(effect: type[ForceLaw], missing: MissingForce) -> list[dict[str, float]]:
     """Start values of an effect's shape parameters worth trying; one empty set where it has none to find."""
+    if effect.kind != "periodic_force":
+        return [{}]
     return effect.guesses(missing.t, missing.displacement, missing.velocity, missing.force)
 
 

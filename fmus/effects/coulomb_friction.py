@@ -4,9 +4,12 @@ In data: a residual of one height that turns its sign with the velocity, flat to
 """
 
 import casadi as cs
+import numpy as np
 
-from fmus.effects.force_law import ForceLaw
+from fmus.effects.force_law import Array, ForceLaw
 from fmus.variables import Expr, Parameter
+
+ROUNDINGS = (0.02, 0.1, 0.5)  # of the median speed, at which friction may be nearly full
 
 
 class CoulombFriction(ForceLaw):
@@ -21,3 +24,14 @@ class CoulombFriction(ForceLaw):
     def force(self, q: Expr, v: Expr) -> Expr:
         """See ForceLaw.force."""
         return -self.F_c * cs.tanh(v / self.v_s)
+
+    @classmethod
+    def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
+        """See ForceLaw.shapes: sharp and soft steps at zero velocity."""
+        return [{"v_s": v_s} for v_s in roundings(v)]
+
+
+def roundings(v: Array) -> list[float]:
+    """Velocities at which friction may be nearly full, for a motion with velocities v (N,)."""
+    median = float(np.median(np.abs(v)))
+    return [share * median for share in ROUNDINGS if share * median > 1e-6]

@@ -6,6 +6,7 @@ In data: a residual that turns its sign with the velocity and is largest just af
 import casadi as cs
 import numpy as np
 
+from fmus.effects.coulomb_friction import roundings
 from fmus.effects.force_law import Array, ForceLaw
 from fmus.variables import Expr, Parameter
 
@@ -29,5 +30,6 @@ class StribeckFriction(ForceLaw):
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
-        """See ForceLaw.shapes: velocities that occur."""
-        return [{"v_b": float(v_b)} for v_b in np.unique(np.quantile(np.abs(v), QUANTILES)) if v_b > 0]
+        """See ForceLaw.shapes: velocities that occur, sharp and soft steps at zero velocity."""
+        falls = np.unique(np.quantile(np.abs(v), QUANTILES))
+        return [{"v_b": float(v_b), "v_s": v_s} for v_b in falls for v_s in roundings(v) if v_b > v_s]
