@@ -4,18 +4,14 @@
 wrong with a file is a BadInput of one line.
 """
 
-import tomllib
 from collections.abc import Iterable, Iterator
-from itertools import chain
 from pathlib import Path
-from typing import Any, get_args
-
-from pydantic import ValidationError
-from pydantic_core import ErrorDetails
+from typing import Any
 
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription, FmuVariable
-from scenarios.declaration import Declaration, Table
+from scenarios.declaration import Declaration
+from scenarios.validation import and_more, read_file
 
 
 class Experiment(Declaration):
@@ -48,10 +44,7 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
     Raises BadInput, one line that names the file, the key and the way out.
     """
     file = Path(path)
-    try:
-        declared = Declaration.model_validate(_read_toml(file))
-    except ValidationError as error:
-        raise BadInput(f"{file}: {_one_line(error)}") from None
+    declared = read_file(Declaration, file, "an experiment.toml")
     if declared.model is not None:
         _check_model(file, declared.model)
     place: dict[str, Any] = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
@@ -67,75 +60,12 @@ def _check_model(file: Path, name: str) -> None:
         raise BadInput(f"{file}: key 'model': {error}") from error
 
 
-def _read_toml(file: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise BadInput(
-            f"{file}: cannot be read ({error.strerror}); give the path of an experiment.toml"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise BadInput(f"{file}: is not UTF-8 text; save it as UTF-8") from error
-    except ValueError as error:  # TOMLDecodeError, or a number too long for Python
-        raise BadInput(f"{file}: is not valid TOML: {error}") from error
-
-
-def _one_line(error: ValidationError) -> str:
-    """The first problem of a validation in one sentence, and how many more there are.
-
-    Unknown keys go first: a misspelt key is also a missing one.
-    """
-    problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-    return " ".join(_sentence(problems[0]).split()) + _and_more(len(problems))
-
-
-def _and_more(problems: int) -> str:
-    return f" (and {problems - 1} more)" if problems > 1 else ""
-
-
-def _sentence(problem: ErrorDetails) -> str:
-    """One problem found by pydantic, in the words of the file."""
-    loc, kind, value = problem["loc"], problem["type"], problem["input"]
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc).lstrip(".")
-    if kind == "extra_forbidden":
-        return f"key '{key}' is not known; {did_you_mean(str(loc[-1]), _table_at(loc).model_fields)}"
-    if kind == "missing":
-        return f"key '{key}' is missing"
-    if kind == "value_error":
-        ours = str(problem["ctx"]["error"])
-        if isinstance(value, dict):
-            return f"[{key}] {ours}" if key else ours
-        return f"key '{key}' {ours}"
-    said = problem["msg"].replace("Input should", "must").replace("a valid ", "a ")
-    if kind in ("dict_type", "model_type"):
-        said = "must be a table"
-    if kind == "too_short":
-        said = "must hold at least one entry"
-    return f"key '{key}' {said}, not {str(value)[:60]!r}"
-
-
-def _table_at(loc: tuple[int | str, ...]) -> type[Table]:
-    """The table of a declaration in which the key at that place stands."""
-    table: type[Table] = Declaration
-    for part in loc:
-        if isinstance(part, str) and part in table.model_fields:
-            table = next(_tables_in(table.model_fields[part].annotation), table)
-    return table
-
-
-def _tables_in(annotation: Any) -> Iterator[type[Table]]:
-    """The classes of tables within a field's type, as Output in dict[str, Output]."""
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        yield annotation
-    yield from chain.from_iterable(_tables_in(argument) for argument in get_args(annotation))
-
-
 def check_names(experiment: Experiment, description: FmuDescription) -> None:
     """Hold the names and values of an experiment against the FMU's own; BadInput for the first that fails."""
     names, values = [*_wrong_names(experiment, description)], [*_wrong_values(experiment, description)]
     problems = names + values
     if problems:
-        raise BadInput(f"{experiment.file}: {problems[0]}{_and_more(len(problems))}")
+        raise BadInput(f"{experiment.file}: {problems[0]}{and_more(len(problems))}")
 
 
 def _wrong_names(e: Experiment, fmu: FmuDescription) -> Iterator[str]:

@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from fmus.errors import BadInput, did_you_mean
 from scenarios.declaration import Interval, Number, Positive, Table
-from scenarios.track.declared import read_table
+from scenarios.validation import read_table
 
 Array = NDArray[np.float64]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]

@@ -1,7 +1,10 @@
-"""Reads a declared table into its class; whatever is wrong with it is a BadInput of one line."""
+"""Reads a declared file or table into its class; whatever is wrong with it is a BadInput of one line."""
 
+import tomllib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar, get_args
 
@@ -25,8 +28,36 @@ SAID = MappingProxyType(
 )
 
 
-def read_table(cls: type[T], table: object, key: str) -> T:
-    """The table that stands at `key` of a file as an object of its class."""
+def read_toml(file: Path, kind: str) -> dict[str, Any]:
+    """The top table of a TOML file, which the message of an error calls `kind`, as "an experiment.toml"."""
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise BadInput(f"{file}: cannot be read ({error.strerror}); give the path of {kind}") from error
+    except UnicodeDecodeError as error:
+        raise BadInput(f"{file}: is not UTF-8 text; save it as UTF-8") from error
+    except ValueError as error:  # TOMLDecodeError, or a number too long for Python
+        raise BadInput(f"{file}: is not valid TOML: {error}") from error
+
+
+def read_file(cls: type[T], file: Path, kind: str) -> T:
+    """A whole TOML file as an object of its class."""
+    with of_file(file):
+        return read_table(cls, read_toml(file, kind))
+
+
+@contextmanager
+def of_file(file: Path) -> Iterator[None]:
+    """Name the file in errors about what stands in it."""
+    try:
+        yield
+    except BadInput as error:
+        said = str(error)
+        raise BadInput(said if said.startswith(f"{file}: ") else f"{file}: {said}") from error
+
+
+def read_table(cls: type[T], table: object, key: str = "") -> T:
+    """The table that stands at `key` of a file, or the whole file, as an object of its class."""
     try:
         return cls.model_validate(table)
     except ValidationError as error:
@@ -39,8 +70,12 @@ def _one_line(cls: type[Table], error: ValidationError, key: str) -> str:
     Unknown keys go first: a misspelt key is also a missing one.
     """
     problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return " ".join(_sentence(cls, problems[0], key).split()) + more
+    return " ".join(_sentence(cls, problems[0], key).split()) + and_more(len(problems))
+
+
+def and_more(problems: int) -> str:
+    """The tail of an error about the first of some problems."""
+    return f" (and {problems - 1} more)" if problems > 1 else ""
 
 
 def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
@@ -49,6 +84,7 @@ def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
     # pydantic marks the key of a table, beside its value, as [key]
     parts = [part for part in loc if part != "[key]"]
     key = root + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
+    key = key.lstrip(".")
     if kind == "extra_forbidden":
         known = _table_at(cls, loc).model_fields
         return f"key '{key}' is not known; {did_you_mean(str(loc[-1]), known)}"
@@ -59,7 +95,9 @@ def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
         return f"key '{key}' must be one of {', '.join(names)}, not {str(value)[:60]!r}"
     if kind == "value_error":
         ours = str(problem["ctx"]["error"])
-        return f"[{key}] {ours}" if isinstance(value, dict) else f"key '{key}' {ours}"
+        if isinstance(value, dict):
+            return f"[{key}] {ours}" if key else ours
+        return f"key '{key}' {ours}"
     said = SAID.get(kind) or problem["msg"].replace("Input should", "must").replace("a valid ", "a ")
     return f"key '{key}' {said}, not {str(value)[:60]!r}"
 
