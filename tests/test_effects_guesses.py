@@ -53,7 +53,7 @@ def nearest(kind, name, true, values, motion, rng):
     ],
 )
 @given(seed=SEEDS, where=st.floats(0, 1))
-@settings(max_examples=12)
+@settings(max_examples=6)
 def test_what_shows_in_the_motion_is_guessed(kind, name, amplitude, low, high, factor, seed, where):
     """The true value between two quantiles of the magnitude of displacement or velocity."""
     rng = np.random.default_rng(seed)
@@ -65,7 +65,7 @@ def test_what_shows_in_the_motion_is_guessed(kind, name, amplitude, low, high, f
 
 
 @given(seed=SEEDS, t0=st.floats(3, 27))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_the_time_of_a_step_is_guessed(seed, t0):
     rng = np.random.default_rng(seed)
     motion = wandering(rng)
@@ -74,7 +74,7 @@ def test_the_time_of_a_step_is_guessed(seed, t0):
 
 
 @given(seed=SEEDS, f=st.floats(0.5, 20))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_the_frequency_of_a_force_locked_to_time_is_guessed(seed, f):
     rng = np.random.default_rng(seed)
     motion = turning(rng)
@@ -84,7 +84,7 @@ def test_the_frequency_of_a_force_locked_to_time_is_guessed(seed, f):
 
 
 @given(seed=SEEDS, order=st.floats(0.5, 12))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_the_order_of_a_force_locked_to_an_angle_is_guessed(seed, order):
     rng = np.random.default_rng(seed)
     motion = turning(rng)
@@ -94,7 +94,7 @@ def test_the_order_of_a_force_locked_to_an_angle_is_guessed(seed, order):
 
 
 @given(seed=SEEDS, f=st.floats(1.5, 8))
-@settings(max_examples=15)
+@settings(max_examples=4)
 def test_a_flexible_mode_that_rings_is_guessed_by_its_frequency(seed, f):
     rng = np.random.default_rng(seed)
     q, v = wandering(rng)
@@ -107,7 +107,7 @@ def test_a_flexible_mode_that_rings_is_guessed_by_its_frequency(seed, f):
 
 
 @given(seed=SEEDS, share=st.floats(0.45, 0.97))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_the_limit_of_an_actuator_is_guessed(seed, share):
     u = np.cumsum(np.random.default_rng(seed).standard_normal(len(T)))
     limit = np.quantile(np.abs(u), share)

@@ -96,7 +96,7 @@ def test_an_input_and_its_rate_stay_together(kind):
 
 
 @given(a=amplitudes, b=amplitudes, w=rates, z=rates, beta=st.floats(0.5, 1), n=st.floats(1, 5))
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_hysteresis_never_gives_more_than_it_took(a, b, w, z, beta, n):
     q, v = moving(a, b, w, z)
     F = HYSTERESIS.along({"F_h": 3.0, "q_y": 0.2, "beta": beta, "n": n}, T, q, v)
@@ -106,7 +106,7 @@ def test_hysteresis_never_gives_more_than_it_took(a, b, w, z, beta, n):
 
 
 @given(beta=st.floats(0.5, 1), n=st.floats(1, 5), a=st.floats(0.05, 1))
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_hysteresis_dissipates_over_each_closed_cycle(beta, n, a):
     t = np.linspace(0, 6 * np.pi, 6001)
     F = HYSTERESIS.along({"F_h": 2.0, "q_y": 0.1, "beta": beta, "n": n}, t, a * np.sin(t), a * np.cos(t))
@@ -153,7 +153,7 @@ def test_a_flexible_mode_that_turns_with_its_base_is_not_felt():
 
 
 @given(a=amplitudes, b=amplitudes, w=rates, z=rates, f=st.floats(0.5, 20), D=st.floats(0, 1))
-@settings(max_examples=20)
+@settings(max_examples=10)
 def test_a_flexible_mode_never_gives_more_than_it_took(a, b, w, z, f, D):
     q, v = moving(a, b, w, z)
     F = MODE.along({"m": 2.0, "f": f, "D": D}, T, q, v)
