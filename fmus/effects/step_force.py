@@ -10,7 +10,7 @@ from fmus.variables import Expr, Parameter
 
 
 class StepForce(ForceLaw):
-    """F = -F_0 from t0 on; the step takes 20 ms."""
+    """F = -F_0 S(t - t0); S steps from 0 to 1 within 20 ms."""
 
     kind = "step_force"
     source = "the abrupt additive fault, Isermann, Fault-Diagnosis Systems (2006)"
