@@ -63,11 +63,18 @@ def cross(Wc: Array, A: Array, a: Array, B: Array, b: Array) -> Array:
 
 
 @compiled
-def after(Wc: Array, X: Array, x: Array, Y: Array, y: Array, K: Array, R: Array) -> Array:
-    """Covariance (n, n) after a correction with gain K (n, m), in Joseph's form for points (k, n), (k, m)."""
+def corrected(
+    Wc: Array, X: Array, x: Array, Y: Array, y: Array, S: Array, e: Array, R: Array
+) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n) of points X (k, n) after innovations e (m,) of their outputs Y (k, m).
+
+    x (n,), y (m,) are their means, S (m, m) the covariance of e, in which R (m, m) is noise. Joseph's form:
+    a sum of squares.
+    """
+    K = np.linalg.solve(S, (Y - y).T @ (Wc.reshape(-1, 1) * (X - x))).T
     rest = (X - x) - (Y - y) @ K.T
     P = rest.T @ (Wc.reshape(-1, 1) * rest) + K @ (R @ K.T)
-    return (P + P.T) * 0.5
+    return x + K @ e, (P + P.T) * 0.5
 
 
 @compiled
@@ -81,10 +88,10 @@ def joseph(x: Array, P: Array, H: Array, e: Array, R: Array) -> tuple[Array, Arr
 
 
 @compiled
-def log_density(e: Array, S: Array) -> float:
+def log_density(e: Array, S: Array) -> tuple[float, float]:
     """Logarithm of the normal density of e (m,) with covariance S (m, m), and e' S^-1 e."""
-    solved = np.linalg.solve(S, e)
+    square = float(np.sum(e * np.linalg.solve(S, e)))
     sign, size = np.linalg.slogdet(S)
     if sign <= 0:
-        return -np.inf
-    return float(-0.5 * (np.sum(e * solved) + size + len(e) * np.log(2 * np.pi)))
+        return -np.inf, square
+    return -0.5 * (square + float(size) + len(e) * np.log(2 * np.pi)), square

@@ -62,7 +62,7 @@ class Ekf(Filter):
         return seen[0], symmetric(self._H @ P @ self._H.T)
 
     def _correct(
-        self, x: Array, P: Array, used: BoolArray, innovation: Array, R: Array
+        self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
         found: tuple[Array, Array] = joseph(x, P, np.ascontiguousarray(self._H[used]), innovation, R)
         return found

@@ -34,7 +34,10 @@ class System(Protocol):
         """What y holds."""
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
-        """States (k, n) at t + dt [s] with inputs (n_u,) held, and what row 0 carries then."""
+        """States (k, n) at t + dt [s] with inputs held, and what row 0 carries then.
+
+        u: (n_u,), or (parts, n_u) held one after the other over equal parts of dt.
+        """
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """Outputs (k, m) at t with inputs (n_u,) of that moment."""
@@ -47,7 +50,7 @@ class System(Protocol):
 class Estimate:
     """What is believed after a sample, and how it came about; a filter restarted from it goes on exactly.
 
-    Where nothing was used, innovation and S are empty and log_likelihood is 0.
+    Where nothing was measured, innovation is nan, S empty and log_likelihood 0.
     """
 
     t: float  # s
@@ -59,19 +62,12 @@ class Estimate:
     used: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) what corrected x
     gated: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) measured, but too far off
     log_likelihood: float = 0.0
+    nis: float = 0.0  # normalised square of the innovation that was used
     x_prior: Array = field(default_factory=lambda: NONE)  # (n,) before the correction
     P_prior: Array = field(default_factory=lambda: NONE)  # (n, n)
     C: Array = field(default_factory=lambda: NONE)  # (n, n) covariance of x before and after the step
     carried: Array = field(default_factory=lambda: NONE)
     memory: Any = None  # what an option of the filter remembers
-
-    @property
-    def nis(self) -> float:
-        """Normalised square of the innovation that was used."""
-        if not self.used.any():
-            return 0.0
-        e = self.innovation[self.used]
-        return float(e @ np.linalg.solve(self.S[np.ix_(self.used, self.used)], e))
 
 
 @dataclass(frozen=True)
@@ -150,14 +146,14 @@ class Filter(ABC):
 
     @abstractmethod
     def _correct(
-        self, x: Array, P: Array, used: BoolArray, innovation: Array, R: Array
+        self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        """x, P after the channels `used`, with their innovations (m_used,) and noise (m_used, m_used)."""
+        """x, P after the channels `used`: their innovations (m_u,), covariance (m_u, m_u), noise in it."""
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
         """Move on by dt with inputs u (n_u,) at its end, correct by outputs y (m,), nan where there are none.
 
-        held: inputs (n_u,) that act over the step, where the mean of both ends is not good enough.
+        held: inputs that act over the step, where the mean of both ends is not good enough; see System.f.
         Raises Diverged where the estimate can not be carried on.
         """
         now, dt = self.now, self.dt if dt is None else dt
@@ -193,8 +189,8 @@ class Filter(ABC):
         if not used.any():
             return x, P, facts
         part = (slice(None), slice(None)) if used.all() else np.ix_(used, used)
-        facts["log_likelihood"] = log_density(innovation[used], S[part])
-        x, P = self._correct(x, P, used, innovation[used], R[part])
+        facts["log_likelihood"], facts["nis"] = log_density(innovation[used], S[part])
+        x, P = self._correct(x, P, used, innovation[used], S[part], R[part])
         if self.adapt:
             self._adapt(self.adapt, innovation, S, R, used)
         return x, P, facts

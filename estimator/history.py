@@ -29,7 +29,7 @@ class Samples:
 
     t: Array  # (N,) s, increasing
     u: Array  # (N, n_u) at t
-    held: Array  # (N - 1, n_u) acting between
+    held: Array  # (N - 1, parts, n_u) acting one after the other between
     y: Array  # (N, m)
 
     def first(self, n: int) -> "Samples":
@@ -37,12 +37,26 @@ class Samples:
         return Samples(self.t[:n], self.u[:n], self.held[: n - 1], self.y[:n])
 
 
-def samples(t: Array, u: Array, y: Array, every: int = 1) -> Samples:
-    """Each `every`-th sample of a record; inputs act between them with their mean by the trapezoidal rule."""
+def samples(t: Array, u: Array, y: Array, every: int = 1, parts: int = 1) -> Samples:
+    """Each `every`-th sample of a record; inputs run linearly between its samples.
+
+    Between two of those that are kept they act with their exact mean over each of so many equal parts.
+    """
     at = np.arange(0, len(t), every)
+    share = np.arange(parts) / parts
+    edges = np.append((t[at[:-1], None] + np.diff(t[at])[:, None] * share).ravel(), t[at[-1]])
+    means = np.diff(_area(t, u, edges), axis=0) / np.diff(edges)[:, None]
+    return Samples(t[at], u[at], means.reshape(len(at) - 1, parts, u.shape[1]), y[at])
+
+
+def _area(t: Array, u: Array, edges: Array) -> Array:
+    """Integral (M, n_u) from t[0] to edges (M,) of inputs (N, n_u) that run linearly between times (N,)."""
+    slope = np.diff(u, axis=0) / np.diff(t)[:, None]
     area = np.vstack([np.zeros(u.shape[1]), np.cumsum((u[1:] + u[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
-    held = np.diff(area[at], axis=0) / np.diff(t[at])[:, None]
-    return Samples(t[at], u[at], held, y[at])
+    k = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, len(t) - 2)
+    since = (edges - t[k])[:, None]
+    found: Array = area[k] + u[k] * since + slope[k] * since**2 / 2
+    return found
 
 
 @dataclass(frozen=True)

@@ -118,6 +118,10 @@ class Joint:
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
         """See System. Unknown inputs act over a step with the mean of both its ends, as known ones do."""
+        if u.ndim == 2:
+            for part, held in enumerate(u):
+                X, carried = self.f(X, held, t + part * dt / len(u), dt / len(u), carried)
+            return X, carried
         values, after = self._values(X, u, carried), np.empty_like(X)
         at = self._n_states + self._n_parameters
         after[:, self._n_states : at] = X[:, self._n_states : at]

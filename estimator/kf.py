@@ -33,7 +33,7 @@ class Kf(Filter):
         return self.system.h(x[None], u, t, carried)[0], symmetric(self._H @ P @ self._H.T)
 
     def _correct(
-        self, x: Array, P: Array, used: BoolArray, innovation: Array, R: Array
+        self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
         found: tuple[Array, Array] = joseph(x, P, self._H[used], innovation, R)
         return found

@@ -25,7 +25,8 @@ class Linear:
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
         """See System; dt is that of the sampling."""
-        moved: Array = X @ self.F.T + (self.B @ u + self.f0)
+        held = u.mean(axis=0) if u.ndim == 2 else u
+        moved: Array = X @ self.F.T + (self.B @ held + self.f0)
         return moved, carried
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:

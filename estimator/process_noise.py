@@ -15,10 +15,12 @@ LEARNT_FROM = 800  # samples
 def motion(t: Array, x: Array, nominal: Array) -> Array:
     """How fast states x (N, n) wander along a run at times t (N,), each in its unit per sqrt(s), (n,).
 
-    The root of the mean squared step over its length; at least a millionth of what is usual of it.
+    The root of the mean squared step over its length; at least a millionth of what is usual of it, and
+    just that where the run failed.
     """
-    steps = np.diff(t)[:, None]
-    found: Array = np.sqrt(np.nanmean(np.diff(x, axis=0) ** 2 / steps, axis=0))
+    if not np.isfinite(x).all():
+        return nominal
+    found: Array = np.sqrt(np.mean(np.diff(x, axis=0) ** 2 / np.diff(t)[:, None], axis=0))
     return np.maximum(found, 1e-6 * nominal)
 
 

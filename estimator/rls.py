@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimator.algebra import joseph, log_density
-from estimator.estimate import NONE, Estimate, checked
+from estimator.estimate import Estimate, checked
 from estimator.record import Array
 
 
@@ -29,15 +29,15 @@ class Rls:
         P = self._forgotten(now.P) if used.any() else now.P
         innovation = y - phi @ now.x
         S = phi @ P @ phi.T + self._R
-        x1, P1, likelihood = now.x, P, 0.0
+        x1, P1, likelihood, nis = now.x, P, 0.0, 0.0
         if used.any():
             part = np.ix_(used, used)
-            likelihood = log_density(innovation[used], S[part])
+            likelihood, nis = log_density(innovation[used], S[part])
             x1, P1 = joseph(now.x, P, phi[used], innovation[used], self._R[part])
             checked(x1, P1, self.names, now.t)
         self.now = Estimate(
             now.t + (dt if now.u is not None else 0.0), x1, P1, phi, innovation, S, used,
-            np.zeros(len(y), dtype=np.bool_), likelihood, now.x, P, now.P, NONE,
+            np.zeros(len(y), dtype=np.bool_), likelihood, nis, now.x, P, now.P,
         )  # fmt: skip
         return self.now
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from estimator.algebra import after, cross, drawn, moments
+from estimator.algebra import corrected, cross, drawn, moments
 from estimator.estimate import (
     Adaptation,
     Covariance,
@@ -57,7 +57,7 @@ class _Batch(UnscentedKalmanFilter):  # type: ignore[misc]
 
     def __init__(self, system: System, points: _Points, m: int) -> None:
         super().__init__(len(system.names), m, 1.0, None, None, points)
-        self.system, self.carried, self.inv = system, np.empty(0), np.linalg.inv
+        self.system, self.carried = system, np.empty(0)
         self.told: tuple[Array, float] = (np.empty(0), 0.0)
         self.before = self.after = np.empty((0, len(system.names)))
 
@@ -67,11 +67,6 @@ class _Batch(UnscentedKalmanFilter):  # type: ignore[misc]
         u, t = self.told
         self.after, self.carried = self.system.f(self.before, u, t, dt, self.carried)
         self.sigmas_f = self.after
-
-    def cross_variance(self, x: Array, z: Array, sigmas_f: Array, sigmas_h: Array) -> Array:
-        """Of states and outputs, (n, m)."""
-        found: Array = cross(self.Wc, sigmas_f, x, sigmas_h, z)
-        return found
 
 
 class Ukf(Filter):
@@ -92,7 +87,7 @@ class Ukf(Filter):
         self.points = _Points(len(system.names), spread, self.factored)
         self.ukf = _Batch(system, self.points, len(self.R))
         self._Y = np.empty((0, len(self.R)))
-        self._nothing = np.zeros_like(self.R)
+        self._y, self._nothing = np.zeros(len(self.R)), np.zeros_like(self.R)
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
         ukf, now = self.ukf, self.now
@@ -108,18 +103,18 @@ class Ukf(Filter):
             ukf.x, ukf.P = x, P
             ukf.sigmas_f = self.points.sigma_points(x, P)
         self._Y = np.ascontiguousarray(self.system.h(ukf.sigmas_f, u, t, carried))
-        return _moments(self._Y, ukf.Wm, ukf.Wc, self._nothing)
+        self._y, S = _moments(self._Y, ukf.Wm, ukf.Wc, self._nothing)
+        return self._y, S
 
     def _correct(
-        self, x: Array, P: Array, used: BoolArray, innovation: Array, R: Array
+        self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        ukf = self.ukf
-        Y = np.ascontiguousarray(self._Y[:, used])
-        rows, expected = iter(Y), ukf.Wm @ Y
-        ukf.update(expected + innovation, R, UT=_moments, hx=lambda _: next(rows))
-        # Joseph's form: a sum of squares where filterpy subtracts one
-        P = after(ukf.Wc, ukf.sigmas_f, x, Y, expected, np.ascontiguousarray(ukf.K), R)
-        return ukf.x, P
+        Y, y = self._Y, self._y
+        if not used.all():
+            Y, y = np.ascontiguousarray(Y[:, used]), y[used]
+        # filterpy's own update subtracts covariances, which may leave one that is none
+        found: tuple[Array, Array] = corrected(self.ukf.Wc, self.ukf.sigmas_f, x, Y, y, S, innovation, R)
+        return found
 
 
 def _moments(points: Array, Wm: Array, Wc: Array, noise: Array, *_functions: None) -> tuple[Array, Array]:

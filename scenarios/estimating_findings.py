@@ -18,7 +18,7 @@ from estimator.ukf import Spread, Ukf
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
-from scenarios.estimating_setup import Setup
+from scenarios.estimating_setup import Setup, finely
 
 Tell = Callable[[str], None]
 
@@ -103,14 +103,14 @@ def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:
     names = joint.names[: n + len(s.parameters)]
     start = joint.start()
     z, std = start.x[: len(names)], np.sqrt(np.diag(start.P))[: len(names)]
-    inputs = {name: s.samples.held[:, j] for j, name in enumerate(s.inputs)}
+    (t, inputs), parts = finely(s.samples, s.inputs), s.samples.held.shape[1]
     with Fmu(archive) as fmu:
 
         def simulate(at: Array) -> Array:
             values = dict(zip(names[:n], at[:n].tolist(), strict=True))
             for p, coordinate in zip(s.parameters, at[n:], strict=True):
                 values[p.name] = float(p.transform.theta(coordinate))
-            y = fmu.simulate(s.samples.t, inputs, s.outputs, {**s.constants, **values})
+            y = fmu.simulate(t, inputs, s.outputs, {**s.constants, **values})[::parts]
             return np.where(np.isfinite(s.samples.y), y, np.nan)
 
         try:

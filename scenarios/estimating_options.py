@@ -22,6 +22,7 @@ class Options(Table):
 
     process_std: noise that drives a state, its unit/sqrt(s). walk: how far a parameter wanders in a second,
     its unit/sqrt(s). initial_std: what is known of a state's start. damping: of an unknown input's process.
+    input_parts: in how many parts inputs act between two samples.
     """
 
     filter: Literal["ukf", "ekf", "dual"] = "ukf"
@@ -34,6 +35,7 @@ class Options(Table):
     clip: tuple[str, ...] = ()
     gate: Positive | None = None
     adapt: tuple[Literal["measurement", "process"], ...] = ()
+    input_parts: Annotated[int, Field(ge=1)] | None = None
     alpha: Annotated[float, Field(gt=0, le=1)] = 1.0
     beta: float = 2.0
     kappa: float = 0.0

@@ -1,6 +1,6 @@
 """From an experiment to the system of its filter: samples, unknowns, noise."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,10 @@ from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating_options import Options
 from scenarios.estimating_unknowns import check_options, inputs_of, parameters_of, states_of, usual
 from scenarios.experiment import Experiment
+
+MIN_SAMPLES = 10
+MOST_PARTS = 16  # of a step
+TOLD_APART = 0.1  # of the noise: a smaller change of the outputs is none
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,8 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     if e.estimate and e.estimate.rate:
         every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
     s = samples(run.t, run.u, run.y, every)
-    if len(s.t) < 2:
-        raise BadInput(f"{e.file}: [estimate] rate = {e.estimate and e.estimate.rate:g} leaves one sample")
+    if len(s.t) < MIN_SAMPLES:
+        raise BadInput(f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher one")
     noise = noise_of(record)
     constants = {**e.parameters, **e.initial}
     parameters = tuple(parameters_of(e, options, d))
@@ -72,7 +76,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     values = constants | {p.name: p.start for p in parameters}
     names = tuple(e.estimate.states) if e.estimate else ()
     states = names or _needed(archive, values, s, record)
-    run_of = _free_run(archive, values, s, record, states)
+    s, run_of = _fine_enough(archive, values, record, states, noise, every, options.input_parts)
     nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
     return Setup(
         e, options, s, noise, tuple(np.isfinite(record.noise_std)), constants,
@@ -111,14 +115,43 @@ def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: R
         return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), dt))
 
 
+def _fine_enough(
+    archive: Archive, values: Mapping[str, float], record: Record, states: tuple[str, ...], noise: Array,
+    every: int, parts: int | None,
+) -> tuple[Samples, Array]:  # fmt: skip
+    """Samples with inputs in as many parts as the outputs' noise can tell apart, and their free run.
+
+    A step with a held input ends in another slip than one with a running input where physics is stiff.
+    """
+    run = record.runs[0]
+    found = samples(run.t, run.u, run.y, every, parts or 1)
+    free = _free_run(archive, values, found, record, states)
+    while parts is None and found.held.shape[1] < MOST_PARTS:
+        finer = samples(run.t, run.u, run.y, every, 2 * found.held.shape[1])
+        other = _free_run(archive, values, finer, record, states)
+        off = np.sqrt(np.mean((other - free)[:, : len(noise)] ** 2, axis=0))
+        if not np.any(off > TOLD_APART * noise):
+            break
+        found, free = finer, other
+    return found, free
+
+
 def _free_run(
     archive: Archive, values: Mapping[str, float], s: Samples, record: Record, states: tuple[str, ...]
 ) -> Array:
     """Outputs and states (N, m + n) of a run with what is believed at the start; nan where the FMU fails."""
-    names = [*record.outputs, *states]
-    inputs = {n: s.held[:, j] for j, n in enumerate(record.inputs)}
+    names, parts = [*record.outputs, *states], s.held.shape[1]
     with Fmu(archive) as fmu:
         try:
-            return fmu.simulate(s.t, inputs, names, dict(values))
+            found = fmu.simulate(*finely(s, record.inputs), names, dict(values))
         except FmuError:
             return np.full((len(s.t), len(names)), np.nan)
+    return found[::parts]
+
+
+def finely(s: Samples, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
+    """Times (M,) at which inputs change, and these by name, (M - 1,) each."""
+    parts = s.held.shape[1]
+    share = np.arange(parts) / parts
+    t = np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * share).ravel(), s.t[-1])
+    return t, {name: s.held[:, :, j].ravel() for j, name in enumerate(names)}

@@ -178,8 +178,17 @@ def test_the_motion_of_a_walk_is_its_size():
 def test_fewer_samples_keep_the_work_that_inputs_do():
     t = np.cumsum(np.random.default_rng(5).uniform(0.5, 1.5, 101))
     u, y = np.sin(t)[:, None], np.cos(t)[:, None]
-    s = samples(t, u, y, every=4)
-    assert len(s.t) == 26
-    assert_allclose(s.held[:, 0] @ np.diff(s.t), np.trapezoid(u[:, 0], t))
-    assert_allclose(s.y, y[::4])
-    assert len(s.first(10).held) == 9
+    for parts in (1, 3):
+        s = samples(t, u, y, every=4, parts=parts)
+        assert len(s.t) == 26
+        assert s.held.shape == (25, parts, 1)
+        assert_allclose(s.held.mean(axis=1)[:, 0] @ np.diff(s.t), np.trapezoid(u[:, 0], t))
+        assert_allclose(s.y, y[::4])
+        assert len(s.first(10).held) == 9
+
+
+def test_inputs_run_linearly_between_samples():
+    t = np.array([0.0, 1.0, 3.0])
+    u, y = np.array([[0.0], [4.0], [0.0]]), np.zeros((3, 1))
+    assert_allclose(samples(t, u, y, parts=2).held[:, :, 0], [[1.0, 3.0], [3.0, 1.0]])
+    assert_allclose(samples(t, u, y, every=2, parts=3).held[:, :, 0], [[2.0, 3.0, 1.0]])
