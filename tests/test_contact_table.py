@@ -12,10 +12,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fmus.contact import cache
 from fmus.contact.exact import exact_profile
 from fmus.contact.normal import hertz
+from fmus.contact.pair import Pair
 from fmus.contact.profile import Polynomial
 from fmus.contact.table import B_MIN, COLUMNS, YOUNG, contact_table
 from fmus.errors import BadInput
-from tests.profile_files import cone, points_of, write_points
+from tests.profile_files import cone, points_of, round_rail, round_wheel, write_points
 
 SHARED = Path(__file__).parents[2] / "shared" / "data" / "contact"
 SEARCHES = ("rigid", "quasi_elastic")
@@ -96,6 +97,20 @@ def test_beyond_flange_contact_the_table_stays_sensible():
     assert table["z"].iloc[-1] < 0.028 / 2 * 1.1  # one wheel on its flange of 28 mm, the other on its tread
     assert table["r_left"].max() <= 0.46 + 0.028 + 1e-9
     assert table[["a_left", "b_left"]].min().min() > 1e-4
+
+
+def test_conforming_surfaces_count_as_nearly_flat():
+    rail = round_rail(0.3)
+    gauge = 1.435 + 2 * (
+        0.75 - Pair(round_wheel(0.306), rail, cant=0.0).left_rail.axis_y
+    )  # crowns under treads
+    narrow, shifts = {"cant": 0.0, "gauge": gauge}, [-1e-5, 0.0, 1e-5]
+    hollow = contact_table(round_wheel(0.306), rail, **narrow, shifts=shifts)
+    assert (hollow["B_left"] == B_MIN).all()  # 0.033 by the radii
+    assert np.isfinite(hollow).all().all()
+    assert hollow["b_left"].max() < 0.05
+    nearly = contact_table(round_wheel(0.33), rail, **narrow, shifts=shifts, search="rigid")
+    assert_allclose(nearly["B_left"], (1 / 0.3 - 1 / 0.33) / 2, rtol=1e-6)
 
 
 def test_columns_and_what_they_are():

@@ -120,6 +120,7 @@ def test_points_without_noise_give_the_profile(name):
     assert_allclose((made.height(y) - z) / np.hypot(1, made.slope(y)), 0, atol=2e-6)
     assert "z of the file points down" in made.found
     assert ("to the flange" in made.found) == (kind == "wheel")
+    assert ("the head leans inwards by about 1:4" in made.found) == (kind == "rail")
 
 
 @settings(max_examples=6)
@@ -145,6 +146,7 @@ def test_noisy_rail_is_found_by_its_gauge_side(tmp_path):
     made = measured_profile(write_points(tmp_path / "rail.csv", -points, "; "), "rail")
     assert "z of the file points down" in made.found
     assert "y of the file points inwards" in made.found
+    assert "leans" not in made.found
     y = np.linspace(-0.022, 0.022, 200)
     true = exact_profile("60E1")
     assert_allclose(made.height(y), true.height(y), atol=2e-5)

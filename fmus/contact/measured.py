@@ -18,6 +18,7 @@ from fmus.errors import BadInput, did_you_mean
 
 NODES = 2.5e-4  # m along the curve between the nodes of the profile's spline
 UPRIGHT = math.cos(math.radians(86))  # least dy/du of what is kept, a wall that is nearly upright ends it
+LEANS = 0.012  # slope of a head that must have been measured as it is canted; 1:40 is 0.025
 LARGEST_NOISE = 1e-3  # m; more is no noise
 
 
@@ -72,9 +73,22 @@ def _made(points: Points, kind: Kind, smoothing: float | None) -> Arrays:
     found = [
         *turned.found,
         f"{len(running.y)} of {len(points.y)} points used",
+        *(_leaning(spline) if kind == "rail" else []),
         f"smoothed to {curve.rms * 1e6:.2g} um rms, {how}, {curve.parameters:.0f} parameters",
     ]
     return {"knots": spline.x, "pieces": spline.c.T, "found": np.array("; ".join(found))}
+
+
+def _leaning(spline: PPoly) -> list[str]:
+    """What to say of a rail whose head leans: its slope in the middle between places of one height."""
+    y = np.linspace(spline.x[0], spline.x[-1], 10000)
+    z = spline(y)
+    high = y[z > max(z[0], z[-1], z.max() - 0.012)]
+    lean = float(spline((high[0] + high[-1]) / 2, 1))
+    if abs(lean) < LEANS:
+        return []
+    way = "inwards" if lean > 0 else "outwards"
+    return [f"the head leans {way} by about 1:{1 / abs(lean):.0f}, so give cant = 0"]
 
 
 def _over_y(curve: Curve, file: str) -> PPoly:
