@@ -6,11 +6,13 @@ Equations, symbols and range of validity: README.md beside this file.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
 import casadi as cs
 
+from fmus.component import Component
 from fmus.contact.coefficients import looked_up
 from fmus.contact.friction import friction_coefficient
 from fmus.contact.laws import selected_law
@@ -19,7 +21,9 @@ from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.port import Port
 from fmus.variables import Expr, Input, Output, Parameter, State, rate
-from fmus.wheelset.curves import FIELDS, LOAD, NU, G, Track, contact_curves
+from fmus.wheelset.curves import FIELDS, LOAD, NU, G, contact_curves
+from fmus.wheelset.stepping import rk4_within_stability
+from fmus.wheelset.track import Track
 
 TABLE = "thesis Table 3.4"
 DRY = "thesis Table 4.1, dry"
@@ -48,6 +52,7 @@ class Wheelset(Model):
 
     name = "Wheelset"
     step_size = 1e-3
+    method = rk4_within_stability
 
     y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)
     psi = State("rad", doc="yaw of the wheelset", nominal=1e-3)
@@ -132,6 +137,15 @@ class Wheelset(Model):
         """effects, probes: see Model; track: the profiles and how they stand."""
         self.track = track
         super().__init__(effects, probes)
+        for name, start in (("r0", track.r0), ("s", track.half_distance)):
+            self.variables[name] = replace(self.variables[name], start=start)
+        search = self.variables["contact_search"]
+        self.variables["contact_search"] = replace(search, doc=f"{search.doc}; {track}")
+
+    @property
+    def about(self) -> str:
+        """What is built in, in one line."""
+        return f"Plan-view wheelset with a laterally suspended mass on straight track; {self.track}."
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
@@ -169,6 +183,17 @@ class Wheelset(Model):
             "contact": Port(m.y - m.y_irr, m.y_dot - m.y_irr_dot, {"F_y_ext": 1.0}),
         }
 
+    def components(m) -> dict[str, Component]:
+        """Primary suspension, lateral and longitudinal."""
+        return {
+            "primary_lateral": Component(("k_y",), ("b_y",)),
+            "primary_yaw": Component(("k_x",), ("b_x",)),
+        }
+
+    def groups(m) -> dict[str, tuple[str, ...]]:
+        """What a change of the rail's surface changes together."""
+        return {"friction_condition": ("mu0", "A", "B", "k_A", "k_S")}
+
     @cached_property
     def _shifts(m) -> dict[str, Expr]:
         """Shift of each wheel towards its flange."""
@@ -203,14 +228,14 @@ class Wheelset(Model):
         phi_dot = m._roll[1]
         r, delta = m.r0 + at["growth"], at["delta"]
         V = cs.fmax(m.V, V_MIN)
-        xi_x = 1 - r / m.r0 - sign * m.s * m.psi_dot / V
-        xi_y = (m.y_dot + r * phi_dot) / V - m.psi
-        xi_s = m.psi_dot / V - sign * delta / m.r0
+        xi_x = (m.V * (1 - r / m.r0) - sign * m.s * m.psi_dot) / V
+        xi_y = (m.y_dot + r * phi_dot - m.V * m.psi) / V
+        xi_s = (m.psi_dot - sign * m.V / m.r0 * delta) / V
         # a patch grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu)
         scale = (m.F_n / LOAD * (G / (1 - NU)) / (m.G / (1 - m.nu))) ** (1 / 3)
         virtual = m.patch > 0.5
         a, b = (scale * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"]) for x in ("a", "b"))
-        mu = friction_coefficient(m.V * cs.sqrt(xi_x**2 + xi_y**2), m.mu0, m.A, m.B)
+        mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2), m.mu0, m.A, m.B)
         c11, c22, c23, c33 = m._coefficients(a, b)
         F_x, F_y, M_z = m.call(
             selected_law(),
