@@ -61,7 +61,7 @@ def agree(found, expected):
 
 
 def installed(*packages):
-    missing = set(packages) - {d.name for d in distributions()}
+    missing = set(packages) - {d.name.replace("_", "-") for d in distributions()}
     if missing:
         pytest.skip(f"not installed: {', '.join(sorted(missing))}; pip install brings it")
 
