@@ -132,9 +132,7 @@ def main() -> None:
 
 
 def _print(times: dict[str, list[float]], spread: float) -> None:
-    print(
-        f"joint UKF of the rig, {DT * 1e3:g} ms, nine sigma points, medians of {ROUNDS} rounds of {STEPS} steps"
-    )
+    print(f"joint UKF of the rig, {DT * 1e3:g} ms, nine sigma points; medians of {ROUNDS} x {STEPS} steps")
     for way, us in times.items():
         plain = np.array(times["plain, native" if "native" in way else "plain, PythonFMU"])
         typical = float(np.median(us))

@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 
 from estimator.access.copies import Copies, Refused
-from estimator.access.probe import Access, probe
+from estimator.access.exchange import Exchange, continuous_states
+from estimator.access.probe import Access, by_exchange, probe
 from estimator.access.recipe import Way
 from estimator.estimate import Diverged, Estimate
 from estimator.record import Array
@@ -82,7 +83,7 @@ class Joint:
         fed = [n for w in unknown for n in w.feeds]
         mine = [s.name for s in states]
         self.names = (*mine, *(p.name for p in parameters), *(n for w in unknown for n in w.states))
-        known = self.archive.description.states
+        known = self.archive.description.states or continuous_states(self.archive)
         self.others = tuple(n for n in known if n not in mine)
         self._constants = dict(constants or {})
         put = [*mine, *self.others, *(p.name for p in parameters), *inputs, *fed]
@@ -122,7 +123,7 @@ class Joint:
             for part, held in enumerate(u):
                 X, carried = self.f(X, held, t + part * dt / len(u), dt / len(u), carried)
             return X, carried
-        values, after = self._values(X, u, carried), np.empty_like(X)
+        values, after = self.rows(X, u, carried), np.empty_like(X)
         at = self._n_states + self._n_parameters
         after[:, self._n_states : at] = X[:, self._n_states : at]
         for w, columns in zip(self.unknown, self._fed, strict=True):
@@ -142,13 +143,24 @@ class Joint:
         """See System; the FMU is asked only for what is not a state."""
         if self._direct is not None:
             return X[:, self._direct]
-        values = self._values(X, u, carried)
-        at = self._n_states + self._n_parameters
+        values = self.rows(X, u, carried)
+        return self._asked(lambda: self.copies.evaluate(values, t))[:, self._seen]
+
+    def rows(self, X: Array, u: Array, carried: Array) -> Array:
+        """What the FMU is given at x of each row (k, n), unknown inputs of this moment, (k, n_put)."""
+        n = self._n_states
+        values = np.empty((len(X), self._n_put))
+        values[:, :n] = X[:, :n]
+        values[:, n : self._n_all] = carried
+        for i, parameter in enumerate(self.parameters):
+            values[:, self._n_all + i] = parameter.transform.theta(X[:, n + i])
+        values[:, self._at_inputs] = u
+        at = n + self._n_parameters
         for w, columns in zip(self.unknown, self._fed, strict=True):
             for column, state in columns:
                 values[:, column] = X[:, at + state]
             at += len(w.states)
-        return self._asked(lambda: self.copies.evaluate(values, t))[:, self._seen]
+        return values
 
     def settled(self, x: Array) -> Array:
         """See System: cuts off what is bounded by clipping."""
@@ -165,6 +177,18 @@ class Joint:
             std[:, i] = p.transform.spread(x[:, i], std[:, i])
             x[:, i] = p.transform.theta(x[:, i])
         return x, std
+
+    def exchange(self) -> Exchange:
+        """An instance by model exchange, the caller's to close; BadInput where the FMU offers none."""
+        told = self._put, self._get, self._fixed
+        access = self.access
+        if access.way is not Way.EXCHANGE:
+            access = by_exchange(self.archive, *told, self._first, self._t0, self._dt)
+        return Exchange(self.archive, *told, self._t0, access.parts)
+
+    def owns(self, close: Callable[[], None]) -> None:
+        """Call something when this is closed."""
+        self._stack.callback(close)
 
     def close(self) -> None:
         """Free the copies, and the unpacked file where it is this one's own."""
@@ -198,7 +222,8 @@ class Joint:
         }
         first |= {s.name: s.start for s in self.states} | {p.name: p.start for p in self.parameters}
         self._first_carried = np.array([first[n] for n in self.others])
-        constants = {n: v for n, v in self._constants.items() if n not in put}
+        constants = self._fixed = {n: v for n, v in self._constants.items() if n not in put}
+        self._t0, self._dt, self._first = t0, dt, first
         self.access: Access = probe(self.archive, put, get, constants, first, t0, dt, compiled)
         late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
         if late:
@@ -206,7 +231,15 @@ class Joint:
                 f"{self.archive.path}: output '{late[0]}' is worked out in steps only, not from the states; "
                 "leave it out of [outputs] or measure a state"
             )
+        if way is Way.EXCHANGE:
+            self.access = by_exchange(self.archive, put, get, constants, first, t0, dt)
         chosen = self.access.way if way is None else way
+        self._put, self._get = tuple(put), tuple(get)
+        self.copies: Copies | Exchange
+        if chosen is Way.EXCHANGE:
+            self.copies = self.exchange()
+            self._stack.callback(self.copies.close)
+            return
         free = self.access.free_time if chosen is self.access.way else False
         self.copies = self._stack.enter_context(
             Copies(self.archive, chosen, put, get, constants, t0, free, compiled)
@@ -220,16 +253,6 @@ class Joint:
         twice = sorted({n for n in put if put.count(n) > 1})
         if twice:
             raise BadInput(f"{d.name}: '{twice[0]}' is named twice among what is set; name it once")
-
-    def _values(self, X: Array, u: Array, carried: Array) -> Array:
-        n = self._n_states
-        values = np.empty((len(X), self._n_put))
-        values[:, :n] = X[:, :n]
-        values[:, n : self._n_all] = carried
-        for i, parameter in enumerate(self.parameters):
-            values[:, self._n_all + i] = parameter.transform.theta(X[:, n + i])
-        values[:, self._at_inputs] = u
-        return values
 
     @staticmethod
     def _asked(call: Callable[[], Array]) -> Array:

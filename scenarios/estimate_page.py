@@ -39,9 +39,7 @@ def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Tru
         correlations=_embedded(correlation_plots(found), folder),
         version=version("railfmi"),
     )
-    part = folder / "estimate.part"
-    part.write_text(page, encoding="utf-8")
-    part.replace(folder / "estimate.html")
+    (folder / "estimate.html").write_text(page, encoding="utf-8")
 
 
 def headline(result: EstimateResult) -> str:

@@ -143,8 +143,11 @@ def rms_errors(found: Findings, truth: Mapping[str, tuple[Array, Array]]) -> dic
 def _write(
     folder: Path, found: Findings, result: EstimateResult, truth: Mapping[str, tuple[Array, Array]]
 ) -> None:
-    """The page first and result.json last: where that is there, all of it is."""
-    h = found.history
-    write_csv(folder / "estimate.csv", h.names, h.t, found.value, found.std)
-    write_page(folder, found, result, truth)
-    result.write(folder / "result.json")
+    """All files beside one another first, then into the folder, result.json last: whole or not at all."""
+    with tempfile.TemporaryDirectory(prefix=".writing_", dir=folder) as part:
+        made = Path(part)
+        write_csv(made / "estimate.csv", found.history.names, found.history.t, found.value, found.std)
+        write_page(made, found, result, truth)
+        result.write(made / "result.json")
+        for file in sorted(made.iterdir(), key=lambda f: f.name == "result.json"):
+            file.replace(folder / file.name)

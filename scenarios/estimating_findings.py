@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.derivatives import differentiated
 from estimator.dual import Dual
 from estimator.ekf import Ekf
 from estimator.estimate import Adaptation, Diverged, Estimate, Gate
@@ -76,7 +77,8 @@ def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
         Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None
     )
     if o.filter == "ekf":
-        return Ekf(joint, start, joint.noise, R, dt, gate, adapt)
+        own = differentiated(joint, s.samples.u[0], float(s.samples.t[0]), dt)
+        return Ekf(own or joint, start, joint.noise, R, dt, gate, adapt)
     return Ukf(joint, start, joint.noise, R, dt, gate, adapt, spread)
 
 

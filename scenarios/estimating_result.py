@@ -59,10 +59,8 @@ class EstimateResult:
     notes: list[str] = field(default_factory=list)
 
     def write(self, path: Path) -> None:
-        """Write as JSON, whole or not at all."""
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(asdict(self), indent=1, allow_nan=False), encoding="utf-8")
-        part.replace(path)
+        """Write as JSON."""
+        path.write_text(json.dumps(asdict(self), indent=1, allow_nan=False), encoding="utf-8")
 
 
 def estimated(joint: Joint, h: History, informed: dict[str, bool]) -> dict[str, dict[str, Any]]:
@@ -179,9 +177,7 @@ def finite(value: float) -> float | None:
 
 
 def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: Array) -> None:
-    """Columns time, then NAME and NAME_std of each quantity; whole or not at all."""
+    """Columns time, then NAME and NAME_std of each quantity."""
     columns = np.column_stack([t, np.stack([value, std], axis=2).reshape(len(t), 2 * len(names))])
     header = ",".join(["time", *(c for n in names for c in (n, f"{n}_std"))])
-    part = path.with_suffix(".part")
-    np.savetxt(part, columns, fmt="%.9g", delimiter=",", header=header, comments="")
-    part.replace(path)
+    np.savetxt(path, columns, fmt="%.9g", delimiter=",", header=header, comments="")

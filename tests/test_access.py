@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from estimator.access.copies import Copies, Refused
+from estimator.access.exchange import Exchange, continuous_states
 from estimator.access.loop import PythonLoop
-from estimator.access.probe import probe
+from estimator.access.probe import CO_SIMULATION, probe
 from estimator.access.recipe import Way
+from fmus.drive.model import Drive
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
@@ -103,7 +105,7 @@ def test_an_output_that_lags_behind_the_state_is_named(foreign):
 
 
 @LOOPS
-@pytest.mark.parametrize("way", list(Way))
+@pytest.mark.parametrize("way", CO_SIMULATION)
 @pytest.mark.parametrize("free", [True, False], ids=["free", "monotone"])
 def test_every_way_into_our_own_fmu_gives_the_bits_of_a_restart(built, way, free, compiled):
     path, constants = built("testrig"), {"N": 7900.0}
@@ -164,3 +166,50 @@ def test_without_numba_the_loop_is_in_python(vdp, monkeypatch):
     with Archive(vdp) as archive, Copies(archive, Way.RESTART, *VDP, {}) as copies:
         assert_array_equal(copies.advance(rows, 0.0, DT), plain(vdp, *VDP, rows)[1])
         assert isinstance(copies._loop, PythonLoop)
+
+
+DRIVE = ["q", "q_dot", "M", "F"], ["q", "q_dot", "q_ddot"]
+DRIVE_START = {"q": 0.1, "q_dot": 0.2, "M": 90.0, "F": 30.0}
+
+
+@pytest.fixture(scope="module", params=[2, 3], ids=["FMI 2", "FMI 3"])
+def native(request, tmp_path_factory):
+    """The drive as a native FMU, for co-simulation and model exchange."""
+    build = pytest.importorskip("fmus.export.native.build", reason="native FMUs are not built here")
+    return build.build_native(Drive(), tmp_path_factory.mktemp("native"), fmi=request.param)
+
+
+def test_model_exchange_makes_the_same_steps(native):
+    rows = np.array([list(DRIVE_START.values()), [0.0, -0.3, 60.0, -10.0], list(DRIVE_START.values())])
+    with Archive(native) as archive:
+        with Copies(archive, Way.RESTART, *DRIVE, {"F_v": 120.0}) as copies:
+            expected = copies.evaluate(rows, 0.0), copies.advance(rows, 0.0, DT)
+        exchange = Exchange(archive, *DRIVE, {"F_v": 120.0}, parts=10)
+        found = exchange.evaluate(rows, 0.0), exchange.advance(rows, 0.0, DT)
+        F, H = exchange.jacobians(rows[0], 0.0, DT)
+        exchange.close()
+    assert_allclose(found[0], expected[0], rtol=1e-14)
+    assert_allclose(found[1], expected[1], rtol=1e-12)
+    assert_array_equal(found[1][0], found[1][2])
+    decay = np.exp(-120.0 / 90.0 * DT)
+    assert_allclose(F, [[1.0, (1 - decay) * 90.0 / 120.0], [0.0, decay]], rtol=1e-12, atol=1e-15)
+    assert_allclose(H, [[1, 0], [0, 1], [0, -120.0 / 90.0]], rtol=1e-14)
+
+
+def test_model_exchange_is_used_where_co_simulation_shows_no_way(native, monkeypatch):
+    def refused(*_):
+        raise BadInput("no way")
+
+    monkeypatch.setattr("estimator.access.probe._by_co_simulation", refused)
+    found = tried(native, DRIVE, DRIVE_START)
+    assert (found.way, set(found.refused)) == (Way.EXCHANGE, set(CO_SIMULATION))
+    assert found.parts in (2, 4, 8)
+    with pytest.raises(BadInput, match="no way"):  # and its own reason where there is neither
+        tried(native, (["q", "M", "F"], ["q"]), DRIVE_START)
+
+
+def test_an_fmu_without_model_exchange(vdp):
+    with Archive(vdp) as archive:
+        assert continuous_states(archive) == ()
+        with pytest.raises(BadInput, match="is not for model exchange"):
+            Exchange(archive, *VDP, {})

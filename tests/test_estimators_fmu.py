@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from estimator.access.recipe import Way
 from estimator.consistency import mean_band, squares
+from estimator.derivatives import differentiated
 from estimator.dual import Dual
 from estimator.ekf import Ekf
 from estimator.estimate import Diverged
@@ -16,6 +18,7 @@ from estimator.shaping import Shaped, Wandering
 from estimator.smoother import smoothed
 from estimator.transform import Transform, bounded
 from estimator.ukf import Ukf
+from fmus.drive.model import Drive
 from fmus.errors import BadInput
 from fmus.host.fmu import Fmu
 from tests.vdp import solved
@@ -91,7 +94,7 @@ def rig_joint(path, states, **more):
 
 @pytest.fixture(scope="module")
 def torque():
-    t = 0.02 * np.arange(120)
+    t = 0.02 * np.arange(80)
     return t, (350 * np.sin(4 * t) + 350)[:, None]
 
 
@@ -266,3 +269,39 @@ def test_an_output_that_is_no_function_of_the_state_is_refused(foreign):
         BadInput, match=r"output 'y' is worked out in steps only, not from the states; leave it"
     ):
         Joint(late, ["y"], [UnknownState("x", 1.0, 1.0)], inputs=["u"], dt=0.01)
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory):
+    """The drive as a native FMU, for co-simulation and model exchange."""
+    build = pytest.importorskip("fmus.export.native.build", reason="native FMUs are not built here")
+    return build.build_native(Drive(), tmp_path_factory.mktemp("native"))
+
+
+def drive_joint(path, **more):
+    states = [UnknownState("q", 0.0, 0.01, 1e-4), UnknownState("q_dot", 0.1, 0.05, 1e-3)]
+    unknown = [UnknownParameter("F_v", 150.0, 50.0, bounded((0.0, float("inf"))))]
+    force = [Shaped("F_ext", 30.0, 0.5)]
+    return Joint(path, ["q", "q_ddot"], states, unknown, force, inputs=["F"], dt=0.01, **more)
+
+
+@pytest.mark.parametrize("way", [Way.RESUME, Way.EXCHANGE])
+def test_the_fmus_own_derivatives_and_differences_make_the_same_extended_filter(native, way):
+    rng = np.random.default_rng(6)
+    with drive_joint(native, way=way) as joint:
+        assert joint.names == ("q", "q_dot", "F_v", "F_ext", "F_ext_rate")
+        own = differentiated(joint, np.array([20.0]), 0.0, 0.01)
+        assert own is not None
+        start, R = joint.start(), np.diag([1e-6, 1e-2])
+        filters = [Ekf(system, start, joint.noise, R, 0.01) for system in (own, joint)]
+        for _ in range(60):
+            u, y = 50 * rng.standard_normal(1), rng.standard_normal(2) * [1e-3, 0.1]
+            one, other = (f.step(u, y) for f in filters)
+        deviation = np.sqrt(np.diag(other.P))
+        assert_allclose((one.x - other.x) / deviation, 0.0, atol=1e-3)
+        assert_allclose(np.diag(one.P), np.diag(other.P), rtol=1e-3)
+
+
+def test_an_fmu_without_derivatives_is_differenced(vdp):
+    with vdp_joint(vdp) as joint:
+        assert differentiated(joint, np.zeros(1), 0.0, VDP_DT) is None

@@ -5,15 +5,17 @@ Nothing is taken from the flags of an FMU but whether a function may be called a
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.access.copies import Copies, Refused
+from estimator.access.exchange import Exchange
 from estimator.access.recipe import Way
 from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
+from fmus.host.description import FmuDescription
 from fmus.host.fmu import Fmu, FmuError
 
 CONTINUES = 1e-9  # relative; a restart may round where an uninterrupted run does not
@@ -21,6 +23,8 @@ NUDGE = 0.01  # of a value, or of its nominal, by which it is perturbed
 LATER = 7.25  # s, a time at which a model that does not look at the clock does the same
 RUN = 24  # steps before the second point
 ALIKE = 1.3  # costs closer than this are no reason to leave the plainer way
+CO_SIMULATION = (Way.SET, Way.RESUME, Way.RESTART)
+MOST_PARTS = 4096  # of a step by model exchange
 ORDERS = ((1, 2, 1), (2, 1, 2), (0, 1, 1), (1, 0, 2))  # of the points: what stays behind from one shows
 TIMED = 5  # evaluations of which the fastest counts
 
@@ -38,6 +42,7 @@ class Access:
     late: frozenset[str]
     refused: dict[Way, str]
     cost: float
+    parts: int = 1  # of a step by model exchange
 
     @property
     def sentence(self) -> str:
@@ -67,8 +72,61 @@ def probe(
 ) -> Access:
     """Try all ways. put: what is set for a step, states among it; start: its values; get: what is read.
 
-    Raises BadInput where no way is honest: the FMU hides a state.
+    Model exchange comes last: its steps are not the FMU's own. Raises BadInput where no way is honest.
     """
+    try:
+        return _by_co_simulation(archive, put, get, constants, start, t0, dt, compiled)
+    except BadInput as error:
+        try:
+            found = by_exchange(archive, put, get, constants, start, t0, dt)
+        except (BadInput, Refused, Dishonest):
+            raise error from None
+        return replace(found, refused=dict.fromkeys(CO_SIMULATION, str(error)))
+
+
+def by_exchange(
+    archive: Archive,
+    put: Sequence[str],
+    get: Sequence[str],
+    constants: Mapping[str, float],
+    start: Mapping[str, float],
+    t0: float,
+    dt: float,
+) -> Access:
+    """Model exchange with steps short enough, tried by perturbing and undoing.
+
+    Raises BadInput where the FMU does not offer it, Refused or Dishonest where it does not work.
+    """
+    exchange = Exchange(archive, put, get, constants, t0)
+    try:
+        row = np.array([start[n] for n in put])
+        moved = _perturbed(archive.description, put, row)
+        while exchange.parts < MOST_PARTS:
+            coarse = exchange.advance(np.array([row, moved, row]), t0, dt)
+            exchange.parts *= 2
+            fine = exchange.advance(np.array([row, moved, row]), t0, dt)
+            if not np.array_equal(fine[0], fine[2]):
+                raise Dishonest("by model exchange something stays behind from one state to the next")
+            if np.all(np.abs(fine - coarse) <= CONTINUES * np.maximum(np.abs(fine), 1e-3)):
+                break
+        begun = time.perf_counter()
+        exchange.advance(np.array([row, moved]), t0, dt)
+        cost = (time.perf_counter() - begun) / 2
+    finally:
+        exchange.close()
+    return Access(Way.EXCHANGE, True, frozenset(), {}, cost, exchange.parts)
+
+
+def _by_co_simulation(
+    archive: Archive,
+    put: Sequence[str],
+    get: Sequence[str],
+    constants: Mapping[str, float],
+    start: Mapping[str, float],
+    t0: float,
+    dt: float,
+    compiled: bool,
+) -> Access:
     d = archive.description
     states = [n for n in put if n in get]
     with Fmu(archive) as fmu:
@@ -78,7 +136,7 @@ def probe(
         answers = [points if timeless else trial.again(points, k) for k in range(len(ORDERS))]
     refused: dict[Way, str] = {}
     honest: dict[Way, tuple[float, bool]] = {}
-    for way in Way:
+    for way in CO_SIMULATION:
         if way is Way.RESUME and not (d.saves_state and timeless):
             refused[way] = "it saves no state" if timeless else "its equations look at the clock"
             continue
@@ -89,7 +147,7 @@ def probe(
     if not honest:
         raise BadInput(f"{archive.path}: shows no state that can be set for a step; {refused[Way.RESTART]}")
     least = min(cost for cost, _ in honest.values())
-    way = next(w for w in Way if w in honest and honest[w][0] <= ALIKE * least)
+    way = next(w for w in CO_SIMULATION if w in honest and honest[w][0] <= ALIKE * least)
     refused |= {w: f"no faster ({1e6 * c:.2g} µs)" for w, (c, _) in honest.items() if w is not way}
     return Access(way, honest[way][1], frozenset(late), refused, honest[way][0])
 
@@ -149,7 +207,7 @@ class Trial:
         late = {
             n for n, a, b in zip(self.get, along, second.before, strict=True) if not _gap(a, b) <= CONTINUES
         }
-        moved = self._perturbed(middle)
+        moved = _perturbed(fmu.description, self.put, middle)
         return [first, second, self.answer(moved, later)], late
 
     def again(self, points: Sequence[Point], steps: int) -> list[Point]:
@@ -161,14 +219,14 @@ class Trial:
         other = self.answer(point.values, self.t0 + LATER)
         return np.array_equal(other.after, point.after) and np.array_equal(other.before, point.before)
 
-    def _perturbed(self, values: Array) -> Array:
-        variables = self.fmu.description.variables
-        moved = []
-        for name, value in zip(self.put, values.tolist(), strict=True):
-            v = variables[name]
-            by = NUDGE * (abs(value) or v.nominal or 1.0)
-            moved.append(value + by if v.max is None or value + by <= v.max else value - by)
-        return np.array(moved)
+
+def _perturbed(d: FmuDescription, put: Sequence[str], values: Array) -> Array:
+    moved = []
+    for name, value in zip(put, values.tolist(), strict=True):
+        v = d.variables[name]
+        by = NUDGE * (abs(value) or v.nominal or 1.0)
+        moved.append(value + by if v.max is None or value + by <= v.max else value - by)
+    return np.array(moved)
 
 
 def _gap(a: float, b: float) -> float:

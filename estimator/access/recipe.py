@@ -15,6 +15,7 @@ class Way(IntEnum):
     SET = 0  # while it runs: what many FMUs allow though the standard does not ask for it
     RESUME = 1  # back to its state saved during initialisation, set, end of initialisation
     RESTART = 2  # reset, set, initialisation: what every FMU must allow
+    EXCHANGE = 3  # model exchange, integrated here: where co-simulation shows no way
 
     @property
     def words(self) -> str:
@@ -26,6 +27,7 @@ _WORDS = {
     Way.SET: "setting its states while it runs",
     Way.RESUME: "going back to a state saved during initialisation and setting its start values",
     Way.RESTART: "reset and initialisation from start values",
+    Way.EXCHANGE: "model exchange, integrated by Runge-Kutta steps",
 }
 
 
