@@ -1,0 +1,1 @@
+"""Controller that holds a speed by a limited torque."""

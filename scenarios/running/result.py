@@ -1,0 +1,89 @@
+"""What a scenario came to: its expectations with their verdicts, its recordings and figures."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from math import isfinite
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An expectation's answer; variant: None where it is about several at once.
+
+    values: the numbers on the sides of its comparisons, in order, None where one is not finite.
+    problem: why it could not be judged, which counts as not come true.
+    """
+
+    that: str
+    because: str
+    variant: str | None
+    holds: bool
+    values: tuple[float | None, ...]
+    problem: str | None = None
+
+    @property
+    def sentence(self) -> str:
+        """For people: what was expected, and the numbers found."""
+        where = f" [{self.variant}]" if self.variant else ""
+        found = ", ".join("nothing" if v is None else f"{v:.5g}" for v in self.values)
+        return f"{' '.join(self.that.split())}{where} ({self.problem or found})"
+
+
+def finite(values: tuple[float, ...]) -> tuple[float | None, ...]:
+    """Numbers for JSON, which knows no nan."""
+    return tuple(v if isfinite(v) else None for v in values)
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """A variant's recording, file names relative to the folder of the result, and how fast it ran."""
+
+    recording: str
+    measured: str | None
+    simulated_seconds: float | None
+    wall_seconds: float
+    interrupted_at: float | None
+
+    @property
+    def speed(self) -> float | None:
+        """Simulated seconds per second."""
+        return None if self.simulated_seconds is None else self.simulated_seconds / self.wall_seconds
+
+
+@dataclass(frozen=True)
+class Result:
+    """The outcome of a scenario; `folder` holds its files."""
+
+    id: str
+    question: str
+    folder: Path
+    expectations: tuple[Finding, ...]
+    runs: Mapping[str, RunSummary]
+    figures: tuple[Path, ...]
+    wall_seconds: float
+    interrupted_at: float | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether it ran to its end and all that was expected came true."""
+        return self.interrupted_at is None and all(finding.holds for finding in self.expectations)
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """The expectations that did not come true."""
+        return tuple(finding for finding in self.expectations if not finding.holds)
+
+    def write(self, file: Path) -> None:
+        """Write as JSON."""
+        table = {
+            "scenario": self.id,
+            "question": self.question,
+            "ok": self.ok,
+            "expectations": [asdict(finding) for finding in self.expectations],
+            "runs": {name: asdict(run) | {"speed": run.speed} for name, run in self.runs.items()},
+            "figures": [figure.relative_to(self.folder).as_posix() for figure in self.figures],
+            "wall_seconds": self.wall_seconds,
+            "interrupted_at": self.interrupted_at,
+        }
+        file.write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

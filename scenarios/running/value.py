@@ -1,0 +1,88 @@
+"""What an expression works with: numbers and signals, with their units as far as they are known."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from estimator.record import Array
+from fmus.errors import BadInput
+
+
+@dataclass(frozen=True, eq=False)
+class Value:
+    """A number, or a signal (n,) over its axis x (n,): time, s, or lateral shift, m.
+
+    unit: None for a bare number, which fits any unit.
+    """
+
+    y: Any
+    x: Array | None = None
+    unit: str | None = None
+
+    @property
+    def is_signal(self) -> bool:
+        """Whether it has an axis."""
+        return self.x is not None
+
+    def signal(self) -> tuple[Array, Array]:
+        """x and y of a signal; BadInput for a number."""
+        if self.x is None:
+            raise BadInput("takes a signal, not a number")
+        if not self.x.size:
+            raise BadInput("gets a signal without samples; widen its window")
+        return self.x, self.y
+
+    def number(self) -> float:
+        """A number; BadInput for a signal."""
+        if self.x is not None:
+            raise BadInput(
+                f"needs a number, not a signal of {self.x.size} samples; take its max, rms, last ..."
+            )
+        return float(self.y)
+
+    def with_y(self, y: Any, unit: str | None) -> "Value":
+        """The same axis with other values."""
+        return Value(y, self.x, unit)
+
+
+def combined(function: Callable[..., Any], values: list[Value], unit: str | None) -> Value:
+    """A function applied sample by sample; signals must have the same axis."""
+    axes = [v.x for v in values if v.x is not None]
+    for x in axes[1:]:
+        if x is not axes[0] and not np.array_equal(x, axes[0]):
+            raise BadInput("joins signals with different times; bring one onto the other's with on(a, b)")
+    with np.errstate(all="ignore"):  # what is not finite shows up in the comparison
+        return Value(function(*(v.y for v in values)), axes[0] if axes else None, unit)
+
+
+def alike(values: list[Value]) -> str | None:
+    """The unit of a sum: that of its terms, unknown where they differ, for numbers have units too."""
+    units = {v.unit for v in values if v.unit is not None}
+    return units.pop() if len(units) == 1 else None
+
+
+def product(a: Value, b: Value) -> str | None:
+    """Unit of a * b."""
+    if a.unit in (None, "1") or b.unit in (None, "1"):
+        return a.unit if b.unit in (None, "1") else b.unit
+    return f"({a.unit})*({b.unit})"
+
+
+def quotient(a: Value, b: Value) -> str | None:
+    """Unit of a / b."""
+    if b.unit in (None, "1"):
+        return a.unit
+    if a.unit == b.unit:
+        return "1"
+    return f"({a.unit or 1})/({b.unit})"
+
+
+def power(a: Value, b: Value) -> str | None:
+    """Unit of a ** b, known for whole exponents from 1 on."""
+    if a.unit in (None, "1"):
+        return a.unit
+    exponent = b.number()
+    whole = exponent == round(exponent) and exponent >= 1
+    return "*".join([f"({a.unit})"] * round(exponent)) if whole else None
