@@ -27,14 +27,12 @@ class Plant:
     ) -> Array:
         """Free run through a record from its first sample: outputs, then `more`, (N, n_y + n_more).
 
-        start: states and parameters by name. An input acts with the mean of its samples at both ends
-        of a step, which is exact to second order for signals sampled from continuous ones.
+        start: states and parameters by name. Inputs act as samples of continuous signals, see Fmu.simulate.
         push: samples (N,) added to inputs.
         """
-        u = held(run.u)
-        inputs = {name: u[:, j] for j, name in enumerate(self.inputs)}
+        inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
         for name, samples in (push or {}).items():
-            inputs[name] = inputs.get(name, 0.0) + (samples[1:] + samples[:-1]) / 2
+            inputs[name] = inputs.get(name, 0.0) + samples
         return self.fmu.simulate(run.t, inputs, (*self.outputs, *more), start)
 
     def transition(
@@ -46,6 +44,16 @@ class Plant:
         self.fmu.step(dt)
         values = np.array(self.fmu.read((*self.states, *self.outputs)))
         return values[: len(x)], values[len(x) :]
+
+    def response(self, x: Array, given: Mapping[str, float], dt: float) -> tuple[Array, Array]:
+        """Restart in a state: the state after a step (n,), and the outputs before it (n_y,).
+
+        given: inputs and parameters by name.
+        """
+        self.fmu.restart(0.0, **{**given, **dict(zip(self.states, x.tolist(), strict=True))})
+        y = np.array(self.fmu.read(self.outputs))
+        self.fmu.step(dt)
+        return np.array(self.fmu.read(self.states)), y
 
 
 class Plants:

@@ -53,7 +53,7 @@ def close_loop(
         if folder is None:
             return result_of(declared.id, problem, found, time.monotonic() - begun, None)
         tell("building the augmented FMU and writing the report")
-        augmented = augment(builder, found, folder)
+        augmented = augment(builder, problem, found, folder)
         result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented)
         write_report(folder, problem, found, result)
         result.write(folder / "result.json")
@@ -95,8 +95,8 @@ def _starts(description: FmuDescription, e: Experiment) -> dict[str, float]:
     return {n: description.variables[n].start or 0.0 for n in e.calibrate}
 
 
-def augment(builder: Builder, found: Outcome, folder: Path) -> Path:
-    """Write the FMU with the effects found and the calibrated values as start values."""
+def augment(builder: Builder, problem: Problem, found: Outcome, folder: Path) -> Path:
+    """Write the FMU with the effects found; declared and found values are its start values."""
     best = found.chosen or found.base
     effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
-    return builder.final(effects, best.fit.theta, folder)
+    return builder.final(effects, {**problem.declared, **best.theta}, folder)

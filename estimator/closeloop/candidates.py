@@ -1,7 +1,7 @@
 """Candidates: what could explain a residual, each with its unknowns and a first size to try."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -9,36 +9,45 @@ from estimator.closeloop import sensors
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Unknown
 from estimator.record import Array, Record
-from fmus.effects import EFFECTS, spectrum
+from fmus.effects import EFFECTS
+from fmus.effects.component_effect import ComponentEffect
+from fmus.effects.effect import Effect
 from fmus.effects.force_law import ForceLaw
+from fmus.effects.input_effect import HOLD, InputEffect
+from fmus.effects.parameter_effect import ParameterEffect
+from fmus.effects.site import Site
+from fmus.variables import Parameter
 
-TRIED = (  # laws whose shape is nothing or the line of a spectrum
-    "constant_force",
-    "coulomb_friction",
-    "cubic_stiffness",
-    "periodic_force",
-    "quadratic_damping",
-    "viscous_damping",
-)
+FINE = 0.1  # of a shape parameter's value: a change of it that matters
+MOMENT = 0.01  # of the record's length, the same for a time
 
 
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a location, or a fault of a sensor.
 
-    amplitudes: the unknowns it is proportional to, with a realistic size as scale;
-    shape: further unknowns, with their start values.
+    amplitudes: the unknowns it is proportional to, with a realistic size as scale; shape: further
+    unknowns, with their start values; fixed: values that no fit has to find. An amplitude with a fixed
+    value is one that a true effect of this kind has: it serves the screening alone.
     """
 
     kind: str
     location: str
     amplitudes: tuple[Unknown, ...]
     shape: tuple[Unknown, ...] = ()
+    fixed: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """All its unknowns."""
-        return self.amplitudes + self.shape
+        """What a fit has to find."""
+        return (*(u for u in self.amplitudes if u.name not in self.fixed), *self.shape)
+
+    @property
+    def given(self) -> dict[str, float]:
+        """Shape and fixed values, amplitudes left out."""
+        own = {u.name for u in self.amplitudes}
+        shape = {u.name: u.start for u in self.shape}
+        return shape | {n: v for n, v in self.fixed.items() if n not in own}
 
     @property
     def is_fault(self) -> bool:
@@ -51,15 +60,26 @@ class Candidate:
         return f"{self.kind}@{self.location}"
 
 
-def physical_candidates(offers: Sequence[tuple[str, str]], forces: Sequence[MissingForce]) -> list[Candidate]:
-    """Every effect on offer, (kind, location), its amplitudes sized by the missing force there."""
+def physical_candidates(
+    offers: Sequence[tuple[str, str]], site: Site, record: Record, forces: Sequence[MissingForce]
+) -> list[Candidate]:
+    """Every effect on offer, (kind, location), in each shape worth trying."""
     at = {missing.port.name: missing for missing in forces}
-    found = []
+    found: list[Candidate] = []
     for kind, location in offers:
         effect = EFFECTS[kind]
-        if location in at and kind in TRIED and issubclass(effect, ForceLaw):
-            missing = at[location]
-            found += [_candidate(effect, location, missing, shape) for shape in _shapes(effect, missing)]
+        if issubclass(effect, ForceLaw):
+            if location in at:
+                found += _of_a_force(effect, location, at[location])
+        elif issubclass(effect, InputEffect):
+            if location in record.inputs:
+                found += _of_an_input(effect, location, record)
+        elif issubclass(effect, ParameterEffect):
+            found += _of_a_parameter(effect, location, site, record)
+        elif issubclass(effect, ComponentEffect):
+            size = {a: effect.size(_length(record)) for a in effect.amplitudes}
+            shapes = effect.guesses(_times(record))
+            found += [_candidate(effect, location, size, shape, _length(record)) for shape in shapes]
     return found
 
 
@@ -80,43 +100,85 @@ def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
     return found
 
 
+def _of_a_force(effect: type[ForceLaw], location: str, seen: MissingForce) -> Iterator[Candidate]:
+    motion = seen.t - seen.t[0], seen.displacement, seen.velocity
+    for shape in effect.guesses(*motion, seen.force):
+        sizes = {a: _size(effect, a, shape, motion, seen.force) for a in effect.amplitudes}
+        yield _candidate(effect, location, sizes, shape, float(motion[0][-1]))
+
+
+def _of_an_input(effect: type[InputEffect], location: str, record: Record) -> Iterator[Candidate]:
+    run, j = record.runs[0], record.inputs.index(location)
+    u, size = run.u[run.fit, j], effect.size(_length(record))
+    whole = effect.complete
+    for shape in effect.guesses(_times(record), u):
+        sizes = {a: whole.get(a, size) for a in effect.amplitudes}
+        told = {HOLD: float(run.u[0, j])} if any(p.name == HOLD for p in effect.parameters("1")) else {}
+        yield _candidate(effect, location, sizes, {**shape, **told}, _length(record))
+
+
+def _of_a_parameter(
+    effect: type[ParameterEffect], location: str, site: Site, record: Record
+) -> Iterator[Candidate]:
+    members = effect.locations(site)[location]
+    sizes = {}
+    for name in members:
+        value = site.variables[name].start or site.variables[name].nominal or 1.0
+        for a in effect.amplitudes:
+            own = a if location == name else f"{a}_{name}"
+            sizes[own] = effect.size(value, _length(record))
+    for shape in effect.guesses(_times(record)):
+        yield _candidate(effect, location, sizes, shape, _length(record))
+
+
 def _candidate(
-    effect: type[ForceLaw], location: str, missing: MissingForce, shape: dict[str, float]
+    effect: type[Effect], location: str, sizes: Mapping[str, float], shape: Mapping[str, float], length: float
 ) -> Candidate:
-    parameters = {p.name: p for p in effect.parameters("rotation")}
-    amplitudes, others = [], []
-    for name, p in parameters.items():
-        low = -np.inf if p.min is None else p.min
-        high = np.inf if p.max is None else p.max
-        full = effect.name_at(location, name)
-        if name in effect.amplitudes:
-            size = _size(effect, name, missing, shape)
-            amplitudes.append(Unknown(full, 0.0, low, high, size))
-        elif name in shape:
-            scale = 1.0 / max(float(np.ptp(missing.displacement)), 1e-9)
-            others.append(Unknown(full, shape[name], low, high, scale))
-    return Candidate(effect.kind, location, tuple(amplitudes), tuple(others))
+    """sizes: of each amplitude; shape: start values, of those that a record tells the final ones."""
+    declared = {p.name: p for p in effect.parameters(_ANY[effect.acts_on])}
+    fixed = dict(effect.complete)
+    fixed |= {n: v for n, v in shape.items() if n in effect.told or n == HOLD}
+    amplitudes = tuple(
+        _unknown(effect, location, name, declared.get(name, declared.get(name.split("_")[0])), 0.0, abs(size))
+        for name, size in sizes.items()
+    )
+    free = {n: v for n, v in shape.items() if n not in fixed}
+    others = tuple(
+        _unknown(
+            effect, location, n, declared[n], v, MOMENT * length if n == "t0" else FINE * (abs(v) or 1.0)
+        )
+        for n, v in free.items()
+    )
+    named = {effect.name_at(location, n): v for n, v in fixed.items()}
+    return Candidate(effect.kind, location, amplitudes, others, named)
 
 
-def _size(effect: type[ForceLaw], amplitude: str, missing: MissingForce, shape: dict[str, float]) -> float:
+_ANY = {"port": "rotation", "component": "", "parameter": "1", "input": "1"}  # units do not matter here
+
+
+def _unknown(
+    effect: type[Effect], location: str, name: str, p: Parameter | None, start: float, scale: float
+) -> Unknown:
+    low = -np.inf if p is None or p.min is None else p.min
+    high = np.inf if p is None or p.max is None else p.max
+    return Unknown(effect.name_at(location, name), start, low, high, scale)
+
+
+def _size(
+    effect: type[ForceLaw], amplitude: str, shape: Mapping[str, float], motion: tuple[Array, Array, Array],
+    force: Array,
+) -> float:  # fmt: skip
     """The amplitude with which the law's force has the rms of the missing one."""
-    unit = _law(effect, missing, {**shape, amplitude: 1.0})
+    unit = effect.along({**shape, amplitude: 1.0}, *motion)
     rms = float(np.sqrt(np.mean(unit**2)))
-    return float(np.sqrt(np.mean(missing.force**2))) / max(rms, 1e-12)
+    return float(np.sqrt(np.mean(force**2))) / max(rms, 1e-12)
 
 
-def _law(effect: type[ForceLaw], missing: MissingForce, values: dict[str, float]) -> Array:
-    """The force of a law along the motion (n,), with the amplitudes not named at 0."""
-    return effect.along(values, missing.t, missing.displacement, missing.velocity)
+def _times(record: Record) -> Array:
+    """Times of the identify part, s from the start."""
+    run = record.runs[0]
+    return np.asarray(run.t[run.fit] - run.t[0])
 
 
-def _shapes(effect: type[ForceLaw], missing: MissingForce) -> list[dict[str, float]]:
-    """Start values of an effect's shape parameters worth trying; one empty set where it has none to find."""
-    if effect.kind != "periodic_force":
-        return [{}]
-    return effect.guesses(missing.t, missing.displacement, missing.velocity, missing.force)
-
-
-def orders(missing: MissingForce) -> list[float]:
-    """Strongest lines of the missing force over its displacement, in rad per unit of displacement."""
-    return spectrum.orders(missing.displacement, missing.velocity, missing.force)
+def _length(record: Record) -> float:
+    return float(record.runs[0].t[-1] - record.runs[0].t[0])

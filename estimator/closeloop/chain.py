@@ -13,10 +13,12 @@ from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, changes, screen
+from estimator.closeloop.screen import Promise, built, changes, screen
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
 
+NOMINEES = 24  # effects that are fitted
+SHAPES = 2  # start values of an effect's shape that are fitted
 FAULTS = 4  # faults of sensors that are fitted
 
 Tell = Callable[[str], None]
@@ -53,9 +55,11 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     declared, base, size = calibrate(problem)
     tell("inferring the missing force at each port")
     forces = missing_forces(problem, base.fit.theta, noise)
-    candidates = physical_candidates(problem.builder.offers, forces) + fault_candidates(problem.record, noise)
-    tell(f"screening {len(candidates)} candidates by simulated sensitivity")
-    change = list(zip(candidates, changes(problem, base.fit, candidates, size, jobs), strict=True))
+    builder = problem.builder
+    candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
+    candidates += fault_candidates(problem.record, noise)
+    tell(f"screening {len(candidates)} candidates by their effect on the linearised FMU")
+    change = list(zip(candidates, changes(problem, base.fit, candidates, size), strict=True))
     promises = screen(base.fit, [((c,), g) for c, g in change])
     tell("testing for a discrepancy against simulated records without one")
     detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
@@ -63,8 +67,10 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early)
-    tell("fitting each candidate inside the FMU, jointly with the declared parameters")
-    singles = hypotheses(problem, base, nominated(promises), size, jobs)
+    chosen = nominated(promises)
+    tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
+    problem = built(problem, [p.candidates[0] for p in chosen])  # one FMU holds them all, off
+    singles = hypotheses(problem, base, chosen, size, jobs)
     pairs: list[Hypothesis] = []
     floor_known = not np.isnan(problem.record.noise_std).any()
     if not (floor_known and any(explains(problem, h, base, noise, size) for h in singles)):
@@ -77,9 +83,10 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
 
 
 def nominated(promises: Sequence[Promise]) -> list[Promise]:
-    """All physical candidates, since screening misjudges strong laws, and the leading faults of sensors.
-
-    For a fault the screening is exact but for what calibration shifts.
-    """
-    faults = [p for p in promises if p.candidates[0].is_fault]
-    return [p for p in promises if p not in faults[FAULTS:]]
+    """The leading physical candidates, each in its best shapes, and the leading faults of sensors."""
+    labels: dict[str, list[Promise]] = {}
+    for p in promises:
+        labels.setdefault(p.label, []).append(p)
+    physical = [own for own in labels.values() if not own[0].candidates[0].is_fault][:NOMINEES]
+    faults = [own for own in labels.values() if own[0].candidates[0].is_fault][:FAULTS]
+    return [p for own in (*physical, *faults) for p in own[:SHAPES]]

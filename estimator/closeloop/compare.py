@@ -32,6 +32,12 @@ class Hypothesis:
     residuals: tuple[Array, ...]
 
     @property
+    def theta(self) -> dict[str, float]:
+        """All values by name, the fixed ones too."""
+        fixed = {n: v for c in self.candidates for n, v in c.fixed.items()}
+        return {**fixed, **self.fit.theta}
+
+    @property
     def label(self) -> str:
         """Its candidates' labels joined; "none" for the base."""
         return label(self.candidates) or "none"
@@ -52,11 +58,14 @@ class Hypothesis:
         return np.array([-0.5 * b.sum() for b in np.array_split(squares, BLOCKS)])
 
     def significance(self) -> list[float]:
-        """Size of each candidate's amplitudes over their standard error."""
+        """Size of each candidate's amplitudes over their standard error; infinite where they are fixed."""
         names = [u.name for u in self.fit.unknowns]
         found = []
         for c in self.candidates:
-            i = [names.index(u.name) for u in c.amplitudes]
+            i = [names.index(u.name) for u in c.amplitudes if u.name not in c.fixed]
+            if not i:
+                found.append(np.inf)
+                continue
             value, covariance = self.fit.values[i], self.fit.covariance[np.ix_(i, i)]
             found.append(float(np.sqrt(value @ np.linalg.pinv(covariance) @ value)))
         return found

@@ -19,6 +19,7 @@ REPLICATES = 499
 LEVEL = 0.01  # probability of calling noise a discrepancy
 SLOW_BLOCKS = 40  # pieces of the held-out part whose means show slow residuals
 SHARE = 0.02  # of an output's rms, and
+LIKENESS = "likeness to an effect"
 NOISES = 2.0  # times its noise: a smaller residual does not matter
 
 
@@ -46,7 +47,7 @@ def detect(
     residual = np.concatenate(base.residuals) / noise
     slopes = _sensitivities(problem, base, noise)
     g = _directions(base.fit.jacobian, regressors) if regressors else None
-    observed = _figures(residual, fit_mask, test_mask, g)
+    observed = _figures(residual, test_mask)
     n = slopes.shape[2]
     back = np.linalg.pinv(slopes[fit_mask].reshape(fit_mask.sum() * len(noise), n)) if n else np.zeros((0, 1))
     copies = []
@@ -54,10 +55,15 @@ def detect(
         e = rng.standard_normal(residual.shape)
         if n:
             e -= slopes @ (back @ e[fit_mask].ravel())
-        copies.append(_figures(e, fit_mask, test_mask, g))
+        copies.append(_figures(e, test_mask))
+    references = {name: np.array([c[name] for c in copies]) for name in observed}
+    if g is not None:
+        fitted = residual[fit_mask].ravel()
+        observed[LIKENESS] = float(np.max((g.T @ fitted) ** 2))
+        references[LIKENESS] = _likeness_of_noise(g, rng)
     p_values, figures = [], {}
     for name, value in observed.items():
-        reference = np.array([c[name] for c in copies])
+        reference = references[name]
         p_values.append((1 + np.sum(reference >= value)) / (REPLICATES + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
     return Detection(min(1.0, len(p_values) * float(min(p_values))), figures, matters(problem, base, noise))
@@ -93,13 +99,18 @@ def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
     return directions
 
 
-def _figures(residual: Array, fit: Array, test: Array, regressors: Array | None) -> dict[str, float]:
+def _likeness_of_noise(g: Array, rng: np.random.Generator) -> Array:
+    """The largest squared projection of white noise on any direction of g (m, k), (REPLICATES,)."""
+    values, vectors = np.linalg.eigh(g.T @ g)
+    root = vectors * np.sqrt(np.maximum(values, 0))
+    drawn = rng.standard_normal((REPLICATES, g.shape[1])) @ root.T
+    return np.asarray(np.max(drawn**2, axis=1))
+
+
+def _figures(residual: Array, test: Array) -> dict[str, float]:
     held_out = residual[test]
     means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(held_out, SLOW_BLOCKS)])
-    figures = {
+    return {
         "size of the held-out residual": float(np.max(np.mean(held_out**2, axis=0))),
         "slow part of the held-out residual": float(np.max(np.mean(means**2, axis=0))),
     }
-    if regressors is not None:
-        figures["likeness to an effect"] = float(np.max((regressors.T @ residual[fit].ravel()) ** 2))
-    return figures

@@ -35,7 +35,7 @@ def try_pairs(
     promises = _from_base(base, physical)
     if alone:
         best = next(iter(alone.values()))
-        promises += _partners(problem, best, [c for c, _ in physical], size, jobs)
+        promises += _partners(problem, best, [c for c, _ in physical], size)
     found = hypotheses(problem, base, promises, size, jobs)
     kept = [h for h in found if not idle(h)]
     left = {h.label: h for h in found if len(idle(h)) == 1}
@@ -58,11 +58,11 @@ def _from_base(base: Hypothesis, physical: Changes) -> list[Promise]:
 
 
 def _partners(
-    problem: Problem, best: Hypothesis, candidates: Sequence[Candidate], size: Array, jobs: int
+    problem: Problem, best: Hypothesis, candidates: Sequence[Candidate], size: Array
 ) -> list[Promise]:
     others = [c for c in candidates if c.label != best.label]
     here = built(problem, best.candidates)
-    change = changes(here, best.fit, others, size, jobs)
+    change = changes(here, best.fit, others, size)
     promises = screen(best.fit, [((c,), g) for c, g in zip(others, change, strict=True)])[:PROMISES]
     return [
         Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in promises

@@ -13,6 +13,7 @@ import numpy as np
 from estimator.closeloop.sensors import faulty
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
+from fmus.export.outside import Outside
 from fmus.host.description import PortNames
 
 START_SAMPLES = 20  # from which a start state that is measured is found
@@ -36,6 +37,9 @@ class Builder(Protocol):
     @property
     def offers(self) -> tuple[tuple[str, str], ...]:
         """(kind, location) of every effect that can be built in."""
+
+    def outside(self) -> Outside:
+        """The FMU without effects as a site for them, seen from outside."""
 
     def __call__(self, effects: tuple[tuple[str, str], ...]) -> Path:
         """Path of the FMU with these effects, all off at their start values."""

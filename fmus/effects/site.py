@@ -48,6 +48,15 @@ class Site:
         """Locations of springs and dampers, by the contract's names."""
         return {}
 
+    def alike_locations(self) -> dict[str, tuple[str, ...]]:
+        """Locations that are several others alike, with the names of these."""
+        at = self.ports()
+        return {
+            name: tuple(other for part in port.parts for other, p in at.items() if p is part)
+            for name, port in at.items()
+            if port.parts
+        }
+
     def groups(self) -> dict[str, tuple[str, ...]]:
         """Parameters that change together, by the name of what they make up."""
         return {}

@@ -7,7 +7,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from fmus.effects import EFFECTS, offers
+from fmus.errors import BadInput
 from fmus.export.coupled import build_coupled
+from fmus.export.native.build import build_native
 from fmus.export.outside import Outside
 from fmus.export.pythonfmu import build_python
 from fmus.host.archive import describe
@@ -37,9 +39,16 @@ class ModelBuilder:
         names = model_class(self.model)().ports()
         return tuple(PortNames(n, f"{n}_force", f"{n}_velocity", f"{n}_displacement") for n in names)
 
+    def outside(self) -> Outside:
+        """The FMU without effects as a site for them, seen from outside."""
+        return Outside(describe(self(())), self.ports, self._model((), probes=False))
+
     def __call__(self, effects: Effects) -> Path:
-        """Path of the FMU with these effects, all off at their start values."""
-        return _once(self.folder, effects, lambda path: build_python(self._model(effects, probes=True), path))
+        """Path of the FMU with these effects, all off at their start values.
+
+        Native where a C compiler is at hand, since hypotheses are run many times; PythonFMU otherwise.
+        """
+        return _once(self.folder, effects, lambda path: _fastest(self._model(effects, probes=True), path))
 
     def final(self, effects: Effects, starts: Mapping[str, float], out: Path) -> Path:
         """Write the FMU with effects and start values that were found, for use elsewhere."""
@@ -67,6 +76,10 @@ class ForeignBuilder:
         """
         return offers(Outside(describe(self.fmu), self.ports))
 
+    def outside(self) -> Outside:
+        """The FMU without effects as a site for them, seen from outside."""
+        return Outside(describe(self(())), self.ports)
+
     def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values.
 
@@ -80,6 +93,13 @@ class ForeignBuilder:
         """Write the FMU with effects and start values that were found, for use elsewhere."""
         target = out / f"{self.fmu.stem}_augmented.fmu"
         return build_coupled(self.fmu, self.ports, effects, target, starts=dict(starts))
+
+
+def _fastest(model: Model, path: Path) -> Path:
+    try:
+        return build_native(model, path)
+    except BadInput:  # no compiler
+        return build_python(model, path)
 
 
 def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:

@@ -7,20 +7,26 @@ from dataclasses import dataclass
 
 import casadi as cs
 
+from fmus.component import Component
 from fmus.effects import EFFECTS
 from fmus.effects.site import Site
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable, PortNames
-from fmus.port import UNITS, Port
+from fmus.port import UNITS, Port, alike
 from fmus.variables import Expr, Input, Parameter, State, Variable
 
 
 class Outside(Site):
-    """Inputs, parameters and ports of a foreign FMU; only its owner knows what makes sense at a port."""
+    """Inputs, parameters and ports of an FMU; of a foreign one only its owner knows what makes sense at a port.
+
+    model: what the FMU was built from, where it is known; its components and groups are then known too.
+    """
 
     places_known = False
 
-    def __init__(self, description: FmuDescription, ports: Sequence[PortNames]) -> None:
+    def __init__(
+        self, description: FmuDescription, ports: Sequence[PortNames], model: Site | None = None
+    ) -> None:
         known, seen = description.variables, {*description.inputs, *description.outputs}
         for port in ports:
             for name in (port.force, port.velocity, port.displacement):
@@ -29,12 +35,12 @@ class Outside(Site):
         names = [*description.inputs, *description.parameters]
         super().__init__({n: _variable(known[n]) for n in names}, {n: cs.SX.sym(n) for n in names})
         self.name = description.name  # type: ignore[misc]  # of this one, where a model has that of its class
-        self.names, self.description = ports, description
+        self.names, self.description, self.model = ports, description, model
         self.motion = cs.SX.sym("motion", 2 * len(ports))
 
     def ports(self) -> dict[str, Port]:
         """See Site.ports: by displacement and velocity read from the FMU."""
-        return {
+        single = {
             port.name: Port(
                 self.motion[2 * i],
                 self.motion[2 * i + 1],
@@ -43,6 +49,16 @@ class Outside(Site):
             )
             for i, port in enumerate(self.names)
         }
+        parts = self.model.alike_locations() if self.model else {}
+        return single | {name: alike([single[part] for part in names]) for name, names in parts.items()}
+
+    def components(self) -> dict[str, Component]:
+        """See Site.components."""
+        return self.model.components() if self.model else {}
+
+    def groups(self) -> dict[str, tuple[str, ...]]:
+        """See Site.groups."""
+        return self.model.groups() if self.model else {}
 
     def own_inputs(self) -> list[Input]:
         """See Site.own_inputs: those that are no ports."""
@@ -51,6 +67,40 @@ class Outside(Site):
 
     def _turns(self, port: PortNames) -> bool:
         return self.description.variables[port.displacement].unit in (UNITS["rotation"]["q"], "deg")
+
+
+@dataclass(frozen=True)
+class Around:
+    """Effects around an FMU as functions of its motion m = (q, v) at each port and of what it is given.
+
+    states, parameters: what the effects bring; told: names of the inputs and parameters that the FMU is
+    given by the laws; given: inputs and parameters of the FMU, in the order of z = (given, parameters).
+    rates(m, x, z) -> derivatives of the states; values(m, x, z) -> what is told.
+    """
+
+    states: list[State]
+    parameters: list[Parameter]
+    told: list[str]
+    given: list[str]
+    rates: cs.Function
+    values: cs.Function
+
+
+def around(site: Outside, effects: Sequence[tuple[str, str]]) -> Around:
+    """Build effects (kind, location) around an FMU; BadInput where a location is not known."""
+    site.build([(EFFECTS[kind], location) for kind, location in effects])
+    brought = [v for n, v in site.variables.items() if n in site.brought]
+    states = [v for v in brought if isinstance(v, State)]
+    parameters = [v for v in brought if isinstance(v, Parameter)]
+    symbols = site.free_symbols
+    told = [n for n in symbols if n not in site.brought and not cs.is_equal(site.symbols[n], symbols[n])]
+    given = [*site.description.inputs, *site.description.parameters]
+    x = cs.vertcat(*(symbols[s.name] for s in states))
+    z = cs.vertcat(*(symbols[n] for n in given), *(symbols[p.name] for p in parameters))
+    arguments = [site.motion, x, z]
+    rates = cs.Function("f", arguments, [cs.vertcat(*(site.rates[s.name] for s in states))])
+    values = cs.Function("values", arguments, [cs.vertcat(*(site.symbols[n] for n in told))])
+    return Around(states, parameters, told, given, rates, values)
 
 
 @dataclass(frozen=True)
@@ -71,35 +121,32 @@ class Laws:
 
 def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Sequence[tuple[str, str]]) -> Laws:
     """Build effects (kind, location) around a foreign FMU; BadInput where a location is not known."""
-    site = Outside(description, ports)
-    site.build([(EFFECTS[kind], location) for kind, location in effects])
-    brought = [v for n, v in site.variables.items() if n in site.brought]
-    states = [v for v in brought if isinstance(v, State)]
-    parameters = [v for v in brought if isinstance(v, Parameter)]
-    symbols = site.free_symbols
-    told = [n for n in symbols if n not in site.brought and not cs.is_equal(site.symbols[n], symbols[n])]
-    unseen = cs.SX.sym("unseen", len(description.states))
-    x = cs.vertcat(*(symbols[s.name] for s in states))
-    own = cs.vertcat(*(symbols[p.name] for p in parameters))
-    foreign = cs.vertcat(*(symbols[n] for n in (*description.inputs, *description.parameters)))
+    made = around(Outside(description, ports), effects)
+    x = cs.SX.sym("x", len(made.states))
+    unseen, foreign, own = (
+        cs.SX.sym(name, len(part))
+        for name, part in (
+            ("unseen", description.states),
+            ("foreign", made.given),
+            ("own", made.parameters),
+        )
+    )
     z, rest = cs.vertcat(unseen, x, foreign, own), cs.vertcat(foreign, own)
-    f = cs.Function("f", [site.motion, x, rest], [cs.vertcat(*(site.rates[s.name] for s in states))])
-    values = cs.Function("values", [site.motion, x, rest], [cs.vertcat(*(site.symbols[n] for n in told))])
     m0, m1, dt = (
         cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 1))
     )
     half = _moved_on(m0, dt / 2)
-    middle = values(half, _after(f, x, rest, m0, half, dt / 2), rest)
+    middle = made.values(half, after(made.rates, x, rest, m0, half, dt / 2), rest)
     return Laws(
-        states,
-        parameters,
-        told,
+        made.states,
+        made.parameters,
+        made.told,
         cs.Function("push", [m0, z, dt], [cs.cse(middle)]),
-        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(_after(f, x, rest, m0, m1, dt))]),
+        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(after(made.rates, x, rest, m0, m1, dt))]),
     )
 
 
-def _after(f: cs.Function, x: Expr, rest: Expr, m0: Expr, m1: Expr, dt: Expr) -> Expr:
+def after(f: cs.Function, x: Expr, rest: Expr, m0: Expr, m1: Expr, dt: Expr) -> Expr:
     """States x after dt by a Runge-Kutta step, all else held."""
     middle = (m0 + m1) / 2
     k1 = f(m0, x, rest)

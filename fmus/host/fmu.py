@@ -75,14 +75,18 @@ class Fmu:
     ) -> Array:
         """Restart at t[0] and run freely through t; outputs (N, n_y), the first row at t[0].
 
-        t: (N,) s, increasing. inputs: (N-1,) each, the value held over each step.
+        t: (N,) s, increasing. inputs: (N,) samples each: over a step the mean of both ends acts, which is
+        exact to second order for signals sampled from continuous ones, and outputs are read with the
+        sample of their time; or (N-1,), the value held over each step.
         """
         u = np.column_stack([*inputs.values()]) if inputs else np.empty((len(t) - 1, 0))
-        first = {n: float(v[0]) for n, v in inputs.items()}
+        sampled = len(u) == len(t)
+        first = dict(zip(inputs, u[0].tolist(), strict=True))
         self.restart(float(t[0]), **{**start, **first})
         y0 = self.read(outputs)
+        acting, ends = ((u[1:] + u[:-1]) / 2, u[1:]) if sampled else (u, None)
         run = self._instance.run
-        y = self._safely(run, t, u, self.references(inputs), self.references(outputs))
+        y = self._safely(run, t, acting, self.references(inputs), self.references(outputs), ends)
         self.time = float(t[-1])
         return np.vstack([y0, y])
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fmus.host.archive import Archive
 
 Array = NDArray[np.float64]
+LONG = 500  # steps, from which a compiled loop is worth its start
 OK, WARNING, DISCARD, FATAL = 0, 1, 2, 4
 NUMBERS = count()
 MESSAGES: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=20))  # by instance name
@@ -139,28 +140,57 @@ class Instance(ABC):
         """What failed and why, for a raw call whose status is above WARNING."""
         return self._failed(what, status)
 
-    def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
+    def run(
+        self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int], ends: Array | None = None
+    ) -> Array:
         """Step from t[0] through t with inputs u (N-1, n_u) held over each step; outputs (N-1, n_y).
 
-        The loop of every simulation: raw calls on arrays made once.
+        ends: (N-1, n_u), inputs at the end of each step, set before the outputs are read: what depends on
+        an input directly is then that of this very time. The loop of every simulation: raw calls on arrays
+        made once.
         """
-        n_u, n_y = len(set_refs), len(get_refs)
-        (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
-        y = np.empty((len(t) - 1, n_y))
-        times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
-        into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
         self._refuse_after_fatal()
+        n_u, n_y = len(set_refs), len(get_refs)
+        y = np.empty((len(t) - 1, n_y))
+        failed = self._compiled(t, u, set_refs, get_refs, ends, y) if len(t) > LONG else None
+        if failed is not None:
+            k, status = failed
+            if k >= 0:
+                raise CallFailed(self._failed(f"step at t = {t[k]:g} s", status))
+            return y
+        (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
+        times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
+        last = None if ends is None or not n_u else np.ascontiguousarray(ends, dtype=float)
+        into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
         for k, dt in enumerate(steps):
             into[:] = rows[k]
             status = push() if n_u else OK
             if status <= WARNING:
                 status = step(times[k], dt)
+            if status <= WARNING and last is not None:
+                into[:] = last[k]
+                status = push()
             if status <= WARNING:
                 status = pull()
             if status > WARNING:
                 raise CallFailed(self._failed(f"step at t = {times[k]:g} s", status))
             y[k] = out
         return y
+
+    def _compiled(
+        self,
+        t: Array,
+        u: Array,
+        set_refs: Sequence[int],
+        get_refs: Sequence[int],
+        ends: Array | None,
+        y: Array,
+    ) -> tuple[int, int] | None:
+        """The same loop compiled, into y: the step that failed, -1 where none did, and the status.
+
+        None where there is no compiled loop for this FMU here.
+        """
+        return None
 
     def close(self) -> None:
         """Free the instance and unload the library; one that failed fatally stays where it is."""
