@@ -29,6 +29,7 @@ TABLE = "thesis Table 3.4"
 DRY = "thesis Table 4.1, dry"
 CHOICE = "this model"
 V_MIN = 0.1  # m/s, below which creepages are those at this speed
+S_MIN = 1e-12  # rounds the size of the creepage at zero
 SIDES = {"left": 1.0, "right": -1.0}  # sign of y
 
 
@@ -235,7 +236,7 @@ class Wheelset(Model):
         scale = (m.F_n / LOAD * (G / (1 - NU)) / (m.G / (1 - m.nu))) ** (1 / 3)
         virtual = m.patch > 0.5
         a, b = (scale * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"]) for x in ("a", "b"))
-        mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2), m.mu0, m.A, m.B)
+        mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2 + S_MIN**2), m.mu0, m.A, m.B)
         c11, c22, c23, c33 = m._coefficients(a, b)
         F_x, F_y, M_z = m.call(
             selected_law(),
