@@ -10,6 +10,7 @@ import numpy as np
 from estimator.estimate import Diverged, Estimate
 from estimator.record import Array, BoolArray
 
+EVEN = 1e-6  # of a step, below which a difference is one of printed times
 TOLD = 200  # samples between two reports of progress
 
 
@@ -31,6 +32,13 @@ class Samples:
     u: Array  # (N, n_u) at t
     held: Array  # (N - 1, parts, n_u) acting one after the other between
     y: Array  # (N, m)
+
+    @property
+    def steps(self) -> Array:
+        """Lengths of the steps (N - 1,), s; even ones are made alike to the last bit."""
+        steps = np.diff(self.t)
+        usual = np.median(steps)
+        return np.where(np.abs(steps - usual) < EVEN * usual, usual, steps)
 
     def first(self, n: int) -> "Samples":
         """The first n samples."""
@@ -82,12 +90,13 @@ def filtered(
 ) -> History:
     """Take a filter through samples; one that diverges stops with what it has. tell: hears the share done."""
     rows, kept, last, broken = _Rows(len(filter.names), s.y.shape[1]), [], filter.now, ""
-    for k, t in enumerate(s.t):
+    steps = s.steps.tolist()
+    for k in range(len(s.t)):
         try:
             if k == 0:
                 last = filter.step(s.u[0], s.y[0])
             else:
-                last = filter.step(s.u[k], s.y[k], float(t - s.t[k - 1]), s.held[k - 1])
+                last = filter.step(s.u[k], s.y[k], steps[k - 1], s.held[k - 1])
         except Diverged as error:
             broken = str(error)
             break

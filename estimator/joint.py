@@ -20,6 +20,8 @@ from estimator.transform import Transform
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 
+KEPT = 256  # lengths of steps whose noise is kept
+
 
 @dataclass(frozen=True)
 class UnknownParameter:
@@ -77,6 +79,7 @@ class Joint:
         compiled: bool = True,
     ) -> None:
         self._stack = ExitStack()
+        self._noise: dict[float, Array] = {}
         self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
         self.outputs, self.inputs = tuple(outputs), tuple(inputs)
         self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
@@ -107,15 +110,11 @@ class Joint:
 
     def noise(self, dt: float) -> Array:
         """Covariance (n, n) of what comes into x in a step of dt [s]."""
-        Q = np.zeros((len(self.names),) * 2)
-        walks = [*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)]
-        np.fill_diagonal(Q[: len(walks), : len(walks)], np.square(walks) * dt)
-        at = len(walks)
-        for w in self.unknown:
-            size = len(w.states)
-            Q[at : at + size, at : at + size] = w.discrete(dt)[1]
-            at += size
-        return Q
+        if dt not in self._noise:
+            if len(self._noise) >= KEPT:
+                self._noise.clear()
+            self._noise[dt] = self._noise_of(dt)
+        return self._noise[dt]
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
         """See System. Unknown inputs act over a step with the mean of both its ends, as known ones do."""
@@ -201,6 +200,17 @@ class Joint:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _noise_of(self, dt: float) -> Array:
+        Q = np.zeros((len(self.names),) * 2)
+        walks = [*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)]
+        np.fill_diagonal(Q[: len(walks), : len(walks)], np.square(walks) * dt)
+        at = len(walks)
+        for w in self.unknown:
+            size = len(w.states)
+            Q[at : at + size, at : at + size] = w.discrete(dt)[1]
+            at += size
+        return Q
 
     def _places(self, put: list[str], get: list[str]) -> None:
         """Where things stand in the rows of values that go into the FMU and come out of it."""

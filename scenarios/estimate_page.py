@@ -1,6 +1,7 @@
 """The page of estimate: one self-contained file with its figures, which lie beside it too."""
 
 import base64
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -63,7 +64,7 @@ def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
             "meaning": variables[name].description if name in variables else "rate of the input before",
             "value": with_error(e["value"], e["std_error"]),
             "unit": unit(e["unit"]),
-            "band": f"{short(low)} to {short(high)}",
+            "band": " to ".join(short(v, _digits(v, e["std_error"])) for v in (low, high)),
             "informed": e.get("informed_by_data", True),
             "error": NOTHING if error is None else number(error),
         }
@@ -110,6 +111,13 @@ def noise(found: Findings, result: EstimateResult) -> Iterator[Row]:
     for name, value in result.process_noise.items():
         of = unit(variables[name].unit)
         yield {"name": name, "value": number(value), "unit": f"{of}/√s" if of else "1/√s"}
+
+
+def _digits(value: float, std: float) -> int:
+    """Significant digits of a value of which the second digit of its deviation is still shown."""
+    if not (value and std > 0):
+        return 4
+    return min(max(3, math.floor(math.log10(abs(value))) - math.floor(math.log10(std)) + 2), 12)
 
 
 def _number(value: float | None) -> str:

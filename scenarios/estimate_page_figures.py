@@ -85,7 +85,8 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
             memory.bar(lags, white.correlation, color=AFTER, width=0.6)
             if len(lags):
                 memory.axhspan(-white.limit, white.limit, color=NOISE, alpha=0.25, linewidth=0)
-            memory.set_ylim(-1.0, 1.0)
+            reach = min(1.0, 1.3 * max(white.largest, 2 * white.limit)) if len(lags) else 1.0
+            memory.set_ylim(-reach, reach)
             name_axes(memory, "", "correlation")
         name_axes(axes[some[-1]], "time in s", axes[some[-1]].get_ylabel())
         name_axes(axes[f"{some[-1]} memory"], "lag in samples", "correlation")

@@ -150,8 +150,8 @@ def _free_run(
 
 
 def finely(s: Samples, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
-    """Times (M,) at which inputs change, and these by name, (M - 1,) each."""
+    """Times (M,) at which the parts of the steps meet, and inputs by name at them, (M,) each."""
     parts = s.held.shape[1]
     share = np.arange(parts) / parts
     t = np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * share).ravel(), s.t[-1])
-    return t, {name: s.held[:, :, j].ravel() for j, name in enumerate(names)}
+    return t, {name: np.interp(t, s.t, s.u[:, j]) for j, name in enumerate(names)}
