@@ -86,7 +86,7 @@ def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
     key = root + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts)
     key = key.lstrip(".")
     if kind == "extra_forbidden":
-        known = _table_at(cls, loc).model_fields
+        known = [field.alias or name for name, field in _table_at(cls, loc).model_fields.items()]
         return f"key '{key}' is not known; {did_you_mean(str(loc[-1]), known)}"
     if kind == "missing":
         return f"key '{key}' is missing"

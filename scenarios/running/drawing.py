@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +25,7 @@ COLOURS = (AFTER, BEFORE, LAW, "#4f8a5b", NOISE, "#7d5ba6", CLOUD, INK)
 PANEL = 1.75  # in, height of a panel
 HEAD = 0.75  # in, for title, legend and the axis below
 COLUMNS = 4  # of a legend
+LINE = 78  # characters in a line of a title
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ def write_figure(picture: Picture, place: int, asked: Asked, runs: Mapping[str, 
     for j, panel in enumerate(picture.panels):
         _draw(axes[f"{j}"], panel, asked.curves[place, j], runs, f"key 'figure[{place}].panels[{j}]")
     _join([axes[name] for name in names])
-    figure.suptitle(picture.title, x=0.01, ha="left", fontsize=10, fontweight="bold", color=INK)
+    figure.suptitle(fill(picture.title, LINE), x=0.01, ha="left", fontsize=10, fontweight="bold", color=INK)
     _legends(figure, [axes[name] for name in names])
     target = folder / f"{picture.name}.png"
     figure.savefig(target, dpi=DPI)
@@ -138,7 +140,7 @@ def _legends(figure: Figure, axes: list[Axes]) -> None:
     if len(set(labels)) == 1:
         handles = axes[0].get_legend_handles_labels()[0]
         columns = min(COLUMNS, len(handles))
-        figure.legend(handles, labels[0], loc="outside upper left", ncols=columns, **style)
+        figure.legend(handles, labels[0], loc="outside lower left", ncols=columns, **style)
         return
     for ax, some in zip(axes, labels, strict=True):
         if some:
