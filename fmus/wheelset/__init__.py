@@ -1,0 +1,1 @@
+"""Plan-view wheelset on straight track; equations in README.md."""
