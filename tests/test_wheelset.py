@@ -15,8 +15,7 @@ from fmus.export.inside.stepping import Stepper
 from fmus.host.fmu import Fmu
 from fmus.model import equations
 from fmus.variables import Input, Output, Parameter, State
-from fmus.wheelset.curves import FIELDS, E, contact_curves
-from fmus.wheelset.model import NU, G, Track, Wheelset
+from fmus.wheelset.model import NU, G, Wheelset
 from tests.everything import values
 from tests.truth.wheelset import NOISE, true_run
 from tests.truth.wheelset_effects import CONDITIONS, FRICTION
@@ -199,31 +198,6 @@ def test_patches_grow_with_load_and_stiffness_as_hertz_says(search, patch):
     table = contact_table(search=search, patch=patch, N=90e3, E=2 * 7e10 * 1.3, nu=0.3, shifts=[y])
     for name in ("a_left", "b_left", "a_right", "b_right"):
         assert o[name] == pytest.approx(float(table[name].iloc[0]), rel=1e-3 if search == "rigid" else 1e-4)
-
-
-def test_curves_are_the_table_also_between_its_nodes():
-    shifts = np.sort(np.random.default_rng(1).uniform(-5.5e-3, 5.5e-3, 600))
-    table = contact_table(shifts=shifts, E=E, nu=NU)
-    found = contact_curves(Track()).map(len(shifts))(1, shifts.reshape(1, -1)).full()
-    curve = dict(zip(FIELDS, found, strict=True))
-    inner = np.abs(shifts) < 4.9e-3  # beyond, the contact runs to the flange within 0.2 mm
-    r, expected = 0.46 + curve["growth"], table["r_left"].to_numpy()
-    assert_allclose(r[inner], expected[inner], rtol=1e-6)
-    assert_allclose(r, expected, rtol=6e-6)
-    # the table's own patches jitter by 2e-5 of themselves, and its quasi-elastic points bend within 50 um
-    for name, typical, largest in (("delta", 1e-6, 2e-3), ("a_hertz", 2e-5, 2e-3), ("b_hertz", 4e-5, 5e-3)):
-        off = np.abs(curve[name] / table[f"{name.removesuffix('_hertz')}_left"] - 1)
-        assert np.median(off) < typical
-        assert off.max() < largest
-
-
-def test_curves_do_not_overshoot_where_contact_jumps():
-    jumps = contact_table(search="rigid")
-    fine = np.linspace(-9e-3, 9e-3, 5001)
-    curve = contact_curves(Track()).map(len(fine))(0, fine.reshape(1, -1)).full()
-    for row, name in ((1, "delta_left"), (3, "a_left"), (4, "b_left")):
-        low, high = jumps[name].min(), jumps[name].max()
-        assert low - 0.02 * (high - low) < curve[row].min() < curve[row].max() < high + 0.02 * (high - low)
 
 
 def test_creep_coefficients_that_are_given_count_for_the_linear_law_only():

@@ -4,13 +4,15 @@ import zipfile
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from fmus.contact import contact_table
 from fmus.errors import BadInput
 from fmus.export.pythonfmu import build_python
 from fmus.host.check import grade
 from fmus.host.fmu import Fmu
-from fmus.wheelset.model import Wheelset
+from fmus.wheelset.curves import FIELDS, E, contact_curves
+from fmus.wheelset.model import NU, Wheelset
 from fmus.wheelset.track import Track
 from tests.profile_files import points_of, write_points
 
@@ -53,6 +55,31 @@ def test_a_point_file_that_is_no_profile_is_refused(tmp_path):
     inches = write_points(tmp_path / "inch.txt", points_of("S1002", 300, np.random.default_rng(1)) / 25.4)
     with pytest.raises(BadInput, match=r"inch\.txt"):
         Track.parse(wheel=str(inches))
+
+
+def test_curves_are_the_table_also_between_its_nodes():
+    shifts = np.sort(np.random.default_rng(1).uniform(-5.5e-3, 5.5e-3, 600))
+    table = contact_table(shifts=shifts, E=E, nu=NU)
+    found = contact_curves(Track()).map(len(shifts))(1, shifts.reshape(1, -1)).full()
+    curve = dict(zip(FIELDS, found, strict=True))
+    inner = np.abs(shifts) < 4.9e-3  # beyond, the contact runs to the flange within 0.2 mm
+    r, expected = 0.46 + curve["growth"], table["r_left"].to_numpy()
+    assert_allclose(r[inner], expected[inner], rtol=1e-6)
+    assert_allclose(r, expected, rtol=6e-6)
+    # the table's own patches jitter by 2e-5 of themselves, and its quasi-elastic points bend within 50 um
+    for name, typical, largest in (("delta", 1e-6, 2e-3), ("a_hertz", 2e-5, 2e-3), ("b_hertz", 4e-5, 5e-3)):
+        off = np.abs(curve[name] / table[f"{name.removesuffix('_hertz')}_left"] - 1)
+        assert np.median(off) < typical
+        assert off.max() < largest
+
+
+def test_curves_do_not_overshoot_where_contact_jumps():
+    jumps = contact_table(search="rigid")
+    fine = np.linspace(-9e-3, 9e-3, 5001)
+    curve = contact_curves(Track()).map(len(fine))(0, fine.reshape(1, -1)).full()
+    for row, name in ((1, "delta_left"), (3, "a_left"), (4, "b_left")):
+        low, high = jumps[name].min(), jumps[name].max()
+        assert low - 0.02 * (high - low) < curve[row].min() < curve[row].max() < high + 0.02 * (high - low)
 
 
 @pytest.fixture(scope="module")
