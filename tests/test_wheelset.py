@@ -15,7 +15,7 @@ from fmus.export.inside.stepping import Stepper
 from fmus.host.fmu import Fmu
 from fmus.model import equations
 from fmus.variables import Input, Output, Parameter, State
-from fmus.wheelset.model import NU, G, Wheelset
+from fmus.wheelset.model import Wheelset
 from tests.everything import values
 from tests.truth.wheelset import NOISE, true_run
 from tests.truth.wheelset_effects import CONDITIONS, FRICTION
@@ -295,8 +295,3 @@ def test_the_fmu_is_the_truth_within_the_noise(built):
         found = fmu.simulate(track.t, inputs, [*NOISE], {})
     off = (found - truth[:, :4]).std(axis=0) / [*NOISE.values()]
     assert (off < 0.1).all(), off
-
-
-def test_the_declared_values_are_those_of_the_truth_and_the_table():
-    assert (G, NU) == (8e10, 0.28)
-    assert MODEL.variables["s"].start == pytest.approx(0.75)
