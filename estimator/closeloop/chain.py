@@ -59,7 +59,7 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     candidates += fault_candidates(problem.record, noise)
     tell(f"screening {len(candidates)} candidates by their effect on the linearised FMU")
-    change = list(zip(candidates, changes(problem, base.fit, candidates, size), strict=True))
+    change = list(zip(candidates, changes(problem, base.fit, candidates, size, forces), strict=True))
     promises = screen(base.fit, [((c,), g) for c, g in change])
     tell("testing for a discrepancy against simulated records without one")
     detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))

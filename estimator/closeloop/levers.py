@@ -12,7 +12,8 @@ import numpy as np
 
 from estimator.record import Array
 from fmus.effects.site import CLOCK, WAY
-from fmus.export.outside import Around, after
+from fmus.export.outside import Around, runge_kutta
+from fmus.variables import Expr
 
 
 @dataclass(frozen=True)
@@ -36,10 +37,12 @@ def shifts(made: Around, course: Course, moved: Mapping[str, float]) -> dict[str
     """
     own = np.array([moved.get(p.name, p.start) for p in made.parameters])
     z = np.vstack([course.given.T, np.tile(own[:, None], len(course.t))])
-    m = np.ascontiguousarray(course.motion.T)
-    told = np.asarray(made.values.map(len(course.t))(m, _states(made, course, m, z), z))
+    m = course.motion.T
+    parts = (m, _states(made, course, m, z), z)
+    told, rows = made.slim(made.values)
+    values = np.asarray(told.map(len(course.t)).call([parts[i][row][None, :] for i, row in rows])[0])
     rest = course.given[:, [made.given.index(name) for name in made.told]].T
-    return dict(zip(made.told, told - rest, strict=True))
+    return dict(zip(made.told, values - rest, strict=True))
 
 
 def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
@@ -48,12 +51,19 @@ def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
     names = [s.name for s in made.states]
     if set(names) <= set(known):
         return np.array([known[name] for name in names]).reshape(len(names), len(course.t))
+    rates, rows = made.slim(made.rates)
+    seen = [(i, row) for i, row in rows if i != 1]  # what the states see, linear between the samples
     x, dt = cs.SX.sym("x", len(names)), cs.SX.sym("dt")
-    m0, m1, z0 = (cs.SX.sym(n, size) for n, size in (("m0", len(m)), ("m1", len(m)), ("z", len(z))))
-    step = cs.Function("step", [x, m0, m1, z0, dt], [after(made.rates, x, z0, m0, m1, dt)])
+    w0, w1 = cs.SX.sym("w0", len(seen)), cs.SX.sym("w1", len(seen))
+
+    def f(w: Expr, state: Expr) -> Expr:
+        given = iter(cs.vertsplit(w))
+        return rates(*(state[row] if i == 1 else next(given) for i, row in rows))
+
+    step = cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, w0, w1, dt)])
     start = np.array([s.start for s in made.states])
-    held = (z[:, 1:] + z[:, :-1]) / 2  # what the effects see is linear between the samples
-    run = step.mapaccum(len(course.t) - 1)(start, m[:, :-1], m[:, 1:], held, np.diff(course.t)[None, :])
+    w = np.array([(m if i == 0 else z)[row] for i, row in seen])
+    run = step.mapaccum(len(course.t) - 1)(start, w[:, :-1], w[:, 1:], np.diff(course.t)[None, :])
     return np.column_stack([start, np.asarray(run)])
 
 

@@ -1,12 +1,13 @@
 """An FMU linearised along its free run, by restarts: what a small change of anything does to its outputs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.problem import Problem
+from estimator.plant import PLANTS
 from estimator.record import Array
 
 POINTS = 200  # at most this many linearisations along the run
@@ -27,6 +28,10 @@ class Linearised:
     B: Array
     C: Array
     D: Array
+
+    def of(self, outputs: slice) -> "Linearised":
+        """The same with some of the outputs."""
+        return replace(self, C=self.C[:, outputs], D=self.D[:, outputs])
 
     def near(self, samples: int) -> NDArray[np.intp]:
         """For each sample the linearisation before it, (samples,)."""
@@ -49,13 +54,15 @@ def shows_its_state(problem: Problem, theta: Mapping[str, float], x: Array) -> b
 
 
 def linearise(
-    problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp], levers: Sequence[str]
-) -> Linearised:
+    problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp],
+    levers: Sequence[str], more: Sequence[str] = (),
+) -> Linearised:  # fmt: skip
     """Linearise steps between the samples `keep` of the first run, whose states are x (N, n).
 
-    levers: inputs and parameters.
+    levers: inputs and parameters; more: outputs beside those of the record.
     """
-    plant, run = problem.plant, problem.record.runs[0]
+    record, run = problem.record, problem.record.runs[0]
+    plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
     index = np.unique(np.linspace(0, len(keep) - 2, min(POINTS, len(keep) - 1)).astype(int))
     start = problem.start(theta)
     nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))

@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.levers import Course, names_of, shifts
 from estimator.closeloop.linear import linearise, responses, shows_its_state
+from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import faulty
 from estimator.record import Array
@@ -56,10 +56,20 @@ def built(problem: Problem, candidates: Sequence[Candidate]) -> Problem:
     return replace(here, declared={**problem.declared, **fixed})
 
 
-def changes(problem: Problem, base: Fit, candidates: Sequence[Candidate], size: Array) -> list[Array]:
-    """Change of the weighted residual by each candidate's amplitudes at their scales, (m, k) each."""
+def changes(
+    problem: Problem,
+    base: Fit,
+    candidates: Sequence[Candidate],
+    size: Array,
+    forces: Sequence[MissingForce] = (),
+) -> list[Array]:
+    """Change of the weighted residual by each candidate's amplitudes at their scales, (m, k) each.
+
+    forces: at each port, with the motion there that it makes; a law is worked out along that motion, since
+    the FMU without the law may move quite differently.
+    """
     physical = [c for c in candidates if not c.is_fault]
-    moved = _moved(problem, base.theta, physical)
+    moved = _moved(problem, base.theta, physical, forces)
     flat = [change for c in physical for change in moved[c]]
     columns = iter(_answers(problem, base.theta, flat, size))
     own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
@@ -68,34 +78,50 @@ def changes(problem: Problem, base: Fit, candidates: Sequence[Candidate], size: 
 
 
 def _moved(
-    problem: Problem, theta: Mapping[str, float], candidates: Sequence[Candidate]
+    problem: Problem,
+    theta: Mapping[str, float],
+    candidates: Sequence[Candidate],
+    forces: Sequence[MissingForce],
 ) -> dict[Candidate, list[dict[str, Array]]]:
-    """What each amplitude of each candidate changes of what the FMU is given, along its free run."""
+    """What each amplitude of each candidate changes of what the FMU is given."""
+    if not candidates:
+        return {}
+    site = problem.builder.outside()
+    free = _course(problem, theta, [*site.description.inputs, *site.description.parameters])
+    courses = {m.port.name: _along(free, m) for m in forces if m.motion is not None}
     made: dict[str, Around] = {}
     found: dict[Candidate, list[dict[str, Array]]] = {}
-    course: Course | None = None
     for c in candidates:
         if c.label not in made:
             made[c.label] = around(problem.builder.outside(), [(c.kind, c.location)])
-        course = course or _course(problem, theta, made[c.label])
+        course = courses.get(c.location, free)
         found[c] = [shifts(made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
     return found
 
 
-def _course(problem: Problem, theta: Mapping[str, float], made: Around) -> Course:
-    """The free run of the first run of the record, up to its last sample that is fitted."""
-    plant, run = problem.plant, problem.record.runs[0]
+def _course(problem: Problem, theta: Mapping[str, float], names: Sequence[str]) -> Course:
+    """The free run of the first run of the record, up to its last sample that is fitted.
+
+    names: inputs and parameters of the FMU, in this order.
+    """
+    plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
     motion = [name for p in problem.ports for name in (p.displacement, p.velocity)]
     [full, *_] = problem.simulate(theta, motion)
-    last = _last(problem)
     known = plant.fmu.description.variables
     start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
     columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
-    given = [columns.get(n, np.full(last, start[n])) for n in made.given]
+    given = [columns.get(n, np.full(last, start[n])) for n in names]
     t = run.t[:last] - run.t[0]
-    speed = given[made.given.index(SPEED)] if SPEED in plant.inputs else np.zeros(last)
-    way = cumulative_trapezoid(speed, t, initial=0.0)
+    speed = columns.get(SPEED, np.zeros(last))
+    way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
     return Course(t, full[:last, len(plant.outputs) :], np.column_stack(given), way)
+
+
+def _along(free: Course, missing: MissingForce) -> Course:
+    """The course with the motion that a missing force makes."""
+    t = missing.t - missing.t[0]
+    motion = np.column_stack([np.interp(free.t, t, column) for column in np.asarray(missing.motion).T])
+    return replace(free, motion=motion)
 
 
 def _last(problem: Problem) -> int:

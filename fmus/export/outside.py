@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as cs
@@ -17,7 +17,7 @@ from fmus.variables import Expr, Input, Parameter, State, Variable
 
 
 class Outside(Site):
-    """Inputs, parameters and ports of an FMU; of a foreign one only its owner knows what makes sense at a port.
+    """Inputs, parameters and ports of an FMU; only its owner knows what makes sense at a foreign one's port.
 
     model: what the FMU was built from, where it is known; its components and groups are then known too.
     """
@@ -85,6 +85,21 @@ class Around:
     rates: cs.Function
     values: cs.Function
 
+    def slim(self, function: cs.Function) -> tuple[cs.Function, list[tuple[int, int]]]:
+        """`rates` or `values` of those of its arguments alone that it depends on, as scalars.
+
+        Returns the function and for each argument which of (m, x, z) it is and its row there.
+        """
+        arguments = [cs.SX.sym(name, function.size1_in(i)) for i, name in enumerate("mxz")]
+        (expression,) = function.call(arguments)
+        rows = [
+            (i, row)
+            for i, argument in enumerate(arguments)
+            for row in range(argument.numel())
+            if cs.depends_on(expression, argument[row])
+        ]
+        return cs.Function("slim", [arguments[i][row] for i, row in rows], [expression]), rows
+
 
 def around(site: Outside, effects: Sequence[tuple[str, str]]) -> Around:
     """Build effects (kind, location) around an FMU; BadInput where a location is not known."""
@@ -136,23 +151,27 @@ def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Seque
         cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 1))
     )
     half = _moved_on(m0, dt / 2)
-    middle = made.values(half, after(made.rates, x, rest, m0, half, dt / 2), rest)
+
+    def rates(m: Expr, state: Expr) -> Expr:
+        return made.rates(m, state, rest)
+
+    middle = made.values(half, runge_kutta(rates, x, m0, half, dt / 2), rest)
     return Laws(
         made.states,
         made.parameters,
         made.told,
         cs.Function("push", [m0, z, dt], [cs.cse(middle)]),
-        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(after(made.rates, x, rest, m0, m1, dt))]),
+        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(runge_kutta(rates, x, m0, m1, dt))]),
     )
 
 
-def after(f: cs.Function, x: Expr, rest: Expr, m0: Expr, m1: Expr, dt: Expr) -> Expr:
-    """States x after dt by a Runge-Kutta step, all else held."""
-    middle = (m0 + m1) / 2
-    k1 = f(m0, x, rest)
-    k2 = f(middle, x + dt / 2 * k1, rest)
-    k3 = f(middle, x + dt / 2 * k2, rest)
-    k4 = f(m1, x + dt * k3, rest)
+def runge_kutta(f: Callable[[Expr, Expr], Expr], x: Expr, w0: Expr, w1: Expr, dt: Expr) -> Expr:
+    """States x after dt by a step of order 4 of x' = f(w, x), w going straight from w0 to w1."""
+    middle = (w0 + w1) / 2
+    k1 = f(w0, x)
+    k2 = f(middle, x + dt / 2 * k1)
+    k3 = f(middle, x + dt / 2 * k2)
+    k4 = f(w1, x + dt * k3)
     return x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
