@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 
+from fmus.errors import BadInput
 from fmus.host.fmu import FmuError
 from fmus.host.recording import read_recording
 from fmus.model import equations
@@ -197,8 +198,6 @@ def test_an_fmu_that_fails_is_named_with_scenario_and_time(tmp_path):
 
 
 def test_a_source_that_cannot_be_built_is_said_in_one_line(tmp_path):
-    from fmus.errors import BadInput
-
     write(tmp_path, "from pythonfmu import Fmi2Slave\n\nclass A(Fmi2Slave):\n    x = 1 +\n", "broken.py")
     text = edited(GOOD, ('model = "drive"', 'source = "broken.py"'))
     with pytest.raises(BadInput, match=r"broken.py': PythonFMU cannot build it") as refused:
@@ -210,3 +209,62 @@ def test_a_model_can_be_built_native(tmp_path):
     pytest.importorskip("ziglang")
     result, _ = ran(tmp_path, edited(GOOD, ('model = "drive"', 'model = "drive"\nkind = "native"')))
     assert result.ok
+
+
+def test_effects_are_built_in(tmp_path):
+    damped = edited(
+        GOOD,
+        ('model = "drive"', 'model = "drive"\neffects = ["viscous_damping@carriage"]'),
+        ("{M = 50.0, F_v = 100.0}", "{M = 50.0, F_v = 0.0, viscous_damping_carriage_c = 100.0}"),
+        ('set = {"drive.F_v" = 400.0}', 'set = {"drive.viscous_damping_carriage_c" = 400.0}'),
+        ("drive.F_v * drive.q_dot - drive.F", "drive.viscous_damping_carriage_c * drive.q_dot - drive.F"),
+    )
+    assert ran(tmp_path, damped)[0].ok
+
+
+CANTED = """
+id = "canted"
+question = "Does the cant of the rails change where the wheels run?"
+duration = 0.01
+step = 1e-3
+fmus.wheelset = {model = "wheelset", initial = {y = 3e-3}}
+variants = [{name = "plain"}, {name = "canted", fmus = {wheelset = {contact = {cant = 0.05}}}}]
+
+[[expect]]
+that = '''first(plain.wheelset.r_left - plain.wheelset.r_right) >
+    5 * first(canted.wheelset.r_left - canted.wheelset.r_right)'''
+because = "S1002 hardly steers at 1:20"
+"""
+
+
+@pytest.mark.slow
+def test_a_wheelset_gets_its_profiles(tmp_path):
+    assert ran(tmp_path, CANTED)[0].ok
+
+
+@pytest.mark.slow
+def test_a_wheelset_on_a_track_gives_the_same_bits(tmp_path):
+    for name in ("first", "second"):
+        run(FOLDER / "wheelset_in_four_frictions.toml", tmp_path / name)
+    files = sorted((tmp_path / "first").glob("*.p*"))
+    assert len(files) == 7
+    for file in files:
+        assert file.read_bytes() == (tmp_path / "second" / file.name).read_bytes(), file.name
+
+
+@pytest.mark.slow
+def test_the_example_of_the_documentation_runs(tmp_path):
+    text = (FOLDER.parent / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    example = text.split("```toml\n")[1].split("```")[0]
+    result, written = ran(tmp_path, edited(example, ("duration = 20.0", "duration = 11.0")))
+    assert [f.sentence for f in result.failed] == []
+    assert sorted(written["runs"]) == ["fast", "slow"]
+
+
+def test_a_figure_that_cannot_be_drawn_leaves_the_verdicts(tmp_path):
+    file = write(tmp_path, edited(GOOD, ('unit = "mm/s"', 'unit = "kg"')))
+    with pytest.raises(BadInput, match=r"key 'figure\[0\].panels\[0\].unit': unit 'm/s' does not fit 'kg'"):
+        run(file, tmp_path / "out")
+    written = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert written["ok"] is True
+    assert written["figures"] == []

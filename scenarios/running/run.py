@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -41,7 +42,14 @@ def run(
             questions = asked(read)
             cases = _all_prepared(read, questions, builder, stack, tell)
             runs, summaries = _run_all(cases, read, folder, tell)
-            result = _concluded(read, questions, runs, summaries, folder, begun, tell)
+            result = _judged(read, questions, runs, summaries, folder, begun)
+            result.write(folder / "result.json")  # now, as a figure may ask for what cannot be drawn
+            if result.interrupted_at is not None:
+                return result
+            tell(f"{read.id}: drawing")
+            pictures = enumerate(read.declared.figure)
+            figures = tuple(write_figure(p, i, questions, runs, folder) for i, p in pictures)
+    result = replace(result, figures=figures, wall_seconds=perf_counter() - begun)
     result.write(folder / "result.json")
     return result
 
@@ -138,30 +146,23 @@ def _written(run: Run, name: str, case: Case, scenario: Scenario, folder: Path, 
     return RunSummary(target.name, measured, simulated, took, stopped)
 
 
-def _concluded(
+def _judged(
     scenario: Scenario,
     questions: Asked,
     runs: Mapping[str, Run],
     summaries: Mapping[str, RunSummary],
     folder: Path,
     begun: float,
-    tell: Tell,
 ) -> Result:
-    """Judge and draw; a run that was broken off is only kept."""
-    findings: tuple[Finding, ...] = ()
-    figures: tuple[Path, ...] = ()
+    """The result without figures; a run that was broken off is not judged."""
     stopped = next((s.interrupted_at for s in summaries.values() if s.interrupted_at is not None), None)
-    if stopped is None:
-        tell(f"{scenario.id}: judging and drawing")
-        findings = tuple(_judged(questions, runs))
-        pictures = enumerate(scenario.declared.figure)
-        figures = tuple(write_figure(p, i, questions, runs, folder) for i, p in pictures)
+    findings = tuple(_findings(questions, runs)) if stopped is None else ()
     d = scenario.declared
     took = perf_counter() - begun
-    return Result(d.id, d.question, folder, findings, dict(summaries), figures, took, stopped)
+    return Result(d.id, d.question, folder, findings, dict(summaries), (), took, stopped)
 
 
-def _judged(questions: Asked, runs: Mapping[str, Run]) -> Iterator[Finding]:
+def _findings(questions: Asked, runs: Mapping[str, Run]) -> Iterator[Finding]:
     """The answer to each expectation; what the signals do not allow to be worked out has not come true."""
     for expectation, question in questions.expectations:
         for variant in question.asked():
