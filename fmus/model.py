@@ -50,6 +50,11 @@ class Model(Site, ABC):
         if probes:
             self._probe()
 
+    @property
+    def about(self) -> str:
+        """What it is, in one line."""
+        return (type(self).__doc__ or self.name).strip().splitlines()[0]
+
     @abstractmethod
     def derivatives(self) -> dict[str, Expr]:
         """Time derivative of each state, by name."""

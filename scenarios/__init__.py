@@ -1,5 +1,6 @@
-"""Questions asked of the FMUs: experiments, closing the loop, reports, command line."""
+"""Questions asked of the FMUs: experiments, estimates, closing the loop, scenarios, reports, command line."""
 
 from scenarios.closing import close_loop
+from scenarios.estimating import estimate
 
-__all__ = ["close_loop"]
+__all__ = ["close_loop", "estimate"]

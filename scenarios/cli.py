@@ -12,7 +12,10 @@ from rich.console import Console
 from fmus.effects import EFFECTS, parse_effect
 from fmus.errors import BadInput
 from fmus.host.fmu import FmuError
+from fmus.model import Model
 from fmus.models import MODELS, model_class
+from fmus.wheelset.model import Wheelset
+from fmus.wheelset.track import Track
 
 # libraries' worker processes would each use every core for small matrices
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -32,23 +35,62 @@ def build(
         list[str] | None, typer.Argument(help=f"of {', '.join(MODELS)}; all by default")
     ] = None,
     out: Out = Path("build"),
-    kind: Annotated[str, typer.Option(help="python: PythonFMU, needs Python where it runs")] = "python",
-    fmi: Annotated[int, typer.Option(help="FMI version")] = 2,
+    kind: Annotated[
+        str, typer.Option(help="python: PythonFMU, needs Python where it runs; native: C, needs nothing")
+    ] = "python",
+    fmi: Annotated[int, typer.Option(help="FMI version, 2 or 3; 3 is native")] = 2,
+    platform: Annotated[
+        list[str] | None, typer.Option(help="of native: host (default), all, or x86_64-linux and the like")
+    ] = None,
+    compiler: Annotated[
+        str | None, typer.Option(help="of native: a C compiler of this machine instead of ziglang's")
+    ] = None,
     effect: Annotated[
         list[str] | None, typer.Option(help=f"KIND@LOCATION to build in, off at first; {', '.join(EFFECTS)}")
     ] = None,
+    wheel: Annotated[str | None, typer.Option(help="of the wheelset: profile by name or point file")] = None,
+    rail: Annotated[str | None, typer.Option(help="of the wheelset: the same of the rail")] = None,
+    cant: Annotated[str | None, typer.Option(help="of the wheelset: of the rails, such as 1/40")] = None,
+    gauge: Annotated[str | None, typer.Option(help="of the wheelset: m, 14 mm below the crown")] = None,
+    back_to_back: Annotated[
+        str | None, typer.Option(help="of the wheelset: between the flange backs, m")
+    ] = None,
 ) -> None:
     """Build FMUs of the models, with or without effects."""
+    sizes = {"cant": cant, "gauge": gauge, "back_to_back": back_to_back}
+    contact = {"wheel": wheel, "rail": rail, **sizes}
+    given = {name: value for name, value in contact.items() if value is not None}
+    made = [_model(name, effect or [], given) for name in models or MODELS]
+    write = _writer(kind, fmi, platform or [], compiler)
+    for model in made:
+        typer.echo(write(model, out))
+
+
+def _model(name: str, effects: list[str], contact: dict[str, str]) -> Model:
+    """The model of a name with effects, and where it has a contact, the profiles given for it."""
+    chosen, parsed = model_class(name), [parse_effect(text) for text in effects]
+    if not contact:
+        return chosen(parsed)
+    if not issubclass(chosen, Wheelset):
+        raise BadInput(
+            f"--{next(iter(contact)).replace('_', '-')}: {name} has no contact of profiles; leave it out"
+        )
+    return chosen(parsed, track=Track.parse(**contact))
+
+
+def _writer(kind: str, fmi: int, platforms: list[str], compiler: str | None) -> Callable[[Model, Path], Path]:
+    from fmus.export.native.build import build_native
     from fmus.export.pythonfmu import build_python
 
+    if kind == "native":
+        return lambda model, out: build_native(model, out, fmi, platforms or ("host",), compiler)
     if kind != "python":
-        raise BadInput(f"--kind {kind}: only 'python' is built")
+        raise BadInput(f"--kind {kind}: 'python' and 'native' are built")
     if fmi != 2:
-        raise BadInput(f"--fmi {fmi}: PythonFMU builds are FMI 2")
-    effects = [parse_effect(text) for text in effect or []]
-    made = [model_class(name)(effects) for name in models or MODELS]
-    for model in made:
-        typer.echo(build_python(model, out))
+        raise BadInput(f"--fmi {fmi}: PythonFMU builds are FMI 2; use --kind native")
+    if platforms or compiler:
+        raise BadInput("--platform and --compiler: of native builds; use --kind native")
+    return build_python
 
 
 @app.command()
@@ -90,6 +132,56 @@ def close_loop(
     if result.next_experiment:
         typer.echo(f"  to tell them apart: {result.next_experiment}")
     typer.echo(f"report: {out / 'report.html'}")
+
+
+@app.command()
+def run(
+    scenarios: Annotated[list[Path], typer.Argument(help="scenario files (.toml)")],
+    out: Out = Path("out"),
+    watch: Annotated[bool, typer.Option("--watch", help="a line for each step of the progress")] = False,
+) -> None:
+    """Run scenarios: FMUs on a track, with inputs, events and sensors, and what must come true."""
+    from scenarios.running import Result as Answer
+    from scenarios.running import run_all
+
+    def done(answer: Answer) -> None:
+        typer.echo(f"{answer.id}: {'as expected' if answer.ok else 'NOT as expected'}")
+        for finding in answer.failed:
+            typer.echo(f"  {finding.sentence}")
+
+    with said.status("reading the scenarios") as status:
+        answers = run_all(scenarios, out, said.print if watch else status.update, done)
+    typer.echo(f"results: {out}")
+    if not all(answer.ok for answer in answers):
+        raise typer.Exit(1)
+
+
+@app.command()
+def estimate(
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
+    out: Out = Path("out"),
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
+    ] = None,
+) -> None:
+    """Estimate states, parameters and unknown inputs of an FMU from a record, sample by sample."""
+    from scenarios.estimating import estimate as filtered
+
+    with said.status("reading the experiment") as status:
+        result = filtered(experiment, out, data, tell=status.update)
+    for name, found in result.estimated.items():
+        spread, unit = found["std_error"], found["unit"] or ""
+        typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip())
+    for alarm in result.alarms:
+        end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
+        typer.echo(
+            f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, probability {alarm.probability:.3f}"
+        )
+    if result.diverged:
+        typer.echo(f"diverged: {result.reason}")
+    typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
+    if result.diverged:
+        raise typer.Exit(1)
 
 
 def main() -> None:

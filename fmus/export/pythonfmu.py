@@ -58,7 +58,7 @@ def build_python(model: Model, out: Path) -> Path:
     """
     made = equations(model)
     card = {
-        "description": first_line(model),
+        "description": model.about,
         "step_size": model.step_size,
         "sizes": sizes(model),
         "units": unit_table(v.unit for v in model.variables.values()),
@@ -114,11 +114,6 @@ def _write_sources(content: Content, folder: Path) -> tuple[Path, Path]:
     text = ENTRY.format(name=content.name, package=package.name, description=card["description"])
     entry.write_text(text, encoding="utf-8")
     return entry, package
-
-
-def first_line(model: Model) -> str:
-    """What a model's class says of it, in one line."""
-    return (type(model).__doc__ or model.name).strip().splitlines()[0]
 
 
 def documentation(name: str, card: dict[str, Any], effects: Sequence[str], extra: str = "") -> str:

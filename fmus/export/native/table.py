@@ -12,7 +12,6 @@ from typing import Any
 import casadi as cs
 
 from fmus.export.native.dependencies import Dependencies, dependencies
-from fmus.export.pythonfmu import first_line
 from fmus.export.table import KINDS, row, unit_table
 from fmus.model import Equations, Model
 from fmus.variables import Rate, State
@@ -102,7 +101,7 @@ def table(model: Model, made: Equations) -> Table:
     rest = tuple(u for u in derivatives if u not in computed)
     return Table(
         name=model.name,
-        description=first_line(model),
+        description=model.about,
         step_size=model.step_size,
         tolerance=model.tolerance,
         sizes=(sizes[0], sizes[1], sizes[2], sizes[3]),
