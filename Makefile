@@ -3,17 +3,21 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test test-all lint bench clean
+.PHONY: demo test test-all lint bench scenarios clean
 
 demo: .venv/ready  ## build the FMU, close the loop on the bundled record, name the report
 	$(BIN)/railfmi build testrig --out $(OUT)/demo
 	$(BIN)/railfmi check $(OUT)/demo/Testrig.fmu
 	$(BIN)/railfmi close-loop scenarios/demo/rig-drag --out $(OUT)/demo
 
+scenarios: .venv/ready  ## all scenarios, with their figures and a contact sheet
+	$(BIN)/railfmi run scenarios/*.toml --out $(OUT)/scenarios
+
 test: .venv/ready-dev  ## everything that is fast
 	$(BIN)/python -m pytest
 
-test-all: .venv/ready-dev  ## the slow ones too
+test-all: .venv/ready-dev  ## the slow ones too, and other importers of FMUs
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[interop]'
 	$(BIN)/python -m pytest -m ""
 
 lint: .venv/ready-dev
@@ -23,6 +27,9 @@ lint: .venv/ready-dev
 
 bench: .venv/ready-dev  ## side-by-side measurements
 	$(BIN)/python -m benchmarks.steps
+	$(BIN)/python -m benchmarks.wheelset
+	$(BIN)/python -m benchmarks.native
+	$(BIN)/python -m benchmarks.estimate
 
 .venv/ready: pyproject.toml requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit("railfmi needs Python 3.11 or newer; set PYTHON=..." if sys.version_info < (3, 11) else 0)'

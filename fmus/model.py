@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import casadi as cs
 
@@ -145,7 +145,7 @@ def _compiled(name: str, model: Model, symbols: list[Expr], expression: Expr, re
         return list(inner.call([m for _, m in needed]))
 
     for call in model.calls:
-        results = call.function.call(worked_out(call.arguments))
+        results: Any = call.function.call(worked_out(call.arguments))
         known += zip(call.results, results, strict=True)
     return cs.Function(name, given, worked_out([expression]), names, [result])
 

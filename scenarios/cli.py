@@ -134,25 +134,31 @@ def close_loop(
     typer.echo(f"report: {out / 'report.html'}")
 
 
-@app.command()
-def run(
-    scenarios: Annotated[list[Path], typer.Argument(help="scenario files (.toml)")],
+@app.command("run")
+def run_scenarios(
+    scenarios: Annotated[list[Path], typer.Argument(help="scenario files; several get a contact sheet")],
     out: Out = Path("out"),
-    watch: Annotated[bool, typer.Option("--watch", help="a line for each step of the progress")] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
 ) -> None:
-    """Run scenarios: FMUs on a track, with inputs, events and sensors, and what must come true."""
-    from scenarios.running import Result as Answer
-    from scenarios.running import run_all
+    """Run scenarios and see whether what must come true does: exit 1 if not. Ctrl-C keeps the record."""
+    from scenarios.running import Result, run_all
 
-    def done(answer: Answer) -> None:
-        typer.echo(f"{answer.id}: {'as expected' if answer.ok else 'NOT as expected'}")
-        for finding in answer.failed:
-            typer.echo(f"  {finding.sentence}")
+    def done(result: Result) -> None:
+        held = sum(finding.holds for finding in result.expectations)
+        if result.interrupted_at is not None:
+            typer.echo(f"{result.id}: broken off at {result.interrupted_at:g} s; what was recorded is kept")
+        else:
+            took = f"{result.wall_seconds:.1f} s"
+            typer.echo(f"{result.id}: {held} of {len(result.expectations)} came true ({took})")
+        for finding in result.failed:
+            typer.echo(f"  not: {finding.sentence}; {finding.because}")
 
     with said.status("reading the scenarios") as status:
-        answers = run_all(scenarios, out, said.print if watch else status.update, done)
+        results = run_all(scenarios, out, status.update if watch else (lambda _: None), done)
     typer.echo(f"results: {out}")
-    if not all(answer.ok for answer in answers):
+    if any(r.interrupted_at is not None for r in results):
+        raise typer.Exit(130)
+    if not all(r.ok for r in results):
         raise typer.Exit(1)
 
 
@@ -174,9 +180,8 @@ def estimate(
         typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip())
     for alarm in result.alarms:
         end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
-        typer.echo(
-            f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, probability {alarm.probability:.3f}"
-        )
+        likely = f"probability {alarm.probability:.3f}"
+        typer.echo(f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, {likely}")
     if result.diverged:
         typer.echo(f"diverged: {result.reason}")
     typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")

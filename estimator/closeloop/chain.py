@@ -13,7 +13,7 @@ from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, built, changes, screen
+from estimator.closeloop.screen import Promise, changes, screen
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
 
@@ -69,7 +69,6 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
         return Outcome(*found, (), (), early)
     chosen = nominated(promises)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
-    problem = built(problem, [p.candidates[0] for p in chosen])  # one FMU holds them all, off
     singles = hypotheses(problem, base, chosen, size, jobs)
     pairs: list[Hypothesis] = []
     floor_known = not np.isnan(problem.record.noise_std).any()
