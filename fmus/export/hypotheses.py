@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from fmus.export.native.build import build_native
 from fmus.export.outside import Outside
 from fmus.export.pythonfmu import build_python
 from fmus.host.archive import describe
-from fmus.host.description import PortNames
+from fmus.host.description import FmuDescription, PortNames
 from fmus.model import Model
 from fmus.models import model_class
 
@@ -41,7 +42,7 @@ class ModelBuilder:
 
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
-        return Outside(describe(self(())), self.ports, self._model((), probes=False))
+        return Outside(_described(self(())), self.ports, self._model((), probes=False))
 
     def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values.
@@ -78,7 +79,7 @@ class ForeignBuilder:
 
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
-        return Outside(describe(self(())), self.ports)
+        return Outside(_described(self(())), self.ports)
 
     def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values.
@@ -93,6 +94,11 @@ class ForeignBuilder:
         """Write the FMU with effects and start values that were found, for use elsewhere."""
         target = out / f"{self.fmu.stem}_augmented.fmu"
         return build_coupled(self.fmu, self.ports, effects, target, starts=dict(starts))
+
+
+@cache
+def _described(fmu: Path) -> FmuDescription:
+    return describe(fmu)
 
 
 def _fastest(model: Model, path: Path) -> Path:
