@@ -8,8 +8,9 @@ come every FMU, the model description, the parameter tables and the Jacobians.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import casadi as cs
@@ -36,6 +37,10 @@ class Model(Site, ABC):
     step_size: ClassVar[float]  # s, the longest internal step
     tolerance: ClassVar[float] = 1e-6  # of a state's nominal, error of an internal step where it is known
     method: ClassVar[Method] = rk4
+    # what the model's form is uncertain in: parameters that stand for it, with the bounds within which
+    # other methods of its kind lie, and the share of an output that is still open after fitting them
+    form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    form_error: ClassVar[float] = 0.0
 
     def __init__(self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False) -> None:
         """effects: laws and their locations; probes: open every location by a force input and its motion."""

@@ -3,7 +3,7 @@
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from estimator.closeloop.chain import Outcome, trace
@@ -85,14 +85,16 @@ def pose(e: Experiment, builder: Builder) -> Problem:
     """The question that an experiment asks of its FMU."""
     description = describe(e.fmu_path or builder(()))
     record = load_record(e, description)
-    declared = {**_starts(description, e), **e.parameters, **e.initial}
+    form = {n: bounds for n, bounds in builder.form.items() if n not in e.parameters}
+    calibrate = {**form, **e.calibrate}
+    declared = {**_starts(description, calibrate), **e.parameters, **e.initial}
     free = tuple(n for n in description.states if n not in e.initial)
-    return Problem(builder, record, declared, dict(e.calibrate), free, builder.ports)
+    return Problem(builder, record, declared, calibrate, free, builder.ports, form_error=builder.form_error)
 
 
-def _starts(description: FmuDescription, e: Experiment) -> dict[str, float]:
-    """The FMU's own values of parameters to calibrate that the experiment does not declare."""
-    return {n: description.variables[n].start or 0.0 for n in e.calibrate}
+def _starts(description: FmuDescription, calibrate: Iterable[str]) -> dict[str, float]:
+    """The FMU's own values of parameters to calibrate that the experiment may not declare."""
+    return {n: description.variables[n].start or 0.0 for n in calibrate}
 
 
 def augment(builder: Builder, problem: Problem, found: Outcome, folder: Path) -> Path:

@@ -71,10 +71,18 @@ def detect(
 
 def matters(problem: Problem, base: Hypothesis, noise: Array) -> bool:
     """Whether a held-out residual is too large to be left alone, in any output."""
-    rms = base.rms(problem)
+    signal = signal_size(problem)
+    left_open = problem.form_error * signal
+    limit = np.where(
+        left_open > 0, np.maximum(left_open, NOISES * noise), np.minimum(SHARE * signal, NOISES * noise)
+    )
+    return bool(np.any(base.rms(problem) >= limit))
+
+
+def signal_size(problem: Problem) -> Array:
+    """Root mean square of each output on the held-out part, (n_y,)."""
     measured = np.concatenate([run.y[run.test] for run in problem.record.runs])
-    signal = np.sqrt(np.mean(measured**2, axis=0))
-    return bool(np.any((rms >= SHARE * signal) | (rms >= NOISES * noise)))
+    return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
 def _sensitivities(problem: Problem, base: Hypothesis, noise: Array) -> Array:

@@ -50,8 +50,8 @@ class Problem:
     """An FMU with declared values against a record.
 
     builder gives the FMU with `effects`, (kind, location), built in; declared holds parameters and given
-    start states, calibrate bounds by name, free_states those whose start is not given. Small and
-    picklable: workers open the FMU themselves.
+    start states, calibrate bounds by name, free_states those whose start is not given; form_error is the
+    share of an output that the FMU's form leaves open. Small and picklable: workers open the FMU themselves.
     """
 
     builder: Builder
@@ -61,6 +61,7 @@ class Problem:
     free_states: tuple[str, ...] = ()
     ports: tuple[PortNames, ...] = ()
     effects: tuple[tuple[str, str], ...] = ()
+    form_error: float = 0.0
 
     @property
     def plant(self) -> Plant:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.compare import Hypothesis, beats, lead
-from estimator.closeloop.detect import NOISES, Detection
+from estimator.closeloop.detect import NOISES, Detection, signal_size
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
 from estimator.record import Array
@@ -53,7 +53,8 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
         return False
     before, after = base.rms(problem), h.rms(problem)
     declared = ~np.isnan(problem.record.noise_std)
-    reached = (after < NOISES * noise) | (gap_closed(before, after, noise) >= GAP)
+    enough_for = np.maximum(NOISES * noise, problem.form_error * signal_size(problem))
+    reached = (after < enough_for) | (gap_closed(before, after, noise) >= GAP)
     squares = [
         np.mean((x.held_out(problem) / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
         for x in (h, base)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
+from typing import ClassVar
 
 from fmus.effects import EFFECTS, offers
 from fmus.errors import BadInput
@@ -28,6 +30,16 @@ class ModelBuilder:
 
     model: str
     folder: Path
+
+    @property
+    def form(self) -> Mapping[str, tuple[float, float]]:
+        """Bounds of the parameters that stand for what the model's form is uncertain in."""
+        return model_class(self.model).form
+
+    @property
+    def form_error(self) -> float:
+        """Share of an output that the model's form leaves open."""
+        return model_class(self.model).form_error
 
     @property
     def offers(self) -> Effects:
@@ -69,6 +81,8 @@ class ForeignBuilder:
     fmu: Path
     ports: tuple[PortNames, ...]
     folder: Path
+    form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    form_error: ClassVar[float] = 0.0
 
     @property
     def offers(self) -> Effects:

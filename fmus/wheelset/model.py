@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import NamedTuple
 
 import casadi as cs
@@ -28,6 +29,7 @@ from fmus.wheelset.track import Track
 TABLE = "thesis Table 3.4"
 DRY = "thesis Table 4.1, dry"
 CHOICE = "this model"
+FORM = "this model: what methods for the patch differ in"
 V_MIN = 0.1  # m/s, below which creepages are those at this speed
 S_MIN = 1e-12  # rounds the size of the creepage at zero
 SIDES = {"left": 1.0, "right": -1.0}  # sign of y
@@ -53,6 +55,8 @@ class Wheelset(Model):
 
     name = "Wheelset"
     step_size = 1e-3
+    form = MappingProxyType({"k_a": (0.6, 1.3), "k_b": (0.6, 2.6), "k_spin": (0.2, 1.2)})
+    form_error = 0.03
     method = rk4_within_stability
 
     y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)
@@ -89,6 +93,13 @@ class Wheelset(Model):
     B = Parameter("s/m", 0.6, min=0.0, doc="decrease of friction with slip velocity", source=DRY)
     k_A = Parameter("1", 1.0, min=0.0, doc="Polach factor in the area of adhesion", source=DRY)
     k_S = Parameter("1", 0.4, min=0.0, doc="Polach factor in the area of slip", source=DRY)
+    k_a = Parameter(
+        "1", 1.0, min=0.1, max=10.0, doc="semi-axes a of the contacts over the table's", source=FORM
+    )
+    k_b = Parameter(
+        "1", 1.0, min=0.1, max=10.0, doc="semi-axes b of the contacts over the table's", source=FORM
+    )
+    k_spin = Parameter("1", 1.0, min=0.0, max=10.0, doc="spin coefficients over Kalker's", source=FORM)
     f11 = Parameter("N", min=0.0, doc="longitudinal creep coefficient, 0: Kalker's", source=CHOICE)
     f22 = Parameter("N", min=0.0, doc="lateral creep coefficient, 0: Kalker's", source=CHOICE)
     f23 = Parameter("N.m", min=0.0, doc="lateral creep coefficient of spin, 0: Kalker's", source=CHOICE)
@@ -235,7 +246,10 @@ class Wheelset(Model):
         # a patch grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu)
         scale = (m.F_n / LOAD * (G / (1 - NU)) / (m.G / (1 - m.nu))) ** (1 / 3)
         virtual = m.patch > 0.5
-        a, b = (scale * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"]) for x in ("a", "b"))
+        a, b = (
+            scale * k * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"])
+            for x, k in (("a", m.k_a), ("b", m.k_b))
+        )
         mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2 + S_MIN**2), m.mu0, m.A, m.B)
         c11, c22, c23, c33 = m._coefficients(a, b)
         F_x, F_y, M_z = m.call(
@@ -246,7 +260,8 @@ class Wheelset(Model):
 
     def _coefficients(m, a: Expr, b: Expr) -> list[Expr]:
         """Kalker's coefficients, or for the linear law those that are given."""
-        kalker = m.call(looked_up(), a / b, m.nu)
+        c11, c22, c23, c33 = m.call(looked_up(), a / b, m.nu)
+        kalker = (c11, c22, m.k_spin * c23, m.k_spin * c33)
         area = m.G * a * b
         given = (m.f11 / area, m.f22 / area, m.f23 / area**1.5 * m.G**0.5, m.f33 / area**2 * m.G)
         linear = m.creep_law < 0.5
