@@ -12,7 +12,7 @@ import uuid
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from jinja2 import Environment, FileSystemLoader
 from pythonfmu.builder import FmuBuilder
 
 from fmus.errors import BadInput
+from fmus.export.provenance import PLACE, Origin, common, on_page, record, sealed
 from fmus.export.table import sizes, unit_table, variable_table
 from fmus.model import Model, equations
 
@@ -49,12 +50,14 @@ class Content:
     files: dict[str, bytes]
     page: str  # documentation/index.html
     saves_state: bool = True
+    provenance: dict[str, Any] = field(default_factory=dict)  # beside what every build says of itself
 
 
-def build_python(model: Model, out: Path) -> Path:
+def build_python(model: Model, out: Path, origin: Origin | None = None) -> Path:
     """Write `out`/NAME.fmu, or `out` itself where it ends in .fmu, and return its path.
 
-    The same source gives the same bytes. BadInput where PythonFMU has no binary for this platform.
+    origin: what estimates in the model rest on, for its record of provenance. The same source gives the
+    same bytes. BadInput where PythonFMU has no binary for this platform.
     """
     made = equations(model)
     card = {
@@ -66,7 +69,8 @@ def build_python(model: Model, out: Path) -> Path:
     }
     files = {f"{n}.casadi": f.serialize().encode() for n, f in (("step", made.step), ("outputs", made.h))}
     page = documentation(model.name, card, [f"{e.kind}@{location}" for e, location in model.effects])
-    return pack(Content(model.name, card, ("solved", "stepping"), files, page), out)
+    about = record(model, "python", 2, origin)
+    return pack(Content(model.name, card, ("solved", "stepping"), files, page, provenance=about), out)
 
 
 def pack(content: Content, out: Path) -> Path:
@@ -75,11 +79,12 @@ def pack(content: Content, out: Path) -> Path:
         raise BadInput(f"PythonFMU has no binary for {sys.platform}; it builds on Linux and Windows x86-64")
     target = out if out.suffix == ".fmu" else out / f"{content.name}.fmu"
     target.parent.mkdir(parents=True, exist_ok=True)
+    about = {**common(content.name, "python", 2), **content.provenance}
     with tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
         entry, package = _write_sources(content, Path(folder))
         documents = Path(folder) / "documentation"
         documents.mkdir()
-        (documents / "index.html").write_text(content.page, encoding="utf-8")
+        (documents / "index.html").write_text(on_page(content.page, about), encoding="utf-8")
         bundled = [f"{package.name}.{f}" for f in ("common", *content.modules)]
         with _clean_imports(entry.stem, package.name, *bundled):
             packed = FmuBuilder.build_FMU(
@@ -92,7 +97,7 @@ def pack(content: Content, out: Path) -> Path:
                 canSerializeFMUstate=content.saves_state,
             )
         final = Path(folder) / "final.fmu"
-        _repack(packed, final)
+        _repack(packed, final, about)
         target.write_bytes(final.read_bytes())
     return target
 
@@ -134,8 +139,11 @@ def _clean_imports(*modules: str) -> Iterator[None]:
             sys.modules.pop(name, None)
 
 
-def _repack(source: Path, target: Path) -> None:
-    """Copy a zip with sorted names and no dates."""
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
-        for name in sorted(old.namelist()):
-            new.writestr(zipfile.ZipInfo(name, ZIP_DATE), old.read(name), compress_type=zipfile.ZIP_DEFLATED)
+def _repack(source: Path, target: Path, about: dict[str, Any]) -> None:
+    """Copy a zip with sorted names and no dates, and with its record of provenance."""
+    with zipfile.ZipFile(source) as old:
+        files = {name: old.read(name) for name in old.namelist()}
+    files[PLACE] = sealed(about, files)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in sorted(files):
+            new.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], compress_type=zipfile.ZIP_DEFLATED)

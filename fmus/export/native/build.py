@@ -18,10 +18,12 @@ from fmus.export.native.description3 import description3
 from fmus.export.native.page import page
 from fmus.export.native.table import Table, table
 from fmus.export.native.universal import universal
+from fmus.export.provenance import PLACE, Origin, on_page, record, sealed
 from fmus.export.pythonfmu import ZIP_DATE
 from fmus.model import Equations, Model, equations
 
 HERE = Path(__file__).parent
+PAGE = "documentation/index.html"
 NO_TOKEN = f"{{{uuid.UUID(int=0)}}}"  # until the content is known
 DESCRIBED = {2: description2, 3: description3}
 ICONS = {  # path in the FMU: file here
@@ -36,11 +38,13 @@ def build_native(
     fmi: int = 2,
     platforms: str | Sequence[str] = ("host",),
     compiler: str | None = None,
+    origin: Origin | None = None,
 ) -> Path:
     """Write `out`/NAME.fmu, or `out` itself where it ends in .fmu, and return its path.
 
     platforms: FMI 3.0's names ("x86_64-linux"), "host" or "all". compiler: a C compiler's command for this
-    machine instead of ziglang's. The same source and compiler give the same bytes. BadInput where the
+    machine instead of ziglang's. origin: what estimates in the model rest on, for its record of provenance.
+    The same source and compiler give the same bytes. BadInput where the
     FMI version or a platform is not known, or the compiler is missing or fails; nothing is written then.
     """
     if fmi not in DESCRIBED:
@@ -49,6 +53,8 @@ def build_native(
     calls = command(compiler, wanted)
     made = equations(model)
     files = _content(model, made, table(model, made), fmi)
+    about = record(model, "native", fmi, origin)
+    files[PAGE] = on_page(files[PAGE].decode(), about).encode()
     target = out if out.suffix == ".fmu" else out / f"{model.name}.fmu"
     with tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
         code = Path(folder) / "sources"
@@ -61,6 +67,7 @@ def build_native(
             libraries[where] = Path(folder) / where.name / f"{model.name}{where.suffix}"
             compile_library(calls[where.name], code, libraries[where], where)
         files |= _binaries(libraries, fmi)
+    files[PLACE] = sealed(about, files)
     _write(target, _packed(files))
     return target
 
@@ -72,7 +79,7 @@ def _content(model: Model, made: Equations, about: Table, fmi: int) -> dict[str,
     parts = [version("railfmi").encode(), *(files[path] for path in sorted(files))]
     token = f"{{{uuid.UUID(hashlib.sha256(bytes(1).join(parts)).hexdigest()[:32])}}}"
     files = {path: data.replace(NO_TOKEN.encode(), token.encode()) for path, data in files.items()}
-    files["documentation/index.html"] = page(model, about, fmi).encode()
+    files[PAGE] = page(model, about, fmi).encode()
     return files | {path: (HERE / name).read_bytes() for path, name in ICONS[fmi].items()}
 
 

@@ -1,0 +1,126 @@
+"""Where an FMU comes from: a record in its folder extra/, with checksums of all its other files.
+
+Nothing in it depends on when or where the FMU was built, so that the same build gives the same bytes.
+"""
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, is_dataclass
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader
+from markupsafe import Markup
+
+from fmus.effects.effect import Effect
+from fmus.errors import BadInput
+from fmus.model import Model
+from fmus.variables import Parameter
+
+HERE = Path(__file__).parent
+FOLDER = "extra/org.railfmi"  # FMI and SSP: a folder named by the reversed domain of who adds it
+PLACE = f"{FOLDER}/provenance.json"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What estimates in an FMU rest on.
+
+    experiment: its id; estimates: value and standard error by the FMU's variable, in its unit;
+    data: SHA-256 of the data files, by name; verdict: of close-loop.
+    """
+
+    experiment: str
+    estimates: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    data: Mapping[str, str] = field(default_factory=dict)
+    verdict: str = ""
+
+
+def record(model: Model, kind: str, fmi: int, origin: Origin | None = None) -> dict[str, Any]:
+    """The record of a model's build: version, profiles, parameters, effects, and what estimates rest on."""
+    return {
+        **common(model.name, kind, fmi),
+        "profiles": _profiles(model),
+        "parameters": {p.name: _value(p) for p in model.of(Parameter)},
+        "effects": [_effect(model, effect, location) for effect, location in model.effects],
+        "origin": None if origin is None else asdict(origin),
+    }
+
+
+def common(model: str, kind: str, fmi: int) -> dict[str, Any]:
+    """What the record of every build says."""
+    return {"tool": "railfmi", "version": version("railfmi"), "model": model, "kind": kind, "fmi": fmi}
+
+
+def sealed(record: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
+    """The file at PLACE: a record with the SHA-256 of the FMU's other files, by path."""
+    sums = {path: sha256(files[path]).hexdigest() for path in sorted(files) if path != PLACE}
+    return (json.dumps({**record, "sha256": sums}, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def on_page(page: str, record: Mapping[str, Any]) -> str:
+    """A documentation page with the record at its end."""
+    template = Environment(loader=FileSystemLoader(HERE), autoescape=True).get_template("provenance.html.j2")
+    section = template.render(r=record, place=PLACE)
+    body, end, rest = page.rpartition("</body>")
+    return str(Markup(body) + Markup(section) + Markup(end + rest)) if end else page
+
+
+def provenance(fmu: str | Path) -> dict[str, Any]:
+    """The record in an FMU file, and `fmu_sha256`, the checksum of the file itself.
+
+    BadInput where it is no zip file, or has no such record, as an FMU of another tool.
+    """
+    path = Path(fmu)
+    try:
+        with zipfile.ZipFile(path) as packed:
+            found = json.loads(packed.read(PLACE))
+    except KeyError as error:
+        raise BadInput(f"{path}: has no {PLACE}; it was not built by railfmi 0.1 or later") from error
+    except (OSError, zipfile.BadZipFile) as error:
+        raise BadInput(f"{path}: cannot be read as an FMU ({error}); give the path of an FMU") from error
+    except ValueError as error:
+        raise BadInput(f"{path}: its {PLACE} is no JSON ({error}); get the FMU again") from error
+    if not isinstance(found, dict):
+        raise BadInput(f"{path}: its {PLACE} holds no table; get the FMU again")
+    return {**found, "fmu_sha256": checksum(path)}
+
+
+def altered(fmu: str | Path) -> list[str]:
+    """Files of an FMU that are not as its record says: changed, added or gone since it was built."""
+    said: dict[str, str] = provenance(fmu).get("sha256", {})
+    with zipfile.ZipFile(fmu) as packed:
+        names = [n for n in packed.namelist() if n != PLACE and not n.endswith("/")]
+        now = {name: sha256(packed.read(name)).hexdigest() for name in names}
+    return sorted(name for name in {*said, *now} if said.get(name) != now.get(name))
+
+
+def checksum(file: Path) -> str:
+    """SHA-256 of a file."""
+    return sha256(file.read_bytes()).hexdigest()
+
+
+def _profiles(model: Model) -> dict[str, Any]:
+    """The profile pair of a model that has one; a point file by its name and checksum, not its place."""
+    track: Any = getattr(model, "track", None)
+    if not is_dataclass(track) or isinstance(track, type):
+        return {}
+    found = asdict(track)
+    for name, value in tuple(found.items()):
+        if isinstance(value, str) and Path(value).is_file():
+            found |= {name: Path(value).name, f"{name}_sha256": checksum(Path(value))}
+    return found
+
+
+def _effect(model: Model, effect: type[Effect], location: str) -> dict[str, Any]:
+    start = effect.name_at(location, "")
+    own = [p for p in model.of(Parameter) if p.name in model.brought and p.name.startswith(start)]
+    values = {p.name.removeprefix(start): _value(p) for p in own}
+    return {"kind": effect.kind, "location": location, "parameters": values}
+
+
+def _value(p: Any) -> dict[str, Any]:
+    return {"value": float(p.start), "unit": p.unit}
