@@ -1,0 +1,74 @@
+"""Connected FMUs as a package of System Structure and Parameterization (SSP) 1.0 sees them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+STRUCTURE = "SystemStructure.ssd"
+RESOURCES = "resources"
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+VENDOR = "org.railfmi"  # type of our annotations
+OSP = "com.opensimulationplatform"  # of those that say steps, which libcosim and ecos read
+NAMESPACES = {
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "railfmi": "https://railfmi.org/ssp",  # a name, not an address
+}
+Kind = Literal["input", "output", "parameter", "calculatedParameter", "inout"]
+
+
+@dataclass(frozen=True)
+class Connector:
+    """A variable of a component that can be connected, with its unit where one is stated."""
+
+    name: str
+    kind: Kind
+    unit: str | None = None
+
+
+@dataclass(frozen=True)
+class Component:
+    """An FMU in a system.
+
+    source: its path in the package. start: values before the start by variable, each with its unit or None.
+    step: s, where it has one of its own. feeds, data: of a source of signals, which component it feeds and
+    the path of the same signals as CSV.
+    """
+
+    name: str
+    source: str
+    connectors: tuple[Connector, ...] = ()
+    start: Mapping[str, tuple[float, str | None]] = field(default_factory=dict)
+    step: float | None = None
+    feeds: str | None = None
+    data: str | None = None
+
+
+@dataclass(frozen=True)
+class Link:
+    """An input = gain * an output + offset, in the numbers of both FMUs where `plain`.
+
+    Otherwise the importing tool converts the units first. Ends are (component, variable).
+    """
+
+    source: tuple[str, str]
+    target: tuple[str, str]
+    gain: float = 1.0
+    offset: float = 0.0
+    plain: bool = True
+
+
+@dataclass(frozen=True)
+class System:
+    """Components with their connections and the usual experiment on them; start, stop, step in s."""
+
+    name: str
+    components: tuple[Component, ...]
+    links: tuple[Link, ...]
+    stop: float | None = None
+    step: float | None = None
+    start: float = 0.0
+    description: str = ""
+    ignored: tuple[str, ...] = ()  # what was found in a package and cannot be used here, a sentence each

@@ -1,0 +1,172 @@
+"""A scenario as an SSP 1.0 package that other tools run."""
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from fmus.errors import BadInput
+from fmus.export.provenance import PLACE as PROVENANCE
+from fmus.export.provenance import provenance, sealed
+from fmus.export.ssp import Component, Connector, Link, System, write_package
+from fmus.export.ssp.source import signal_source
+from fmus.export.ssp.system import RESOURCES
+from fmus.host.archive import Archive
+from fmus.host.connections import Connection, Directory, links
+from fmus.host.description import FmuDescription
+from scenarios.closing import writable
+from scenarios.exchange.form import Form, Kind, Packer, starts
+from scenarios.exchange.sampling import Fed, constants, sampled
+from scenarios.exchange.settings import PLACE, chosen, dropped, motion, settings
+from scenarios.running.asking import asked, wanted
+from scenarios.running.case import prepared
+from scenarios.running.declaration import Declaration
+from scenarios.running.given import sources
+from scenarios.running.reading import Scenario, load_scenario
+from scenarios.validation import of_file
+
+Tell = Callable[[str], None]
+
+
+@dataclass
+class _Content:
+    """What goes into the package."""
+
+    components: list[Component] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)
+    files: dict[str, bytes] = field(default_factory=dict)
+
+
+def export_ssp(
+    scenario: str | Path,
+    out: str | Path,
+    kind: Kind = "native",
+    variant: str | None = None,
+    fmi: int = 2,
+    platforms: Sequence[str] = ("host",),
+    tell: Tell = lambda _: None,
+) -> Path:
+    """Write `out`/ID.ssp, or `out` itself where it ends in .ssp, and return its path.
+
+    kind, fmi, platforms: of the FMUs of our models, see build_native; FMUs given as files go in as they are.
+    variant: which one of a scenario that has several. tell: gets a line on what is being done, and on what
+    other tools will not see. The same scenario gives the same bytes. BadInput for a wrong scenario.
+    """
+    read = load_scenario(scenario)
+    name = chosen(read, variant)
+    d = motion(read, name)
+    label = read.id if variant is None else f"{read.id}_{name}"
+    target = Path(out) if Path(out).suffix == ".ssp" else Path(out) / f"{label}.ssp"
+    writable(target.parent)
+    with ExitStack() as stack, of_file(read.file):
+        work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_ssp_")))
+        packer = Packer(work / "models", Form(kind, fmi, platforms), d)
+        tell(f"{label}: building its FMUs and checking all that it names")
+        prepared(d, read.file, wanted(asked(read), name, read), packer, stack)
+        archives = {n: stack.enter_context(Archive(path)) for n, path in packer.paths.items()}
+        fmus = {n: archive.description for n, archive in archives.items()}
+        given = sources(d, fmus, read.file.parent)
+        content = _members(d, packer.paths, fmus, constants(given))
+        for fed, signals in sampled(d, fmus, given).items():
+            tell(f"{label}: writing the signals of '{fed}' as data and as an FMU")
+            _feed(content, fed, signals, Form(kind, fmi, platforms), work / "sources")
+    content.files |= {PLACE: settings(read, name), PROVENANCE: _record(label, d, packer, content)}
+    for said in _unsaid(read, name, d):
+        tell(f"{label}: {said}")
+    system = System(
+        label,
+        tuple(content.components),
+        tuple(content.links),
+        d.duration,
+        d.step,
+        0.0,
+        read.declared.question,
+    )
+    return write_package(system, content.files, target)
+
+
+def _members(
+    d: Declaration, paths: Mapping[str, Path], fmus: Mapping[str, FmuDescription], fixed: Mapping[str, float]
+) -> _Content:
+    """The scenario's own FMUs with their connections and values; members of one file share it."""
+    found = links([Connection(**dict(wire)) for wire in d.connections], Directory(fmus))
+    content = _Content(
+        links=[
+            Link((link.source.fmu, link.source.variable), (link.target.fmu, link.target.variable), *line)
+            for link in found
+            for line in [(link.gain, link.offset)]
+        ]
+    )
+    places, own = dict[Path, str](), starts(d)
+    for name, member in d.fmus.items():
+        if paths[name] not in places:
+            places[paths[name]] = f"{RESOURCES}/{name}.fmu"
+            content.files[places[paths[name]]] = paths[name].read_bytes()
+        known = fmus[name].variables
+        values = {k.partition(".")[2]: v for k, v in fixed.items() if k.partition(".")[0] == name}
+        start = {v: (value, known[v].unit) for v, value in {**own[name], **values}.items()}
+        connected = {link.target.variable for link in found if link.target.fmu == name}
+        connectors = _connectors(fmus[name], connected)
+        content.components.append(Component(name, places[paths[name]], connectors, start, member.step))
+    return content
+
+
+def _connectors(fmu: FmuDescription, connected: set[str]) -> tuple[Connector, ...]:
+    """Inputs that are connected (FMPy stumbles over others), outputs and parameters."""
+    inputs = [Connector(n, "input", fmu.variables[n].unit) for n in fmu.inputs if n in connected]
+    outputs = [Connector(n, "output", fmu.variables[n].unit) for n in fmu.outputs]
+    parameters = [Connector(n, "parameter", fmu.variables[n].unit) for n in fmu.parameters]
+    return (*inputs, *outputs, *parameters)
+
+
+def _feed(content: _Content, fed: str, signals: Fed, form: Form, folder: Path) -> None:
+    """Add a component that feeds another one with its signals, and the same signals as CSV."""
+    taken = {component.name for component in content.components}
+    name = f"inputs_{fed}"
+    while name in taken:
+        name += "_"
+    model = signal_source(name, signals.step, signals.spacing, signals.even)
+    fmu, data = f"{RESOURCES}/{name}.fmu", f"{RESOURCES}/{name}.csv"
+    content.files |= {fmu: form.build(model, folder).read_bytes(), data: signals.csv}
+    outputs = tuple(Connector(n, "output", unit) for n, (unit, _) in signals.even.items())
+    # before the one that it feeds, for tools that step in the order of the file
+    i = next(i for i, c in enumerate(content.components) if c.name == fed)
+    step = content.components[i].step
+    content.components.insert(i, Component(name, fmu, outputs, step=step, feeds=fed, data=data))
+    inputs = tuple(Connector(n, "input", unit) for n, (unit, _) in signals.even.items())
+    kept = content.components[i + 1]
+    content.components[i + 1] = replace(kept, connectors=(*inputs, *kept.connectors))
+    content.links += [Link((name, n), (fed, n)) for n in signals.even]
+
+
+def _record(label: str, d: Declaration, packer: Packer, content: _Content) -> bytes:
+    """Where each FMU comes from, and the SHA-256 of FMUs and data."""
+    known = {component.name: component.source for component in content.components}
+    records = {known[name]: _known_of(packer.paths[name]) for name in d.fmus}
+    about = {"tool": "railfmi", "version": version("railfmi"), "scenario": label, "fmus": records}
+    return sealed(about, content.files)
+
+
+def _known_of(fmu: Path) -> dict[str, Any] | None:
+    """The record in an FMU that was built by railfmi."""
+    try:
+        return {key: value for key, value in provenance(fmu).items() if key != "sha256"}
+    except BadInput:
+        return None
+
+
+def _unsaid(scenario: Scenario, variant: str, d: Declaration) -> list[str]:
+    """What only railfmi will see of a scenario."""
+    said = []
+    if d.events:
+        said.append(f"its {len(d.events)} events are for railfmi alone; SSP 1.0 has no word for them")
+    if (d.order, d.extrapolation) != ("jacobi", "hold"):
+        said.append(f"order '{d.order}' with extrapolation '{d.extrapolation}' is for railfmi alone")
+    if any(wire.delayed for wire in d.connections):
+        said.append("delayed connections are delayed by railfmi alone")
+    if left := dropped(scenario, variant):
+        said.append(f"{left} expectations about other or several variants are left out")
+    return said

@@ -1,0 +1,182 @@
+"""An SSP 1.0 package, of ours or of another tool, as a folder with a scenario that runs here."""
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from hashlib import sha256
+from json import loads
+from pathlib import Path
+from typing import Any
+
+from fmus.errors import BadInput
+from fmus.export.provenance import PLACE as PROVENANCE
+from fmus.export.ssp import Component, Link, System, read_package
+from fmus.export.ssp.system import RESOURCES
+from fmus.host.archive import describe
+from fmus.host.description import FmuDescription
+from fmus.host.recording import TIME
+from fmus.units import conversion
+from scenarios.closing import writable
+from scenarios.exchange.settings import PLACE
+from scenarios.exchange.toml_text import toml_text
+from scenarios.running.reading import load_scenario
+
+Tell = Callable[[str], None]
+Descriptions = Mapping[str, FmuDescription]
+STEP = 1e-3  # s, where neither the package nor its FMUs name one
+FILE = "scenario.toml"
+KEPT = ("id", "question", "order", "extrapolation", "seed", "record", "sensors", "events", "expect", "figure")
+
+
+def import_ssp(package: str | Path, out: str | Path, tell: Tell = lambda _: None) -> Path:
+    """Write a package as a scenario with its FMUs and data into the folder `out`; the scenario's path.
+
+    A package of ours runs as the scenario that it was made from; what was changed in its structure or its
+    values counts. One of another tool expects that the outputs stay finite. tell: gets a line on what is
+    left out or was changed. BadInput where it is no SSP 1.0 package or holds what cannot be run here.
+    """
+    system, files = read_package(package)
+    folder = writable(Path(out))
+    for line in (*system.ignored, *_changed(files)):
+        tell(f"{package}: {line}")
+    for path, data in files.items():
+        if path.startswith(f"{RESOURCES}/") or path in {c.source for c in system.components}:
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(data)
+    try:
+        table = _scenario(system, files, folder)
+    except BadInput as error:
+        raise BadInput(f"{package}: {error}") from error
+    (folder / FILE).write_text(toml_text(table), encoding="utf-8")
+    return load_scenario(folder / FILE).file
+
+
+def _scenario(system: System, files: Mapping[str, bytes], folder: Path) -> dict[str, Any]:
+    ours = _settings(files)
+    sources = _sources(system, files)
+    members = [c for c in system.components if c.name not in sources]
+    fmus = {c.name: describe(folder / c.source) for c in members}
+    names = _names(members)
+    inputs: dict[str, Any] = {}
+    table: dict[str, Any] = {
+        "id": re.sub(r"[^A-Za-z0-9_.-]", "_", system.name).lstrip("_.-") or "package",
+        "question": system.description or f"Do the FMUs of {system.name} run together?",
+        **{key: ours[key] for key in KEPT if key in ours},
+        "duration": _duration(system),
+        "step": _step(system, ours, fmus),
+    }
+    table["fmus"] = {names[c.name]: _member(c, fmus[c.name], names[c.name], inputs) for c in members}
+    links = [link for link in system.links if link.source[0] not in sources]
+    table["connections"] = [_wire(link, fmus, names, ours.get("delayed", [])) for link in links]
+    for link in system.links:
+        if link.source[0] in sources:
+            data = {"data": sources[link.source[0]], "time": TIME, "column": link.source[1]}
+            inputs[f"{names[link.target[0]]}.{link.target[1]}"] = data
+    table["inputs"] = inputs
+    table.setdefault("expect", [_finite(names[n], d) for n, d in fmus.items() if d.outputs])
+    return table
+
+
+def _settings(files: Mapping[str, bytes]) -> dict[str, Any]:
+    """What a package of ours says beyond its structure."""
+    if PLACE not in files:
+        return {}
+    try:
+        return tomllib.loads(files[PLACE].decode())
+    except ValueError as error:
+        raise BadInput(f"{PLACE} in it is not valid TOML ({error}); correct or remove it") from error
+
+
+def _sources(system: System, files: Mapping[str, bytes]) -> dict[str, str]:
+    """Components that only hand on signals which the package holds as data too, with that file."""
+    found = {c.name: c.data for c in system.components if c.data is not None and c.data in files}
+    plain = {"gain": 1.0, "offset": 0.0}
+    for link in system.links:
+        if link.source[0] in found and {"gain": link.gain, "offset": link.offset} != plain:
+            del found[link.source[0]]
+    changed = {c.name for c in system.components if c.start}
+    return {name: data for name, data in found.items() if name not in changed}
+
+
+def _names(members: list[Component]) -> dict[str, str]:
+    """Names that a scenario allows."""
+    names = {c.name: re.sub(r"^(?=\d)|\W", "_", c.name, flags=re.ASCII) for c in members}
+    for name, new in names.items():
+        if list(names.values()).count(new) > 1:
+            raise BadInput(f"component '{name}' would become '{new}' as others do; rename it")
+    return names
+
+
+def _duration(system: System) -> float:
+    if system.stop is None or system.start != 0.0:
+        found = f"{system.start:g} to {'no end' if system.stop is None else format(system.stop, 'g')}"
+        raise BadInput(f"its default experiment goes from {found}; give it startTime 0 and a stopTime, s")
+    return system.stop
+
+
+def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
+    """The communication step, s: of the package, else the shortest that an FMU names for itself."""
+    if system.step is not None:
+        return system.step
+    own = [d.step_size for d in fmus.values() if d.step_size]
+    return float(ours.get("step") or min(own, default=STEP))
+
+
+def _member(c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any]) -> dict[str, Any]:
+    """An FMU with its values; those of inputs go to `inputs`."""
+    member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
+    for variable, (value, unit) in c.start.items():
+        known = fmu.variables.get(variable)
+        if known is None:
+            raise BadInput(f"parameter '{variable}' of component '{c.name}' is not in its FMU; correct it")
+        if unit is not None and known.unit is not None:
+            factor, offset = conversion(unit, known.unit, f"parameter '{variable}' of '{c.name}'")
+            value = factor * value + offset
+        if known.causality == "input":
+            inputs[f"{name}.{variable}"] = value
+        else:
+            kind = "parameters" if known.causality == "parameter" else "initial"
+            member[kind][variable] = value
+    return {key: value for key, value in member.items() if value not in ({}, None)}
+
+
+def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: list[str]) -> dict[str, Any]:
+    """A connection in a scenario's words, where units are converted before gain and offset."""
+    (source, output), (target, inlet) = link.source, link.target
+    to = f"{names[target]}.{inlet}"
+    wire: dict[str, Any] = {"from": f"{names[source]}.{output}", "to": to}
+    units = [
+        fmus[name].variables[v].unit if v in fmus[name].variables else None
+        for name, v in (link.source, link.target)
+    ]
+    gain, offset = link.gain, link.offset
+    if link.plain and units[0] != units[1] and None not in units:
+        wire["gain_unit"] = f"({units[1]})/({units[0]})"
+        factor, shift = conversion(
+            f"({units[0]})*{wire['gain_unit']}", units[1] or "1", f"connection to {to}"
+        )
+        gain, offset = gain / factor, offset - gain / factor * shift
+    if (gain, offset) != (1.0, 0.0):
+        wire |= {"gain": gain, "offset": offset}
+    return wire | ({"delayed": True} if to in delayed else {})
+
+
+def _finite(name: str, fmu: FmuDescription) -> dict[str, Any]:
+    """What can be expected of FMUs of which nothing else is known."""
+    parts = [f"max(abs({name}.{output})) < 1e300" for output in fmu.outputs]
+    return {"that": " and ".join(parts), "because": f"the outputs of {name} stay finite"}
+
+
+def _changed(files: Mapping[str, bytes]) -> list[str]:
+    """FMUs and data that are not as they were when the package was written by railfmi."""
+    if PROVENANCE not in files:
+        return []
+    try:
+        said: dict[str, str] = loads(files[PROVENANCE])["sha256"]
+    except (ValueError, KeyError, TypeError):
+        return [f"{PROVENANCE} in it cannot be read"]
+    return [
+        f"'{path}' {'was changed' if path in files else 'is gone'} since the package was written"
+        for path, known in said.items()
+        if path not in files or sha256(files[path]).hexdigest() != known
+    ]

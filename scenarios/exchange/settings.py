@@ -1,0 +1,93 @@
+"""What a scenario says and SSP 1.0 has no words for: a file of its own in the package."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fmus.errors import BadInput, did_you_mean
+from fmus.export.provenance import FOLDER
+from scenarios.exchange.toml_text import toml_text
+from scenarios.running.asking import asked
+from scenarios.running.declaration import Declaration, Moment
+from scenarios.running.friction import CONDITIONS
+from scenarios.running.reading import Scenario
+
+PLACE = f"{FOLDER}/scenario.toml"
+
+
+def settings(scenario: Scenario, variant: str) -> bytes:
+    """The file at PLACE for one variant; formulas that name variants are left out with them."""
+    d = scenario.variants[variant]
+    table = {
+        "id": scenario.id,
+        "question": scenario.declared.question,
+        "order": d.order,
+        "extrapolation": d.extrapolation,
+        "seed": d.seed,
+        "step": d.step,
+        "delayed": [wire.target for wire in d.connections if wire.delayed],
+        "record": d.record.model_dump(mode="json", exclude_none=True),
+        "sensors": d.sensors,
+        "events": [_event(moment) for moment in d.events],
+        "expect": _expectations(scenario, variant),
+        "figure": _figures(scenario, variant),
+    }
+    return toml_text({key: value for key, value in table.items() if value not in ({}, [])}).encode()
+
+
+def dropped(scenario: Scenario, variant: str) -> int:
+    """How many expectations are left out, being about other variants or several at once."""
+    return len(scenario.declared.expect) - len(_expectations(scenario, variant))
+
+
+def _event(moment: Moment) -> dict[str, Any]:
+    values = dict(moment.set)
+    for name, condition in moment.friction.items():
+        values |= {f"{name}.{variable}": v for variable, v in CONDITIONS[condition].items()}
+    return {"time": moment.time, "set": values}
+
+
+def _expectations(scenario: Scenario, variant: str) -> list[dict[str, Any]]:
+    return [
+        {"that": e.that, "because": e.because}
+        for e, question in asked(scenario).expectations
+        if variant in question.variants and _single([question.formula.names], scenario)
+    ]
+
+
+def _figures(scenario: Scenario, variant: str) -> list[dict[str, Any]]:
+    """Figures with those of their panels that are about this variant alone."""
+    curves, found = asked(scenario).curves, []
+    for i, picture in enumerate(scenario.declared.figure):
+        panels = []
+        for j, panel in enumerate(picture.panels):
+            drawn, over = curves[i, j]
+            questions = [*drawn, *([over] if over else [])]
+            about = all(variant in q.variants or not q.formula.names for q in questions)
+            if about and _single([q.formula.names for q in questions], scenario):
+                panels.append(panel.model_dump(mode="json", exclude={"variants"}, exclude_defaults=True))
+        if panels:
+            found.append({"name": picture.name, "title": picture.title, "panels": panels})
+    return found
+
+
+def _single(names: Sequence[Sequence[str]], scenario: Scenario) -> bool:
+    """Whether no name begins with that of a variant."""
+    return all(n.partition(".")[0] not in scenario.variants for some in names for n in some)
+
+
+def chosen(scenario: Scenario, variant: str | None) -> str:
+    """The variant to export: the one that is named, or the only one."""
+    names = list(scenario.variants)
+    if variant is None and len(names) > 1:
+        raise BadInput(f"{scenario.file}: has variants {', '.join(names)}; a package holds one, name it")
+    if variant is not None and variant not in names:
+        raise BadInput(f"{scenario.file}: there is no variant '{variant}'; {did_you_mean(variant, names)}")
+    return variant or names[0]
+
+
+def motion(scenario: Scenario, variant: str) -> Declaration:
+    """A variant's declaration; BadInput where it has no FMUs."""
+    d = scenario.variants[variant]
+    if d.contact is not None:
+        raise BadInput(f"{scenario.file}: is about a contact table, without FMUs; there is nothing to pack")
+    return d
