@@ -17,8 +17,8 @@ from estimator.closeloop.screen import Promise, changes, screen
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
 
-NOMINEES = 24  # effects that are fitted
-SHAPES = 2  # start values of an effect's shape that are fitted
+NOMINEES = 16  # effects that are fitted
+LEADING, SHAPES = 6, 2  # of them, in so many shapes; the others in the best one
 FAULTS = 4  # faults of sensors that are fitted
 
 Tell = Callable[[str], None]
@@ -88,4 +88,5 @@ def nominated(promises: Sequence[Promise]) -> list[Promise]:
         labels.setdefault(p.label, []).append(p)
     physical = [own for own in labels.values() if not own[0].candidates[0].is_fault][:NOMINEES]
     faults = [own for own in labels.values() if own[0].candidates[0].is_fault][:FAULTS]
-    return [p for own in (*physical, *faults) for p in own[:SHAPES]]
+    more = [p for own in physical[:LEADING] for p in own[1:SHAPES]]
+    return [*(own[0] for own in (*physical, *faults)), *more]

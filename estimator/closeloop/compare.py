@@ -1,7 +1,7 @@
 """Joint fits of hypotheses and their comparison on data that no fit has seen."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -13,8 +13,8 @@ from estimator.closeloop.screen import Promise, built, label
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-BRIEF, LONG = 4, 15  # evaluations of a fit to rank it, and to finish it
-FINALISTS = 6
+BRIEF, LONG = 4, 10  # evaluations of a fit to rank it, and to finish it
+FINALISTS = 5
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
@@ -96,10 +96,13 @@ def hypotheses(
     Best first on the identify part; of several with the same label the one that fits better is kept.
     """
     unknowns = base.fit.unknowns
-    brief = fitted(problem, unknowns, promises, size, BRIEF, jobs)
+    # start states hardly matter for the ranking: the brief fits leave them where the base has them
+    states = {n: v for n, v in base.fit.theta.items() if n in problem.free_states}
+    started = replace(problem, declared={**problem.declared, **states})
+    brief = fitted(started, [u for u in unknowns if u.name not in states], promises, size, BRIEF, jobs)
     limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
     hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
-    again = [Promise(h.candidates, 0.0, h.fit.theta) for h in hopeful]
+    again = [Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta}) for h in hopeful]
     return fitted(problem, unknowns, again, size, LONG, jobs) + [h for h in brief if h not in hopeful]
 
 
