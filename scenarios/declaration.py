@@ -1,7 +1,7 @@
 """What an experiment.toml may say: one class a table, one field a key."""
 
 from collections.abc import Iterator
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
 
@@ -28,6 +28,8 @@ def _column_or_number(value: object) -> str | float:
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
 Interval = Annotated[tuple[float, float], PlainValidator(_interval)]
 Channel = Annotated[str | float, PlainValidator(_column_or_number)]
 
@@ -103,13 +105,53 @@ class EstimatedInput(Table):
     rate_input: str | None = None
 
 
+class Alarm(Table):
+    """Tell when a quantity is below or above a limit with at least that probability."""
+
+    below: Number | None = None
+    above: Number | None = None
+    probability: Share = 0.95
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Self:
+        if self.below is None and self.above is None:
+            raise ValueError("needs 'below' or 'above', the limit in the quantity's unit")
+        return self
+
+
+class Options(Table):
+    """How an estimate is made: filter, noise, gating, smoothing, alarms; the rest is derived from the data.
+
+    process_std: noise that drives a state, its unit/sqrt(s). walk: how far a parameter wanders in a second,
+    its unit/sqrt(s). initial_std: what is known of a state's start. damping: of an unknown input's process.
+    input_parts: in how many parts inputs act between two samples.
+    """
+
+    filter: Literal["ukf", "ekf", "dual"] = "ukf"
+    smooth: bool = False
+    process_std: dict[str, NotNegative] = {}
+    walk: dict[str, Positive] = {}
+    initial_std: dict[str, Positive] = {}
+    damping: dict[str, Positive] = {}
+    random_walk: tuple[str, ...] = ()
+    clip: tuple[str, ...] = ()
+    gate: Positive | None = None
+    adapt: tuple[Literal["measurement", "process"], ...] = ()
+    input_parts: Annotated[int, Field(strict=True, ge=1)] | None = None
+    alpha: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0
+    beta: Number = 2.0
+    kappa: Number = 0.0
+    alarms: dict[str, Alarm] = {"mu0": Alarm(below=0.15)}
+
+
 class Estimate(Table):
-    """What the filter estimates beside the states it needs anyway; `rate` in Hz."""
+    """What the filter estimates beside the states it needs anyway, and how; `rate` in Hz."""
 
     parameters: dict[str, EstimatedParameter] = {}
     states: tuple[str, ...] = ()
     rate: Positive | None = None
     inputs: dict[str, EstimatedInput] = {}
+    options: Options = Options()
 
 
 class Declaration(Table):

@@ -14,10 +14,10 @@ from estimator.needed import needed
 from estimator.process_noise import motion
 from estimator.record import Array, Record
 from estimator.shaping import UnknownInput
-from fmus.errors import BadInput
+from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
-from scenarios.estimating_options import Options
+from scenarios.declaration import Options
 from scenarios.estimating_unknowns import check_options, inputs_of, parameters_of, states_of, usual
 from scenarios.experiment import Experiment
 
@@ -69,6 +69,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     s = samples(run.t, run.u, run.y, every)
     if len(s.t) < MIN_SAMPLES:
         raise BadInput(f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher one")
+    _check_measured(e, record, s)
     noise = noise_of(record)
     constants = {**e.parameters, **e.initial}
     parameters = tuple(parameters_of(e, options, d))
@@ -76,6 +77,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     values = constants | {p.name: p.start for p in parameters}
     names = tuple(e.estimate.states) if e.estimate else ()
     states = names or _needed(archive, values, s, record)
+    _check_alarms(e, options, (*states, *(u.name for u in (*parameters, *unknown))))
     s, run_of = _fine_enough(archive, values, record, states, noise, every, options.input_parts)
     nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
     return Setup(
@@ -84,6 +86,29 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
         motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
         record.inputs, record.outputs, run_of[:, : len(record.outputs)],
     )  # fmt: skip
+
+
+def _check_measured(e: Experiment, record: Record, s: Samples) -> None:
+    """Each output needs measurements among the samples, and enough of them to show noise not declared."""
+    for j, name in enumerate(record.outputs):
+        if not np.isfinite(s.y[:, j]).any():
+            raise BadInput(
+                f"{e.file}: [estimate] rate leaves no measurement of output '{name}'; use a higher one"
+            )
+        found = int(np.isfinite(record.runs[0].y[:, j]).sum())
+        if np.isnan(record.noise_std[j]) and found < MIN_SAMPLES:
+            raise BadInput(
+                f"{e.file}: [outputs.{name}] has {found} measurements, too few to tell its noise; "
+                "add noise_std = ..."
+            )
+
+
+def _check_alarms(e: Experiment, options: Options, estimated: tuple[str, ...]) -> None:
+    """Alarms that were asked for must be about something that is estimated."""
+    for name in options.alarms if "alarms" in options.model_fields_set else ():
+        if name not in estimated:
+            where = f"{e.file}: [estimate.options] alarms '{name}'"
+            raise BadInput(f"{where} is not estimated; {did_you_mean(name, estimated)}")
 
 
 def noise_of(record: Record) -> Array:

@@ -1,37 +1,36 @@
 """Measured data: from the files of an experiment to a checked Record in the FMU's units."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
 
 from estimator.record import Array, BoolArray, Note, Record, Run
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
 from fmus.units import conversion
 from scenarios.checks import check_cells, check_gaps, check_time, output_notes, time_notes
-from scenarios.csv_file import read_csv
 from scenarios.experiment import Experiment, check_names
+from scenarios.readers import READERS, read_sheet
+from scenarios.readers.units import StatedUnits
 
 MIN_SAMPLES = 50  # in each part; fewer cannot show an error beyond its own scatter
-READERS: dict[str, Callable[[Path], pd.DataFrame]] = {".csv": read_csv}
-NOT_READ_YET = (".parquet", ".mat", ".tdms", ".mf4", ".mdf")
+MIN_MEASURED = 2  # of an output in each file; fewer have no motion
+
+__all__ = ["READERS", "load_record"]
 
 
-def load_record(experiment: Experiment, description: FmuDescription) -> Record:
+def load_record(experiment: Experiment, description: FmuDescription, missing: bool = False) -> Record:
     """The measured inputs and outputs of an experiment in the FMU's units, checked.
 
-    Without [split] all samples are to identify and none is held out. Raises BadInput where names, units
-    or data forbid the use; what is merely odd stands in the notes.
+    Without [split] all samples are to identify and none is held out. missing: whether cells of outputs may
+    be empty; they become nan. Raises BadInput where names, units or data forbid the use; what is merely odd
+    stands in the notes.
     """
     check_names(experiment, description)
     scale, notes = _conversions(experiment, description)
     runs = []
     for part, file in enumerate(experiment.data_files):
-        run, found = _run(experiment, part, file, scale)
+        run, found = _run(experiment, description, part, file, scale, missing)
         runs.append(run)
         notes += found
     std = [output.noise_std or np.nan for output in experiment.outputs.values()]
@@ -62,37 +61,73 @@ def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]
     return np.array(scale), notes
 
 
-def _run(e: Experiment, part: int, file: Path, scale: Array) -> tuple[Run, list[Note]]:
+def _run(
+    e: Experiment, fmu: FmuDescription, part: int, file: Path, scale: Array, missing: bool
+) -> tuple[Run, list[Note]]:
     """One file as a run with its notes, from its start to the last sample of the split."""
-    data = _read(e, file)
+    data, stated = _read(e, file)
     fit, test = _masks(e, part, file, data[e.time])
     used = slice(int(np.flatnonzero(fit | test)[-1]) + 1)
     data = {column: values[used] for column, values in data.items()}
     t = data[e.time]
-    check_gaps(str(file), t)
-    for column, values in data.items():
-        check_cells(str(file), column, t, values)
-    notes = list(time_notes(file.name, t))
-    for column in dict.fromkeys(_source(e, output.column) for output in e.outputs.values()):
-        notes += output_notes(file.name, column, data[column])
+    notes = _checked(e, file, data, missing)
     for name, derived in e.derived.items():
-        data[name] = np.gradient(data[derived.derivative], t)
-    inputs = [data[c] if isinstance(c, str) else np.full(t.size, c) for c in e.inputs.values()]
+        data[name] = _derivative(t, data[derived.derivative])
+    u = np.empty((t.size, len(e.inputs)))
+    for j, (name, channel) in enumerate(e.inputs.items()):
+        u[:, j] = _input(e, fmu, name, data[channel], stated) if isinstance(channel, str) else channel
     outputs = np.column_stack([data[output.column] for output in e.outputs.values()])
-    return Run(
-        t=t,
-        u=np.column_stack(inputs) if inputs else np.empty((t.size, 0)),
-        y=outputs * scale[:, 0] + scale[:, 1],
-        fit=fit[used],
-        test=test[used],
-    ), notes
+    y = outputs * scale[:, 0] + scale[:, 1]
+    return Run(t=t, u=u, y=y, fit=fit[used], test=test[used]), [*notes, *stated.notes]
 
 
-def _source(e: Experiment, column: str) -> str:
-    """The column of the file behind a column that may be derived."""
+def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated: StatedUnits) -> Array:
+    """An input in the FMU's unit (N,): taken as it is, unless the file states another unit."""
+    channel = str(e.inputs[name])
+    if channel in e.derived:
+        return values
+    factor, offset = stated.to(channel, fmu.variables[name].unit, f"{e.file}: [inputs] {name}")
+    return values * factor + offset
+
+
+def _check_units(e: Experiment, stated: StatedUnits) -> None:
+    """The units declared of the outputs against those that the file states."""
+    for name, output in e.outputs.items():
+        column, times = _source(e, output.column)
+        stated.check(column, times, output.unit, f"{e.file}: [outputs.{name}]")
+
+
+def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -> list[Note]:
+    """What is odd about the columns of a file, (N,) each; BadInput for gaps and for numbers that must be."""
+    t = data[e.time]
+    check_gaps(str(file), t)
+    measured = dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values())
+    needed = {_source(e, c)[0] for c in e.inputs.values() if isinstance(c, str)}
+    for column, values in data.items():
+        may_miss = missing and column in measured and column not in needed
+        check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
+        if np.isfinite(values).sum() < MIN_MEASURED:
+            raise BadInput(f"{file}: column '{column}' has no numbers to speak of; leave its output out")
+    notes = list(time_notes(file.name, t))
+    for column in measured:
+        notes += output_notes(file.name, column, data[column][np.isfinite(data[column])])
+    return notes
+
+
+def _derivative(t: Array, x: Array) -> Array:
+    """Time derivative (N,) of a column (N,) by central differences over the numbers it has, nan elsewhere."""
+    there = np.isfinite(x)
+    found = np.full(t.size, np.nan)
+    found[there] = np.gradient(x[there], t[there])
+    return found
+
+
+def _source(e: Experiment, column: str) -> tuple[str, int]:
+    """The column of the file behind one that may be derived, and how many times it is differentiated."""
+    times = 0
     while column in e.derived:
-        column = e.derived[column].derivative
-    return column
+        column, times = e.derived[column].derivative, times + 1
+    return column, times
 
 
 def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray]:
@@ -121,24 +156,25 @@ def _check_enough(e: Experiment, where: str, mask: BoolArray) -> None:
         raise BadInput(f"{e.file}: {where} holds {mask.sum()} samples; at least {MIN_SAMPLES} are needed")
 
 
-def _read(e: Experiment, file: Path) -> dict[str, Array]:
-    """The columns an experiment uses from a file, the time among them and checked, (N,) each."""
-    if file.suffix.lower() not in READERS:
-        known = "is not read yet" if file.suffix.lower() in NOT_READ_YET else "is of no known kind"
-        raise BadInput(f"{e.file}: data file '{file}' {known}; convert it to CSV")
-    table = READERS[file.suffix.lower()](file)
-    for name in e.derived:
-        if name in table:
-            raise BadInput(f"{e.file}: [derived.{name}] has the name of a column of {file}; take another one")
+def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
+    """The columns an experiment uses, (N,) each, the time in seconds and checked, and the units stated."""
     wanted = _wanted(e)
+    sheet = read_sheet(file, e.time, wanted)
+    for name in e.derived:
+        if name in sheet.known:
+            raise BadInput(f"{e.file}: [derived.{name}] has the name of a column of {file}; take another one")
     for column, where in wanted.items():
-        if column not in table:
-            known = did_you_mean(column, [*table.columns, *e.derived])
+        if column in sheet.apart:
+            raise BadInput(f"{e.file}: {where}: column '{column}' of {file} {sheet.apart[column]}")
+        if column not in sheet.cells:
+            known = did_you_mean(column, [*sheet.known, *e.derived])
             raise BadInput(f"{e.file}: {where}: column '{column}' is not in {file}; {known}")
-    lines = np.asarray(table.index) + 2
-    columns = {column: _numbers(file, table[column], lines) for column in wanted}
-    check_time(str(file), e.time, columns[e.time], lines)
-    return columns
+    stated = StatedUnits(sheet)
+    _check_units(e, stated)
+    columns = {column: sheet.numbers(column) for column in wanted if column != e.time}
+    t = stated.seconds(e.time, f"{e.file}: key 'time'")
+    check_time(str(file), e.time, t, np.arange(t.size) + sheet.first)
+    return {e.time: t, **columns}, stated
 
 
 def _wanted(e: Experiment) -> dict[str, str]:
@@ -148,16 +184,3 @@ def _wanted(e: Experiment) -> dict[str, str]:
     named |= {output.column: f"[outputs.{name}]" for name, output in e.outputs.items()}
     named |= {derived.derivative: f"[derived.{name}]" for name, derived in e.derived.items()}
     return {column: where for column, where in named.items() if column not in e.derived}
-
-
-def _numbers(file: Path, cells: "pd.Series[Any]", lines: NDArray[np.integer[Any]]) -> Array:
-    """A column's numbers, nan where a cell is blank."""
-    numbers = pd.to_numeric(cells.astype(str) if cells.dtype == bool else cells, errors="coerce")
-    words = (numbers.isna() & cells.notna()).to_numpy()
-    if words.any():
-        i = int(words.argmax())
-        raise BadInput(
-            f"{file} line {lines[i]}: column '{cells.name}' holds '{str(cells.iloc[i])[:40]}', not a number; "
-            "write decimals with a point and leave no words"
-        )
-    return numbers.to_numpy(dtype=np.float64)

@@ -130,8 +130,8 @@ BAD_USE = [
     ('time = "time"', 'time = "t"', "key 'time': column 't' is not in"),
     ("[derived.accel]", "[derived.torque]", "[derived.torque] has the name of a column"),
     ('"data.csv"', '"nodata.csv"', "cannot be read (No such file or directory)"),
-    ('"data.csv"', '"data.mf4"', "is not read yet; convert it to CSV"),
-    ('"data.csv"', '"data.xyz"', "is of no known kind; convert it to CSV"),
+    ('"data.csv"', '"data.mf4"', "cannot be read (No such file or directory)"),
+    ('"data.csv"', '"data.xyz"', "is of no known kind; known are .csv, .mat, .mdf, .mf4, .parquet, .tdms"),
 ]
 
 
