@@ -1,7 +1,6 @@
 """Two FMUs side by side on the inputs and parameters of an experiment: where they differ, and by how much."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
@@ -10,13 +9,13 @@ import numpy as np
 from estimator.record import Array, Record, Run
 from fmus.errors import BadInput
 from fmus.export.provenance import checksum
+from fmus.host.apart import FreeRun, simulate_apart
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, FmuVariable
 from fmus.units import conversion
 from scenarios.closing import writable
 from scenarios.comparing_figure import difference_plot
 from scenarios.comparing_result import SMALLEST, Comparison, Difference, Mismatch
-from scenarios.comparing_run import Job, courses
 from scenarios.experiment import Experiment, check_names, load_experiment
 from scenarios.record import load_record
 
@@ -118,8 +117,9 @@ def _simulated(
         for name, value in {**_measured(run, record, of), **e.parameters, **e.initial}.items():
             factor, offset = _scale(of, own, name)
             start[name] = factor * value + offset
-        runs.append((replace(run, u=run.u * scales[:, 0] + scales[:, 1]), start))
-    found = np.concatenate(courses(Job(file, record.inputs, tuple(names), tuple(runs))))
+        u = run.u * scales[:, 0] + scales[:, 1]
+        runs.append(FreeRun(run.t, {n: u[:, j] for j, n in enumerate(record.inputs)}, start))
+    found = np.concatenate(simulate_apart(file, runs, names))
     back = np.array([_scale(own, of, n) for n in names])
     into: Array = found * back[:, 0] + back[:, 1]
     return into
