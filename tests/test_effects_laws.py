@@ -174,7 +174,7 @@ def test_derivatives_are_finite_at_zero_and_about_it(kind):
         assert np.isfinite(slope(x, 0).full()).all()
 
 
-@pytest.mark.parametrize("kind", set(EVERY_EFFECT) - {"actuator_saturation"})
+@pytest.mark.parametrize("kind", sorted(set(EVERY_EFFECT) - {"actuator_saturation"}))
 def test_nothing_jumps(kind):
     """Along any line the change over a ten-thousandth of it is small, as an integrator needs it."""
     f, names, at = expressions(kind)
