@@ -73,7 +73,7 @@ def export_ssp(
         for fed, signals in sampled(d, fmus, given).items():
             tell(f"{label}: writing the signals of '{fed}' as data and as an FMU")
             _feed(content, fed, signals, Form(kind, fmi, platforms), work / "sources")
-    content.files |= {PLACE: settings(read, name), PROVENANCE: _record(label, d, packer, content)}
+        content.files |= {PLACE: settings(read, name), PROVENANCE: _record(label, d, packer, content)}
     for said in _unsaid(read, name, d):
         tell(f"{label}: {said}")
     system = System(
