@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -211,6 +212,26 @@ def test_units_that_contradict_are_refused(tmp_path, kind, column, unit, words):
 def test_a_unit_nobody_knows_is_noted(tmp_path, kind):
     record = load(experiment(tmp_path, kind, units={"n_wheel": "Kästchen"}))
     assert any("'Kästchen', which is not known; it is taken as rpm" in n.sentence for n in record.notes)
+
+
+@pytest.mark.parametrize("unit", ["rpm", "1/min", "U/min"])
+def test_other_spellings_agree(tmp_path, unit):
+    assert [n.kind for n in load(experiment(tmp_path, "mdf 4", units={"n_wheel": unit})).notes] == ["unit"]
+
+
+def test_a_unit_of_nobody_s_may_be_declared_as_the_file_states_it(tmp_path):
+    """What the FMU calls so too is not converted."""
+    v = RIG.variables["omega_w"]
+    fmu = replace(RIG, variables=dict(RIG.variables) | {"omega_w": replace(v, unit="ticks")})
+    for name, unit in (("stated", "ticks"), ("other", "rpm")):
+        (tmp_path / name).mkdir()
+        toml = GOOD.replace('unit = "rpm"', 'unit = "ticks"')
+        e = load_experiment(experiment(tmp_path / name, "csv", units={"n_wheel": unit}, toml=toml))
+        if name == "stated":
+            assert_array_equal(load_record(e, fmu).runs[0].y[:, 0], table()["n_wheel"])
+            continue
+        with pytest.raises(BadInput, match="states 'rpm' for it"):
+            load_record(e, fmu)
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])

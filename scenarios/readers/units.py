@@ -30,6 +30,8 @@ class StatedUnits:
 
         derived: how many times the column is differentiated to become the output.
         """
+        if not derived and self._sheet.units.get(column) == declared:
+            return
         stated = self._known(column, f"it is taken as {declared}, as declared")
         if stated is None:
             return
