@@ -13,9 +13,9 @@ from fmus.export.pythonfmu import build_python
 from fmus.host.archive import Archive
 from fmus.models import model_class
 from scenarios.closing import writable
+from scenarios.declaration import Options
 from scenarios.estimate_page import write_page
 from scenarios.estimating_findings import Findings, Tell, find, informed
-from scenarios.estimating_options import Options
 from scenarios.estimating_result import (
     EstimateResult,
     alarms,
@@ -51,12 +51,12 @@ def estimate(
     e = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
     if e.estimate is None:
         raise BadInput(f"{e.file}: has no [estimate]; say there which parameters, states or inputs to find")
-    chosen = options or getattr(e.estimate, "options", None) or Options()
+    chosen = options or e.estimate.options
     folder = None if out is None else writable(Path(out))
     with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work:
         tell("opening the FMU and the record")
         with Archive(fmu_of(e, Path(work))) as archive:
-            record = load_record(e, archive.description)
+            record = load_record(e, archive.description, missing=True)
             setup = set_up(e, chosen, record, archive)
             found = find(setup, archive, tell)
             try:

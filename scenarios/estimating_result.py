@@ -13,7 +13,7 @@ from estimator.history import History
 from estimator.identifiability import Identifiability
 from estimator.joint import Joint
 from estimator.record import Array
-from scenarios.estimating_options import Alarm, Options
+from scenarios.declaration import Alarm, Options
 
 BAND = 1.959964  # deviations of the 95 % band
 CLEAR = 0.5  # probability below which an alarm ends

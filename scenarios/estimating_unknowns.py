@@ -11,8 +11,7 @@ from estimator.shaping import DAMPING, Shaped, UnknownInput, Wandering
 from estimator.transform import Transform, bounded
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription, FmuVariable
-from scenarios.declaration import EstimatedParameter
-from scenarios.estimating_options import Options
+from scenarios.declaration import EstimatedParameter, Options
 from scenarios.experiment import Experiment
 
 FIRST = 10.0  # noise deviations: what is known of the start of a measured state

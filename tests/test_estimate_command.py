@@ -9,8 +9,8 @@ import pytest
 
 from fmus.errors import BadInput
 from fmus.host.fmu import Fmu
+from scenarios.declaration import Alarm, Options
 from scenarios.estimating import estimate
-from scenarios.estimating_options import Alarm, Options
 from scenarios.estimating_result import stretches
 from tests.test_estimators_fmu import PYTHON_VDP, SHOW_SPEED
 from tests.truth.rig import write_record

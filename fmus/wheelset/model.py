@@ -55,8 +55,8 @@ class Wheelset(Model):
 
     name = "Wheelset"
     step_size = 1e-3
-    form = MappingProxyType({"k_a": (0.6, 1.3), "k_b": (0.6, 2.6), "k_spin": (0.2, 1.2)})
-    form_error = 0.03
+    form = MappingProxyType({"k_b": (0.6, 2.6), "k_spin": (0.2, 1.2)})
+    form_error = 0.05
     method = rk4_within_stability
 
     y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)
