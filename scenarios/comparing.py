@@ -1,6 +1,7 @@
 """Two FMUs side by side on the inputs and parameters of an experiment: where they differ, and by how much."""
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from math import isfinite
 from pathlib import Path
 
@@ -50,10 +51,11 @@ def compare(
     record = load_record(declared, about[0])
     _check_second(declared, about[1])
     names, unfit = _common(*about, f"{a} and {b}")
-    both = []
-    for which, file, own in (("first", a, about[0]), ("second", b, about[1])):
-        tell(f"running the {which} FMU, {Path(file).name}")
-        both.append(_simulated(Path(file), own, about[0], record, declared, names))
+    tell(f"running {Path(a).name} and {Path(b).name}, the second FMU, over {_length(record):g} s")
+    with ThreadPoolExecutor(2) as pool:  # each waits for a process
+        files = zip((a, b), about, strict=True)
+        asked = [pool.submit(_simulated, Path(f), own, about[0], record, declared, names) for f, own in files]
+        both = [answer.result() for answer in asked]
     outputs = _differences(record, names, both, about[0], tolerance)
     found = Comparison(
         experiment=declared.id,
@@ -73,6 +75,11 @@ def compare(
         found.write(folder / "result.json")
         difference_plot(found, record, names, both).write(folder)
     return found
+
+
+def _length(record: Record) -> float:
+    """s, of all runs."""
+    return float(sum(run.t[-1] - run.t[0] for run in record.runs))
 
 
 def _check_second(e: Experiment, fmu: FmuDescription) -> None:

@@ -53,7 +53,8 @@ def export_ssp(
 
     kind, fmi, platforms: of the FMUs of our models, see build_native; FMUs given as files go in as they are.
     variant: which one of a scenario that has several. tell: gets a line on what is being done, and on what
-    other tools will not see. The same scenario gives the same bytes. BadInput for a wrong scenario.
+    other tools will not see. The same scenario gives the same bytes, but for FMUs that PythonFMU itself
+    builds from a source, which it dates. BadInput for a wrong scenario.
     """
     read = load_scenario(scenario)
     name = chosen(read, variant)
@@ -61,9 +62,20 @@ def export_ssp(
     label = read.id if variant is None else f"{read.id}_{name}"
     target = Path(out) if Path(out).suffix == ".ssp" else Path(out) / f"{label}.ssp"
     writable(target.parent)
+    content = _content(read, name, label, Form(kind, fmi, platforms), tell)
+    for said in _unsaid(read, name, d):
+        tell(f"{label}: {said}")
+    parts = tuple(content.components), tuple(content.links)
+    system = System(label, *parts, stop=d.duration, step=d.step, description=read.declared.question)
+    return write_package(system, content.files, target)
+
+
+def _content(read: Scenario, name: str, label: str, form: Form, tell: Tell) -> _Content:
+    """All of a variant but the structure, which is written from it."""
+    d = read.variants[name]
     with ExitStack() as stack, of_file(read.file):
         work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_ssp_")))
-        packer = Packer(work / "models", Form(kind, fmi, platforms), d)
+        packer = Packer(work / "models", form, d)
         tell(f"{label}: building its FMUs and checking all that it names")
         prepared(d, read.file, wanted(asked(read), name, read), packer, stack)
         archives = {n: stack.enter_context(Archive(path)) for n, path in packer.paths.items()}
@@ -72,20 +84,9 @@ def export_ssp(
         content = _members(d, packer.paths, fmus, constants(given))
         for fed, signals in sampled(d, fmus, given).items():
             tell(f"{label}: writing the signals of '{fed}' as data and as an FMU")
-            _feed(content, fed, signals, Form(kind, fmi, platforms), work / "sources")
+            _feed(content, fed, signals, form, work / "sources")
         content.files |= {PLACE: settings(read, name), PROVENANCE: _record(label, d, packer, content)}
-    for said in _unsaid(read, name, d):
-        tell(f"{label}: {said}")
-    system = System(
-        label,
-        tuple(content.components),
-        tuple(content.links),
-        d.duration,
-        d.step,
-        0.0,
-        read.declared.question,
-    )
-    return write_package(system, content.files, target)
+    return content
 
 
 def _members(
@@ -167,6 +168,8 @@ def _unsaid(scenario: Scenario, variant: str, d: Declaration) -> list[str]:
         said.append(f"order '{d.order}' with extrapolation '{d.extrapolation}' is for railfmi alone")
     if any(wire.delayed for wire in d.connections):
         said.append("delayed connections are delayed by railfmi alone")
+    for member in (n for n, m in d.fmus.items() if m.source is not None):
+        said.append(f"'{member}' is built from a PythonFMU source and needs Python wherever it runs")
     if left := dropped(scenario, variant):
         said.append(f"{left} expectations about other or several variants are left out")
     return said
