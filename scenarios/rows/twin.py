@@ -1,0 +1,95 @@
+"""Records made by the FMU itself: for trying a row, not for judging it, since nothing in them is unknown."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from estimator.record import Array
+from fmus.host.fmu import Fmu
+from scenarios.rows.case import TIME, Case, Record, Source
+from scenarios.track.spectra import SPECTRA, Spectrum
+from scenarios.track.statistics import CHOCEN_DOBRIKOV
+
+BAND = (2 * np.pi / 60.0, 2 * np.pi / 3.0)  # rad/m, wavelengths of 3 to 60 m
+RUN_IN = 40.0  # m, over which irregularities grow from nothing
+LINES = 160
+AXLES = 19.0  # m between the bogie centres
+TORQUE = 852.0  # N.m, thesis 4.5
+REST = 5.0  # s without torque at the beginning and the end, there
+
+
+def twin(fmu: Path) -> Source:
+    """Makes a case's record by a free run of the FMU, with noise."""
+
+    def make(case: Case) -> Record:
+        rng, t = np.random.default_rng(case.seed), case.times
+        inputs = INPUTS[case.model](case, t, rng)
+        at = min(round(case.when / case.dt), len(t) - 1) if case.later else len(t) - 1
+        with Fmu(fmu) as plant:
+            states = list(plant.description.states)
+            wanted = [*case.noise, *states]
+            constant = {"V": case.speed} if case.model == "wheelset" else {}
+            start = {**constant, **case.true}
+            first = {n: u[: at + 1] for n, u in inputs.items()}
+            y = plant.simulate(t[: at + 1], first, wanted, start)
+            if at < len(t) - 1:
+                now = dict(zip(states, y[-1, len(case.noise) :].tolist(), strict=True))
+                rest = {n: u[at:] for n, u in inputs.items()}
+                later = plant.simulate(t[at:], rest, wanted, {**start, **case.later, **now})
+                y = np.vstack([y, later[1:]])
+        seen = {n: y[:, i] + rng.normal(0.0, std, len(t)) for i, (n, std) in enumerate(case.noise.items())}
+        return Record({TIME: t, **inputs, **seen})
+
+    return make
+
+
+def _waves(spectrum: Spectrum, s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Height and slope at distances s (N,) m: waves of a spectrum with random phases, from rest at s = 0."""
+    edges = np.geomspace(*BAND, LINES + 1)
+    size = np.sqrt(2 * spectrum.variance(edges[:-1], edges[1:]))
+    wave = (edges[1:] + edges[:-1]) / 2
+    phase = rng.uniform(0, 2 * np.pi, LINES)
+    z, slope = np.zeros_like(s), np.zeros_like(s)
+    for a, w, p in zip(size, wave, phase, strict=True):
+        z += a * np.cos(w * s + p)
+        slope -= a * w * np.sin(w * s + p)
+    part = np.clip(s / RUN_IN, 0.0, 1.0)
+    grown, growing = part**3 * (10 - 15 * part + 6 * part**2), 30 * part**2 * (1 - part) ** 2 / RUN_IN
+    return grown * z, grown * slope + growing * z
+
+
+def _alignment(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    z, slope = _waves(SPECTRA["erri_low"]["alignment"], case.speed * t, rng)
+    scale = CHOCEN_DOBRIKOV["alignment"].sd / z.std()
+    return {"y_irr": scale * z, "y_irr_dot": scale * case.speed * slope}
+
+
+def _rails(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    s = case.speed * t
+    both = np.concatenate([s, s - AXLES])
+    level, tilt = (_waves(SPECTRA["erri_high"][q], both, rng) for q in ("level", "cross_level"))
+    found = {}
+    for side, sign in (("l", 0.5), ("r", -0.5)):
+        z, slope = (a + sign * b for a, b in zip(level, tilt, strict=True))
+        for bogie, part in (("f", slice(None, len(s))), ("r", slice(len(s), None))):
+            found[f"u_{bogie}{side}"] = z[part]
+            found[f"u_{bogie}{side}_dot"] = case.speed * slope[part]
+    return {name: found[name] for name in case.inputs}
+
+
+def _torque(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    quarter = (t[-1] - 2 * REST) / 4
+    knots, values = [0.0], [0.0]
+    for i, share in enumerate((0.5, -0.5, 1.0, 0.7)):
+        begin = REST + i * quarter
+        knots += [begin, begin + 1.0, begin + quarter - 1.5, begin + quarter - 0.5]
+        values += [0.0, share * TORQUE, share * TORQUE, 0.0]
+    return {"T_P": np.interp(t, knots, values), "f_sync": np.full_like(t, case.speed)}
+
+
+INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
+    "wheelset": _alignment,
+    "vehicle7dof": _rails,
+    "testrig": _torque,
+}

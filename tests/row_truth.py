@@ -1,0 +1,104 @@
+"""Records for the rows by the truth models, which share no code with the FMUs.
+
+From a shell: python -m tests.row_truth friction_ukf OUT, then run the row on OUT.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.rows import ROWS
+from scenarios.rows.case import TIME, Case, Record
+from tests.truth import rig, vehicle, wheelset
+from tests.truth.rig_inputs import Inputs, trapezium
+from tests.truth.vehicle_effects import Law
+from tests.truth.wheelset_track import Run
+
+WRONG_PATCH = {"a": 3.4e-3, "b": 2.4e-3}  # m; the filter believes in a circle of 2.7 mm
+LARGEST_TORQUE = 852.0  # N.m, thesis 4.5
+REST = 5.0  # s without torque at the beginning and the end, thesis 4.5
+
+
+def truth(case: Case) -> Record:
+    """The record of a case, by the truth model of its kind."""
+    return {"wheelset": of_wheelset, "testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
+
+
+def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """What the sensors of a case make of true outputs."""
+    return {n: true[n] + rng.normal(0.0, std, len(true[n])) for n, std in case.noise.items()}
+
+
+def of_wheelset(case: Case) -> Record:
+    """A run over random alignment; where parameters jump, the state goes on with the new ones."""
+    rng, t = np.random.default_rng(case.seed), case.times
+    run = wheelset.random_alignment(rng, t, case.speed)
+    at = min(round(case.when / case.dt), len(t) - 1) if case.later else len(t) - 1
+    before = replace(wheelset.Wheelset(), **dict(case.true))
+    parts = [wheelset.simulate(piece(run, 0, at), before)]
+    if at < len(t) - 1:
+        start = dict(zip(wheelset.COORDINATES, parts[0][-1], strict=True))
+        rest = piece(run, at, len(t) - 1)
+        parts.append(wheelset.simulate(rest, replace(before, **dict(case.later)), start=start)[1:])
+    states = dict(zip(wheelset.COORDINATES, np.vstack(parts).T, strict=True))
+    given = {"y_irr": run.y_irr[::2], "y_irr_dot": run.y_irr_dot[::2]}
+    return Record({TIME: t, **given, **noisy(case, states, rng)})
+
+
+def piece(run: Run, first: int, last: int) -> Run:
+    """The samples `first` to `last` of a run."""
+    middle = slice(2 * first, 2 * last + 1)
+    return Run(run.V, run.t[first : last + 1], run.y_irr[middle], run.y_irr_dot[middle])
+
+
+def of_rig(case: Case) -> Record:
+    """Braking and driving pulses between two rests, at one supply frequency; another patch than declared."""
+    rng, t = np.random.default_rng(case.seed), case.times
+    length = t[-1] - 2 * REST
+    torque = sum(
+        share * LARGEST_TORQUE * trapezium(t, REST + i * length / 4, 1.0, length / 4 - 2.5)
+        for i, share in enumerate((0.5, -0.5, 1.0, 0.7))
+    )
+    inputs = Inputs(t, np.asarray(torque), np.full_like(t, case.speed))
+    parameters = replace(rig.Rig(), **WRONG_PATCH, **dict(case.true))
+    omega_w, omega_r = rig.simulate(inputs, parameters)
+    seen = noisy(case, {"omega_w": omega_w, "omega_r": omega_r}, rng)
+    return Record({TIME: t, "T_P": inputs.T_P, "f_sync": inputs.f_sync, **seen})
+
+
+def of_vehicle(case: Case) -> Record:
+    """A run over random rails; later: health of springs, `h_k1_CORNER`, from `when` on, and k1 of all."""
+    rng = np.random.default_rng(case.seed)
+    laws = {}
+    for name, value in case.later.items():
+        place = name.replace("h_k1", "secondary") if name.startswith("h_") else "secondary"
+        factor = value if name.startswith("h_") else value / case.true[name]
+        laws[place] = Law(spring=factor, change_time=case.when)
+    parameters = replace(vehicle.Vehicle(), **{n: v for n, v in case.true.items() if not n.startswith("h_")})
+    track, motion = vehicle.true_run(
+        rng, duration=case.duration, dt=case.dt, V=case.speed, profile=vehicle.rough_rails,
+        parameters=parameters, effects=vehicle.Effects(laws=laws),
+    )  # fmt: skip
+    given = {}
+    for i, corner in enumerate(vehicle.CORNERS):
+        given |= {f"u_{corner}": track.u[:, i], f"u_{corner}_dot": track.u_dot[:, i]}
+    seen = noisy(case, {name: motion.output(name) for name in case.noise}, rng)
+    return Record({TIME: track.t, **given, **seen})
+
+
+def main() -> None:
+    """Write the records of a row."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("row", choices=[*ROWS])
+    parser.add_argument("out", type=Path, help="folder in which CASE.csv are made")
+    arguments = parser.parse_args()
+    for case in ROWS[arguments.row].cases:
+        print(truth(case).write(arguments.out / f"{case.name}.csv"))
+
+
+if __name__ == "__main__":
+    main()
