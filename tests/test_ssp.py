@@ -181,11 +181,12 @@ def loop(tmp_path_factory):
 
 
 def test_a_scenario_comes_back_as_it_was(tmp_path):
-    first, second, back = round_trip(tmp_path, GOOD)
+    first, second, back = round_trip(tmp_path, GOOD + "window = [0.5, 1.5]\n")
     assert_the_same(first, second)
     table = tomllib.loads(back.read_text(encoding="utf-8"))
     assert table["expect"][0]["because"] == "Newton"
-    assert table["figure"][0]["panels"][0]["draw"] == ["drive.q_dot", "sensors.speed"]
+    panel = table["figure"][0]["panels"][0]
+    assert (panel["draw"], panel["window"]) == (["drive.q_dot", "sensors.speed"], [0.5, 1.5])
     readings = [read_recording(tmp_path / n / "run-measured.parquet").data for n in ("one", "two")]
     assert_the_same(*readings)
 
@@ -371,6 +372,18 @@ def test_a_value_in_another_unit_is_converted(loop, tmp_path):
     other = edited(loop, tmp_path / "other.ssp", value, r'\1"60" unit="rpm"', "resources/rig.ssv")
     table = tomllib.loads(import_ssp(other, tmp_path / "back").read_text(encoding="utf-8"))
     assert table["fmus"]["rig"]["initial"]["omega_w"] == pytest.approx(2 * np.pi)
+
+
+def test_what_hangs_on_the_system_s_own_connectors_is_left_out_and_told(loop, tmp_path):
+    outer = '<ssd:Connectors><ssd:Connector name="speed" kind="output"/></ssd:Connectors><ssd:Elements>'
+    other = edited(loop, tmp_path / "other.ssp", "<ssd:Elements>", outer)
+    wire = (
+        '<ssd:Connection startElement="rig" startConnector="omega_w" endConnector="speed"/></ssd:Connections>'
+    )
+    other, said = edited(other, tmp_path / "more.ssp", "</ssd:Connections>", wire), []
+    table = tomllib.loads(import_ssp(other, tmp_path / "back", said.append).read_text(encoding="utf-8"))
+    assert any("rig.omega_w -> system.speed" in line for line in said)
+    assert [wire["to"] for wire in table["connections"]] == ["controller.omega", "rig.T_P"]
 
 
 def test_a_file_that_was_changed_is_told(loop, tmp_path):

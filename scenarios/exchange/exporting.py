@@ -46,12 +46,13 @@ def export_ssp(
     kind: Kind = "native",
     variant: str | None = None,
     fmi: int = 2,
-    platforms: Sequence[str] = ("host",),
+    platforms: str | Sequence[str] = (),
     tell: Tell = lambda _: None,
 ) -> Path:
     """Write `out`/ID.ssp, or `out` itself where it ends in .ssp, and return its path.
 
-    kind, fmi, platforms: of the FMUs of our models, see build_native; FMUs given as files go in as they are.
+    kind, fmi, platforms: of the FMUs of our models, see build_native; this machine's platform is always one.
+    FMUs given as files go in as they are.
     variant: which one of a scenario that has several. tell: gets a line on what is being done, and on what
     other tools will not see. The same scenario gives the same bytes, but for FMUs that PythonFMU itself
     builds from a source, which it dates. BadInput for a wrong scenario.

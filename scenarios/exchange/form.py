@@ -23,15 +23,19 @@ class Form:
 
     kind: Kind = "native"
     fmi: int = 2
-    platforms: Sequence[str] = ("host",)
+    platforms: Sequence[str] | str = ()
 
     def build(self, model: Model, out: Path) -> Path:
         """Write the FMU of a model into a folder."""
         if self.kind == "native":
-            return build_native(model, out, self.fmi, self.platforms)
+            return build_native(model, out, self.fmi, (*self._named, "host"))  # looked at from here too
         if self.fmi != 2:
             raise BadInput(f"FMI {self.fmi}: PythonFMU builds are FMI 2; choose native ones")
         return build_python(model, out)
+
+    @property
+    def _named(self) -> Sequence[str]:
+        return (self.platforms,) if isinstance(self.platforms, str) else self.platforms
 
 
 class Packer(Builder):

@@ -5,6 +5,7 @@ from typing import Any
 
 from fmus.errors import BadInput, did_you_mean
 from fmus.export.provenance import FOLDER
+from scenarios.declaration import Table
 from scenarios.exchange.toml_text import toml_text
 from scenarios.running.asking import asked
 from scenarios.running.declaration import Declaration, Moment
@@ -25,7 +26,7 @@ def settings(scenario: Scenario, variant: str) -> bytes:
         "seed": d.seed,
         "step": d.step,
         "delayed": [wire.target for wire in d.connections if wire.delayed],
-        "record": d.record.model_dump(mode="json", exclude_none=True),
+        "record": _given(d.record),
         "sensors": d.sensors,
         "events": [_event(moment) for moment in d.events],
         "expect": _expectations(scenario, variant),
@@ -64,10 +65,15 @@ def _figures(scenario: Scenario, variant: str) -> list[dict[str, Any]]:
             questions = [*drawn, *([over] if over else [])]
             about = all(variant in q.variants or not q.formula.names for q in questions)
             if about and _single([q.formula.names for q in questions], scenario):
-                panels.append(panel.model_dump(mode="json", exclude={"variants"}, exclude_defaults=True))
+                panels.append(_given(panel, "variants"))
         if panels:
             found.append({"name": picture.name, "title": picture.title, "panels": panels})
     return found
+
+
+def _given(table: Table, *without: str) -> dict[str, Any]:
+    """The keys of a table that the scenario has."""
+    return {k: v for k, v in table if k in table.model_fields_set and k not in without}
 
 
 def _single(names: Sequence[Sequence[str]], scenario: Scenario) -> bool:
