@@ -14,7 +14,7 @@ scenarios: .venv/ready  ## all scenarios, with their figures and a contact sheet
 	$(BIN)/railfmi run scenarios/*.toml --out $(OUT)/scenarios
 
 test: .venv/ready-dev  ## everything that is fast
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-all: .venv/ready-dev  ## the slow ones too, and other importers of FMUs
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[interop]'

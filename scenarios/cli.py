@@ -189,6 +189,67 @@ def estimate(
         raise typer.Exit(1)
 
 
+@app.command("export-ssp")
+def export_scenario(
+    scenario: Annotated[Path, typer.Argument(help="scenario file")],
+    out: Annotated[Path, typer.Option("--out", help="folder, or a file ending in .ssp")] = Path("out"),
+    kind: Annotated[str, typer.Option(help="of the FMUs: native or python")] = "native",
+    variant: Annotated[str | None, typer.Option(help="of the scenario; its first by default")] = None,
+    fmi: Annotated[int, typer.Option(help="FMI version, 2 or 3; 3 is native")] = 2,
+    platform: Annotated[list[str] | None, typer.Option(help="of native FMUs; see build")] = None,
+) -> None:
+    """Write a scenario as an SSP 1.0 package that other tools open."""
+    from scenarios.exchange import export_ssp
+
+    if kind not in ("native", "python"):
+        raise BadInput(f"--kind {kind}: 'native' and 'python' are built")
+    with said.status("reading the scenario") as status:
+        package = export_ssp(
+            scenario,
+            out,
+            "native" if kind == "native" else "python",
+            variant,
+            fmi,
+            platform or (),
+            status.update,
+        )
+    typer.echo(package)
+
+
+@app.command("import-ssp")
+def import_package(
+    package: Annotated[Path, typer.Argument(help="SSP package (.ssp)")], out: Out = Path("out")
+) -> None:
+    """Read an SSP package as a scenario folder that `railfmi run` runs."""
+    from scenarios.exchange import import_ssp
+
+    with said.status("reading the package") as status:
+        scenario = import_ssp(package, out, status.update)
+    typer.echo(scenario)
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="FMU file")],
+    b: Annotated[Path, typer.Argument(help="the other FMU file")],
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml whose inputs and parameters both get")],
+    out: Out = Path("out"),
+    tolerance: Annotated[float, typer.Option(help="relative difference that is accepted")] = 1e-9,
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
+    ] = None,
+) -> None:
+    """Run two FMUs side by side and report where they differ: exit 1 if by more than the tolerance."""
+    from scenarios.comparing import compare as side_by_side
+
+    with said.status("reading the experiment") as status:
+        found = side_by_side(a, b, experiment, out, tolerance, data, tell=status.update)
+    for line in found.lines():
+        typer.echo(line)
+    if not found.ok:
+        raise typer.Exit(1)
+
+
 def main() -> None:
     """Entry of the console command."""
     for name in THREADS:

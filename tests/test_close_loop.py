@@ -10,6 +10,7 @@ import pytest
 
 from estimator.closeloop.verdict import Verdict
 from fmus.drive.model import Drive
+from fmus.effects import EFFECTS
 from fmus.export.pythonfmu import build_python
 from fmus.host.fmu import Fmu
 from scenarios import close_loop
@@ -121,7 +122,7 @@ def write_foreign(folder: Path, fmu: Path, text: str = FOREIGN) -> tuple[np.ndar
     return t, u, x
 
 
-@pytest.mark.parametrize("initial", ["exact", "calculated"])
+@pytest.mark.parametrize("initial", ["exact", pytest.param("calculated", marks=pytest.mark.slow)])
 def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
     initial: str, foreign: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -135,6 +136,7 @@ def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
     assert np.sqrt(np.mean((y[:, 0] - x) ** 2)) < 0.002
 
 
+@pytest.mark.slow
 def test_nothing_to_calibrate_is_no_obstacle(foreign: Callable[..., Path], tmp_path: Path) -> None:
     text = FOREIGN.replace("[calibrate]\nk = [1.5, 2.5]", "[initial]\nx = 1.0").replace("k = 2.0", "k = 2.1")
     write_foreign(tmp_path, foreign(), text)
@@ -143,24 +145,29 @@ def test_nothing_to_calibrate_is_no_obstacle(foreign: Callable[..., Path], tmp_p
     assert result.calibrated == {}
 
 
-def test_without_ports_only_sensors_are_suspected(foreign: Callable[..., Path], tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_without_ports_no_force_is_suspected(foreign: Callable[..., Path], tmp_path: Path) -> None:
     write_foreign(tmp_path, foreign(), FOREIGN[: FOREIGN.index("[[ports]]")])
     result = close_loop(tmp_path)
     assert result.verdict == "unexplained"
-    assert {a.kind.split("_")[0] for a in result.alternatives} == {"sensor"}
+    assert not [a for a in result.alternatives if EFFECTS.get(a.kind) and EFFECTS[a.kind].acts_on == "port"]
 
 
+@pytest.mark.slow
 def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
     effects = single("coulomb_friction", "roller")
     made = write_record(tmp_path, "one-way", rng, effects=effects, duration=30.0, dt=0.01)
     result = close_loop(made)
     assert result.verdict == "ambiguous"
-    assert named(result) == {("coulomb_friction", "roller"), ("constant_force", "roller")}
+    assert named(result) >= {("coulomb_friction", "roller"), ("constant_force", "roller")}
     assert "changes its sign" in result.next_experiment
 
 
-@pytest.mark.parametrize(("kind", "place"), [("sensor_gain", "omega_r"), ("sensor_bias", "omega_w")])
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [("sensor_gain", "omega_r"), pytest.param("sensor_bias", "omega_w", marks=pytest.mark.slow)],
+)
 def test_a_faulty_sensor_is_not_taken_for_physics(kind: str, place: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
     made = write_record(tmp_path, kind, rng, effects=single(kind, place), duration=30.0, dt=0.01)

@@ -17,7 +17,7 @@ from estimator.closeloop.screen import Promise, changes, screen
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
 
-NOMINEES = 16  # effects that are fitted
+NOMINEES = 16  # effects that are fitted, half as many where each is an FMU around a foreign one
 LEADING, SHAPES = 6, 2  # of them, in so many shapes; the others in the best one
 FAULTS = 4  # faults of sensors that are fitted
 
@@ -67,7 +67,7 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early)
-    chosen = nominated(promises)
+    chosen = nominated(promises, NOMINEES if builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, chosen, size, jobs)
     pairs: list[Hypothesis] = []
@@ -81,12 +81,12 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     return Outcome(*found, tuple(singles), tuple(pairs), judgement)
 
 
-def nominated(promises: Sequence[Promise]) -> list[Promise]:
+def nominated(promises: Sequence[Promise], most: int = NOMINEES) -> list[Promise]:
     """The leading physical candidates, each in its best shapes, and the leading faults of sensors."""
     labels: dict[str, list[Promise]] = {}
     for p in promises:
         labels.setdefault(p.label, []).append(p)
-    physical = [own for own in labels.values() if not own[0].candidates[0].is_fault][:NOMINEES]
+    physical = [own for own in labels.values() if not own[0].candidates[0].is_fault][:most]
     faults = [own for own in labels.values() if own[0].candidates[0].is_fault][:FAULTS]
     more = [p for own in physical[:LEADING] for p in own[1:SHAPES]]
     return [*(own[0] for own in (*physical, *faults)), *more]

@@ -38,6 +38,10 @@ class Builder(Protocol):
     def offers(self) -> tuple[tuple[str, str], ...]:
         """(kind, location) of every effect that can be built in."""
 
+    @property
+    def quick(self) -> bool:
+        """Whether an FMU with effects is as quick as one without."""
+
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
 

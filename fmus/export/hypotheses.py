@@ -30,6 +30,7 @@ class ModelBuilder:
 
     model: str
     folder: Path
+    quick: ClassVar[bool] = True  # with effects as without
 
     @property
     def form(self) -> Mapping[str, tuple[float, float]]:
@@ -81,6 +82,7 @@ class ForeignBuilder:
     fmu: Path
     ports: tuple[PortNames, ...]
     folder: Path
+    quick: ClassVar[bool] = False
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_error: ClassVar[float] = 0.0
 
