@@ -13,6 +13,7 @@ import numpy as np
 
 from scenarios.rows import ROWS
 from scenarios.rows.case import TIME, Case, Record
+from tests.row_truth_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
 from tests.truth.rig_inputs import Inputs, trapezium
 from tests.truth.vehicle_effects import Law
@@ -25,6 +26,8 @@ REST = 5.0  # s without torque at the beginning and the end, thesis 4.5
 
 def truth(case: Case) -> Record:
     """The record of a case, by the truth model of its kind."""
+    if "alignment_sd" in case.true:
+        return of_ward(case)
     return {"wheelset": of_wheelset, "testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
 
 

@@ -8,8 +8,10 @@ import pytest
 from estimator.estimate import Diverged
 from fmus.errors import BadInput
 from scenarios.rows import ROWS, run_row
+from scenarios.rows import friction_false_alarms as alarms
 from scenarios.rows import friction_ukf as friction
 from scenarios.rows import primary_stiffness as primary
+from scenarios.rows import profile_rls as profile
 from scenarios.rows import rolling_radius as radius
 from scenarios.rows import secondary_stiffness as secondary
 from scenarios.rows.case import Case, Record, recorded
@@ -251,3 +253,45 @@ def test_a_row_meets_its_targets_and_writes_what_it_found(tmp_path, name):
 def test_the_friction_row_halves_the_source(tmp_path):
     outcome = run_row("friction_ukf", tmp_path, truth, fmu_of("friction_ukf"), cases=["wet", "wet-low"])
     assert not [f for f in outcome.findings if f.met is False and "(a" not in f.what]
+
+
+def test_alarms_are_counted_when_they_begin():
+    assert alarms._begun(np.array([False, True, True, False, True])) == 2
+    assert alarms._begun(np.array([True, True])) == 1
+    assert alarms._begun(np.zeros(3, bool)) == 0
+
+
+@pytest.mark.slow
+def test_wet_rails_do_not_warn():
+    case = replace(case_of("friction_false_alarms", "wet-11"), duration=60.0)
+    outcome = ROWS["friction_false_alarms"].rebuilt([(case, truth(case))], fmu_of("friction_ukf"), print)
+    assert outcome.ok
+
+
+# ---- the profile
+
+
+def test_the_region_of_a_true_gauge_is_the_curve():
+    curves = profile.geometry()
+    low, high = profile.region(curves, 0.0)
+    inner = np.abs(curves.shift) < profile.FLANGE
+    np.testing.assert_allclose(low[inner], high[inner])
+    np.testing.assert_allclose(low[inner], curves.value[inner], atol=1e-4)  # left and right mirrored
+
+
+def test_the_profile_is_found_bin_by_bin_and_gauge_blurs_it():
+    errors = {}
+    for name in ("alignment", "gauge too"):
+        case = case_of("profile_rls", name, duration=16.0)
+        outcome = profile.rebuilt([(case, truth(case))], fmu=None, tell=print)
+        errors[name] = [f.ours for f in outcome.findings if "RMSE" in f.what]
+    sums_of_radii, differences, _, angles = zip(*errors.values(), strict=True)
+    for alone, blurred in (sums_of_radii, differences, angles):
+        assert alone < 0.02
+        assert blurred > 5 * alone
+
+
+def test_records_of_other_equations_are_not_made_by_the_fmu():
+    case = case_of("profile_rls", "alignment", duration=1.0)
+    with pytest.raises(BadInput, match="the FMU has no 'phi_dot' to make a record with; give records"):
+        twin(fmu_of("profile_rls"))(case)

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from estimator.record import Array
+from fmus.errors import BadInput
+from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
 from scenarios.rows.case import TIME, Case, Record, Source
 from scenarios.track.spectra import SPECTRA, Spectrum
@@ -23,6 +25,7 @@ def twin(fmu: Path) -> Source:
     """Makes a case's record by a free run of the FMU, with noise."""
 
     def make(case: Case) -> Record:
+        _check(case, fmu)
         rng, t = np.random.default_rng(case.seed), case.times
         inputs = INPUTS[case.model](case, t, rng)
         at = min(round(case.when / case.dt), len(t) - 1) if case.later else len(t) - 1
@@ -42,6 +45,15 @@ def twin(fmu: Path) -> Source:
         return Record({TIME: t, **inputs, **seen})
 
     return make
+
+
+def _check(case: Case, fmu: Path) -> None:
+    """BadInput where the FMU is not what a case was measured on."""
+    with Archive(fmu) as archive:
+        known = archive.description.variables
+    for name in (*case.inputs, *case.noise, *case.true):
+        if name not in known:
+            raise BadInput(f"case '{case.name}': the FMU has no '{name}' to make a record with; give records")
 
 
 def _waves(spectrum: Spectrum, s: Array, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -1,0 +1,71 @@
+"""An hour each on dry and wet rails, output only: does the friction estimate ever warn without a cause?"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import norm
+
+from estimator.record import Array, BoolArray
+from scenarios.rows.following import Followed
+from scenarios.rows.friction_ukf import CASES as CONDITIONS
+from scenarios.rows.friction_ukf import CRITICAL, START_UP, task
+from scenarios.rows.outcome import Finding, Outcome
+from scenarios.rows.parameter_figure import Line, Panel, parameter_figure
+from scenarios.rows.row import Measured, Row, Tell
+
+PROBABILITY = 0.95  # of mu0 below the critical value, from which on railfmi estimate warns
+PARTS, LENGTH = 6, 600.0  # runs that make the hour, and their duration, s
+THIN = 50  # samples of the figure
+
+CASES = tuple(
+    replace(case, name=f"{case.name}-{seed}", duration=LENGTH, seed=seed)
+    for case in CONDITIONS
+    if case.name in ("dry", "wet")
+    for seed in range(11, 11 + PARTS)
+)
+
+
+def probability(found: Followed) -> Array:
+    """That mu0 is below the critical value (N,), by the filter's own deviation."""
+    below: Array = norm.cdf((CRITICAL - found.value["mu0"]) / found.std["mu0"])
+    return below
+
+
+def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
+    """See Row."""
+    findings: list[Finding] = []
+    panels: list[Panel] = []
+    for case, record in measured:
+        tell(f"{case.name}: {case.duration:g} s")
+        ours = task(case, fmu)
+        shape = ours.shaped(record)
+        found = ours.along(record, shape)
+        running = record.t > START_UP
+        warned = running & ~(probability(found) < PROBABILITY)
+        lowest = float(np.min(found.value["mu0"][running]))
+        findings += [
+            Finding(case.name, "alarms", "1", _begun(warned), target=0.0, note=found.reason),
+            Finding(case.name, "lowest mu0", "1", lowest, target=CRITICAL, bound=">="),
+        ]
+        thin = slice(None, None, THIN)
+        line = Line(found.t[thin], found.value["mu0"][thin], found.std["mu0"][thin])
+        panels.append(Panel(case.name, [case.truth("mu0", line.t)], {"estimated": line}, "mu0", (0.0, 0.6)))
+    return Outcome(ROW.name, findings, [parameter_figure(ROW.name, panels)], NOTES)
+
+
+def _begun(on: BoolArray) -> float:
+    """How many times it begins; what the filter has lost counts as on."""
+    return float(on[0]) + float(np.sum(on[1:] & ~on[:-1]))
+
+
+NOTES = ("The hour is made of six runs of ten minutes over different tracks.",)
+
+ROW = Row(
+    "friction_false_alarms",
+    "False alarms of the friction estimate in an hour on dry and on wet rails",
+    "thesis 4.6.1 (critical value)",
+    "wheelset",
+    CASES,
+    rebuilt,
+)
