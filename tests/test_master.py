@@ -417,6 +417,7 @@ def test_a_failing_fmu_is_named_with_time_and_reason_and_all_are_freed(parts, vd
     assert len(MESSAGES) == before
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("way", ["callback", "inside an FMU"])
 def test_ctrl_c_keeps_what_was_recorded(foreign, parts, way):
     before, handler = len(MESSAGES), signal.getsignal(signal.SIGINT)

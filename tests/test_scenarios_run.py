@@ -144,6 +144,7 @@ def test_a_broken_vehicle_does_not_pass(tmp_path):
         assert any(failing in finding.that for finding in result.failed)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_keeps_what_was_recorded_and_judges_nothing(tmp_path):
     told = []
 

@@ -70,8 +70,11 @@ def stirred(t):
     return np.sin(3 * t[:-1])
 
 
-def solved(t, u, mu=1.5, x=(2.0, 0.0), damping=0.0):
-    """x0, x1, x1_dot at times t (N,) with inputs u (N-1,) held over each step, by scipy; (N, 3)."""
+def solved(t, u, mu=1.5, x=(2.0, 0.0), damping=0.0, seen=None):
+    """x0, x1, x1_dot at times t (N,) with inputs u (N-1,) held over each step, by scipy; (N, 3).
+
+    seen: (N,) input that x1_dot sees; by default that of the step that ends.
+    """
 
     def f(_, x, u):
         return [x[1], mu * (1 - x[0] ** 2) * x[1] - x[0] + u - damping * x[1]]
@@ -80,7 +83,7 @@ def solved(t, u, mu=1.5, x=(2.0, 0.0), damping=0.0):
     for k, held in enumerate(u):
         end = solve_ivp(f, t[k : k + 2], rows[-1], args=(held,), method="DOP853", rtol=1e-11, atol=1e-12)
         rows.append(end.y[:, -1])
-    held = [*u, u[-1]]
-    # an output at the end of a step still sees the input of that step
-    slopes = [f(0.0, x, held[max(k - 1, 0)])[1] for k, x in enumerate(rows)]
+    if seen is None:
+        seen = [u[0], *u]
+    slopes = [f(0.0, x, now)[1] for x, now in zip(rows, seen, strict=True)]
     return np.column_stack([rows, slopes])
