@@ -4,6 +4,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Iterable
+from math import isfinite
 from pathlib import Path
 
 from estimator.closeloop.chain import Outcome, trace
@@ -11,8 +12,10 @@ from estimator.closeloop.problem import Problem
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.hypotheses import ForeignBuilder, ModelBuilder
+from fmus.export.provenance import Origin, checksum
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
+from fmus.host.fmu import FmuError
 from scenarios.experiment import Experiment, load_experiment
 from scenarios.record import load_record
 from scenarios.report import write_report
@@ -53,8 +56,8 @@ def close_loop(
         if folder is None:
             return result_of(declared.id, problem, found, time.monotonic() - begun, None)
         tell("building the augmented FMU and writing the report")
-        augmented = augment(builder, problem, found, folder)
-        result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented)
+        augmented = augment(builder, declared, problem, found, folder, tell)
+        result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented[0])
         write_report(folder, problem, found, result)
         result.write(folder / "result.json")
         return result
@@ -97,8 +100,39 @@ def _starts(description: FmuDescription, calibrate: Iterable[str]) -> dict[str, 
     return {n: description.variables[n].start or 0.0 for n in calibrate}
 
 
-def augment(builder: Builder, problem: Problem, found: Outcome, folder: Path) -> Path:
-    """Write the FMU with the effects found; declared and found values are its start values."""
+def augment(
+    builder: Builder, e: Experiment, problem: Problem, found: Outcome, folder: Path, tell: Tell
+) -> tuple[Path, ...]:
+    """Write the FMU with the effects found; declared and found values are its start values. All files.
+
+    The first is a PythonFMU build. The second is of our models the native build, of a foreign FMU an SSP
+    package of it and the effects; `tell` hears why where there is none.
+    """
+    from scenarios.exchange.augmented import export_augmented  # here because it imports from this file
+
     best = found.chosen or found.base
     effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
-    return builder.final(effects, {**problem.declared, **best.theta}, folder)
+    starts, origin = {**problem.declared, **best.theta}, origin_of(e, found)
+    files = [builder.final(effects, starts, folder, origin)]
+    try:
+        if isinstance(builder, ModelBuilder):
+            files.append(builder.final_native(effects, starts, folder, origin))
+        elif effects:
+            package = files[0].with_suffix(".ssp")
+            files.append(export_augmented(builder, effects, problem.record, starts, origin, package))
+    except (BadInput, FmuError) as error:
+        tell(f"{files[0].name} has no second form: {error}")
+    return tuple(files)
+
+
+def origin_of(e: Experiment, found: Outcome) -> Origin:
+    """The experiment with the estimates of the best hypothesis; faults of sensors are none of the FMU."""
+    best = found.chosen or found.base
+    faults = {u.name for c in best.candidates if c.is_fault for u in c.unknowns}
+    errors = {n: s if isfinite(s) else None for n, s in best.fit.std.items() if n not in faults}
+    return Origin(
+        experiment=e.id,
+        estimates={n: (best.fit.theta[n], s) for n, s in errors.items()},
+        data={file.name: checksum(file) for file in e.data_files},
+        verdict=found.judgement.verdict,
+    )

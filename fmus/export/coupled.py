@@ -6,11 +6,13 @@ its inputs and tunable parameters, explicitly, as any master would.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fmus.effects import EFFECTS
 from fmus.export.outside import Laws, laws
+from fmus.export.provenance import Origin, record_around
 from fmus.export.pythonfmu import Content, documentation, pack
 from fmus.export.table import row, unit_table
 from fmus.host.archive import describe
@@ -25,12 +27,13 @@ def build_coupled(
     effects: Sequence[tuple[str, str]],
     out: Path,
     name: str | None = None,
-    starts: dict[str, float] | None = None,
+    starts: Mapping[str, float] | None = None,
+    origin: Origin | None = None,
 ) -> Path:
     """Write an FMU with `base` inside and effects (kind, location) around it; returns its path.
 
     A location is the name of a port, of an input or of a tunable parameter.
-    starts: start values that replace those of the carried FMU and of the effects.
+    starts: start values that replace those of the carried FMU and of the effects; origin: what they rest on.
     """
     description = describe(base)
     made = laws(description, ports, effects)
@@ -57,7 +60,9 @@ def build_coupled(
     title = name or f"{description.identifier}WithEffects"
     needs = "It carries another FMU and runs it with the package fmpy, which the importing process needs too."
     page = documentation(title, card, names, needs)
-    return pack(Content(title, card, ("coupled", "carried"), files, page, saves_state=False), out)
+    values = {r["name"]: (r["start"], r["unit"]) for r in table if r["causality"] == "parameter"}
+    about = record_around(base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
+    return pack(Content(title, card, ("coupled", "carried"), files, page, False, about), out)
 
 
 def _groups(description: FmuDescription) -> list[list[FmuVariable]]:

@@ -12,8 +12,10 @@ from typing import ClassVar
 from fmus.effects import EFFECTS, offers
 from fmus.errors import BadInput
 from fmus.export.coupled import build_coupled
+from fmus.export.effects_alone import EffectsAlone
 from fmus.export.native.build import build_native
 from fmus.export.outside import Outside
+from fmus.export.provenance import Origin
 from fmus.export.pythonfmu import build_python
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
@@ -45,17 +47,17 @@ class ModelBuilder:
     @property
     def offers(self) -> Effects:
         """Every effect at every location where it makes sense."""
-        return offers(model_class(self.model)())
+        return offers(_bare(self.model))
 
     @property
     def ports(self) -> tuple[PortNames, ...]:
         """The model's locations by the names of their probes."""
-        names = model_class(self.model)().ports()
+        names = _bare(self.model).ports()
         return tuple(PortNames(n, f"{n}_force", f"{n}_velocity", f"{n}_displacement") for n in names)
 
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
-        return Outside(_described(self(())), self.ports, self._model((), probes=False))
+        return Outside(_described(self(())), self.ports, _bare(self.model))
 
     def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values.
@@ -64,12 +66,25 @@ class ModelBuilder:
         """
         return _once(self.folder, effects, lambda path: _fastest(self._model(effects, probes=True), path))
 
-    def final(self, effects: Effects, starts: Mapping[str, float], out: Path) -> Path:
+    def final(
+        self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
+    ) -> Path:
         """Write the FMU with effects and start values that were found, for use elsewhere."""
+        model = self._found(effects, starts)
+        return build_python(model, out / f"{model.name}_augmented.fmu", origin)
+
+    def final_native(
+        self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
+    ) -> Path:
+        """The same as a native FMU; BadInput where no compiler is at hand."""
+        model = self._found(effects, starts)
+        return build_native(model, out / f"{model.name}_augmented_native.fmu", origin=origin)
+
+    def _found(self, effects: Effects, starts: Mapping[str, float]) -> Model:
         model = self._model(effects, probes=False)
         for name in starts.keys() & model.variables.keys():
             model.variables[name] = replace(model.variables[name], start=starts[name])
-        return build_python(model, out / f"{model.name}_augmented.fmu")
+        return model
 
     def _model(self, effects: Effects, probes: bool) -> Model:
         return model_class(self.model)([(EFFECTS[k], at) for k, at in effects], probes)
@@ -106,10 +121,24 @@ class ForeignBuilder:
             return self.fmu
         return _once(self.folder, effects, lambda path: build_coupled(self.fmu, self.ports, effects, path))
 
-    def final(self, effects: Effects, starts: Mapping[str, float], out: Path) -> Path:
-        """Write the FMU with effects and start values that were found, for use elsewhere."""
+    def final(
+        self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
+    ) -> Path:
+        """Write the FMU with effects around it and start values that were found, for use elsewhere."""
         target = out / f"{self.fmu.stem}_augmented.fmu"
-        return build_coupled(self.fmu, self.ports, effects, target, starts=dict(starts))
+        return build_coupled(self.fmu, self.ports, effects, target, starts=starts, origin=origin)
+
+    def alone(self, effects: Effects, starts: Mapping[str, float], step: float) -> EffectsAlone:
+        """The effects as a model of their own, to be connected to the FMU every `step`, s.
+
+        BadInput where an effect changes a parameter while running.
+        """
+        return EffectsAlone(describe(self.fmu), self.ports, effects, starts, step)
+
+
+@cache
+def _bare(model: str) -> Model:
+    return model_class(model)()
 
 
 @cache

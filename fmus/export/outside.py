@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 
 import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
 
 from fmus.component import Component
 from fmus.effects import EFFECTS
@@ -14,6 +17,8 @@ from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable, PortNames
 from fmus.port import UNITS, Port, alike
 from fmus.variables import Expr, Input, Parameter, State, Variable
+
+Array = NDArray[np.float64]
 
 
 class Outside(Site):
@@ -37,6 +42,7 @@ class Outside(Site):
         self.name = description.name  # type: ignore[misc]  # of this one, where a model has that of its class
         self.names, self.description, self.model = ports, description, model
         self.motion = cs.SX.sym("motion", 2 * len(ports))
+        self._alike = _alike(model) if model else {}
 
     def ports(self) -> dict[str, Port]:
         """See Site.ports: by displacement and velocity read from the FMU."""
@@ -49,8 +55,7 @@ class Outside(Site):
             )
             for i, port in enumerate(self.names)
         }
-        parts = self.model.alike_locations() if self.model else {}
-        return single | {name: alike([single[part] for part in names]) for name, names in parts.items()}
+        return single | {name: alike([single[part] for part in names]) for name, names in self._alike.items()}
 
     def components(self) -> dict[str, Component]:
         """See Site.components."""
@@ -69,7 +74,7 @@ class Outside(Site):
         return self.description.variables[port.displacement].unit in (UNITS["rotation"]["q"], "deg")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Around:
     """Effects around an FMU as functions of its motion m = (q, v) at each port and of what it is given.
 
@@ -85,20 +90,42 @@ class Around:
     rates: cs.Function
     values: cs.Function
 
-    def slim(self, function: cs.Function) -> tuple[cs.Function, list[tuple[int, int]]]:
-        """`rates` or `values` of those of its arguments alone that it depends on, as scalars.
+    @cached_property
+    def slim_rates(self) -> Slim:
+        """`rates` of what it depends on alone."""
+        return slim(self.rates)
 
-        Returns the function and for each argument which of (m, x, z) it is and its row there.
-        """
-        arguments = [cs.SX.sym(name, function.size1_in(i)) for i, name in enumerate("mxz")]
-        (expression,) = function.call(arguments)
-        rows = [
-            (i, row)
-            for i, argument in enumerate(arguments)
-            for row in range(argument.numel())
-            if cs.depends_on(expression, argument[row])
-        ]
-        return cs.Function("slim", [arguments[i][row] for i, row in rows], [expression]), rows
+    @cached_property
+    def slim_values(self) -> Slim:
+        """`values` of what it depends on alone."""
+        return slim(self.values)
+
+
+@dataclass(frozen=True)
+class Slim:
+    """A function of those of its arguments alone that it depends on, as scalars.
+
+    rows: for each argument which of (m, x, z) it is and its row there.
+    """
+
+    function: cs.Function
+    rows: list[tuple[int, int]]
+    _maps: dict[int, cs.Function] = field(default_factory=dict, repr=False)
+
+    def along(self, parts: Sequence[Array]) -> Array:
+        """Its values (n_out, N) for samples of m, x and z, (n, N) each."""
+        n = parts[0].shape[1]
+        if n not in self._maps:
+            self._maps[n] = self.function.map(n)  # which takes longer than to call it
+        return np.asarray(self._maps[n].call([parts[i][row][None, :] for i, row in self.rows])[0])
+
+
+def slim(function: cs.Function) -> Slim:
+    """A function of (m, x, z) slimmed down."""
+    arguments = [cs.SX.sym(name, function.size1_in(i)) for i, name in enumerate("mxz")]
+    rows = [(i, row) for i in range(3) for row in sorted(set(function.jac_sparsity(0, i).get_col()))]
+    (expression,) = function.call(arguments)
+    return Slim(cs.Function("slim", [arguments[i][row] for i, row in rows], [expression]), rows)
 
 
 def around(site: Outside, effects: Sequence[tuple[str, str]]) -> Around:
@@ -150,7 +177,7 @@ def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Seque
     m0, m1, dt = (
         cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 1))
     )
-    half = _moved_on(m0, dt / 2)
+    half = moved_on(m0, dt / 2)
 
     def rates(m: Expr, state: Expr) -> Expr:
         return made.rates(m, state, rest)
@@ -175,10 +202,15 @@ def runge_kutta(f: Callable[[Expr, Expr], Expr], x: Expr, w0: Expr, w1: Expr, dt
     return x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
-def _moved_on(motion: Expr, dt: Expr) -> Expr:
+def moved_on(motion: Expr, dt: Expr) -> Expr:
     """Displacement and velocity of each port after dt with that velocity."""
     parts = [(motion[i] + dt * motion[i + 1], motion[i + 1]) for i in range(0, motion.numel(), 2)]
     return cs.vertcat(*(part for pair in parts for part in pair))
+
+
+@cache
+def _alike(model: Site) -> dict[str, tuple[str, ...]]:
+    return model.alike_locations()
 
 
 def _variable(v: FmuVariable) -> Variable:

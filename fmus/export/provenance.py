@@ -5,7 +5,7 @@ Nothing in it depends on when or where the FMU was built, so that the same build
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass
 from hashlib import sha256
 from importlib.metadata import version
@@ -29,12 +29,12 @@ PLACE = f"{FOLDER}/provenance.json"
 class Origin:
     """What estimates in an FMU rest on.
 
-    experiment: its id; estimates: value and standard error by the FMU's variable, in its unit;
-    data: SHA-256 of the data files, by name; verdict: of close-loop.
+    experiment: its id; estimates: value and standard error by the FMU's variable, in its unit, the error
+    None where the data do not tell it; data: SHA-256 of the data files, by name; verdict: of close-loop.
     """
 
     experiment: str
-    estimates: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    estimates: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
     data: Mapping[str, str] = field(default_factory=dict)
     verdict: str = ""
 
@@ -46,6 +46,25 @@ def record(model: Model, kind: str, fmi: int, origin: Origin | None = None) -> d
         "profiles": _profiles(model),
         "parameters": {p.name: _value(p) for p in model.of(Parameter)},
         "effects": [_effect(model, effect, location) for effect, location in model.effects],
+        "origin": None if origin is None else asdict(origin),
+    }
+
+
+def record_around(
+    base: Path,
+    effects: Sequence[tuple[type[Effect], str]],
+    parameters: Mapping[str, tuple[float, str | None]],
+    origin: Origin | None,
+) -> dict[str, Any]:
+    """What the record of a foreign FMU `base` with effects around it says beside `common`.
+
+    effects: with their locations; parameters: value and unit by name, of the FMU and of the effects.
+    """
+    values = {name: {"value": value, "unit": unit} for name, (value, unit) in parameters.items()}
+    return {
+        "base": {"file": base.name, "sha256": checksum(base)},
+        "parameters": values,
+        "effects": [_named(effect, location, values) for effect, location in effects],
         "origin": None if origin is None else asdict(origin),
     }
 
@@ -116,10 +135,15 @@ def _profiles(model: Model) -> dict[str, Any]:
 
 
 def _effect(model: Model, effect: type[Effect], location: str) -> dict[str, Any]:
+    own = {p.name: _value(p) for p in model.of(Parameter) if p.name in model.brought}
+    return _named(effect, location, own)
+
+
+def _named(effect: type[Effect], location: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """An effect with those of the values that are its parameters."""
     start = effect.name_at(location, "")
-    own = [p for p in model.of(Parameter) if p.name in model.brought and p.name.startswith(start)]
-    values = {p.name.removeprefix(start): _value(p) for p in own}
-    return {"kind": effect.kind, "location": location, "parameters": values}
+    own = {name.removeprefix(start): value for name, value in values.items() if name.startswith(start)}
+    return {"kind": effect.kind, "location": location, "parameters": own}
 
 
 def _value(p: Any) -> dict[str, Any]:
