@@ -2,6 +2,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
+# processes run beside one another: one thread each for linear algebra
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: demo test test-all lint bench scenarios clean
 
@@ -14,7 +17,7 @@ scenarios: .venv/ready  ## all scenarios, with their figures and a contact sheet
 	$(BIN)/railfmi run scenarios/*.toml --out $(OUT)/scenarios
 
 test: .venv/ready-dev  ## everything that is fast
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 test-all: .venv/ready-dev  ## the slow ones too, and other importers of FMUs
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[interop]'

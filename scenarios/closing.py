@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 from math import isfinite
 from pathlib import Path
 
+from joblib import cpu_count
+
 from estimator.closeloop.chain import Outcome, trace
 from estimator.closeloop.problem import Problem
 from estimator.plant import PLANTS
@@ -50,7 +52,7 @@ def close_loop(
         problem = pose(declared, builder)
         folder = None if out is None else writable(Path(out))
         try:
-            found = trace(problem, tell, jobs or os.cpu_count() or 1, seed)
+            found = trace(problem, tell, jobs or cpu_count(), seed)
         finally:
             PLANTS.close()
         if folder is None:

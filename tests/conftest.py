@@ -24,6 +24,14 @@ DEMO = Path(__file__).parents[1] / "scenarios" / "demo" / "rig-drag"
 Built = Callable[..., Path]
 
 
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Contact tables are kept for the session alone, not among the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture
 def ctrl_c() -> Iterator[None]:
     """Ctrl-C interrupts, also where the tests were started in the background, which ignores it."""
@@ -67,4 +75,4 @@ def vdp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
     """The bundled record, closed once, and the folder of its report."""
     out = tmp_path_factory.mktemp("demo")
-    return close_loop(DEMO, out), out
+    return close_loop(DEMO, out, jobs=1), out

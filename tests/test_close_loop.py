@@ -127,7 +127,7 @@ def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
     initial: str, foreign: Callable[..., Path], tmp_path: Path
 ) -> None:
     t, u, x = write_foreign(tmp_path, foreign(initial=initial))
-    result = close_loop(tmp_path, tmp_path / "out")
+    result = close_loop(tmp_path, tmp_path / "out", jobs=1)
     assert (result.verdict, named(result)) == ("traced", {("quadratic_damping", "shaft")})
     assert result.effects[0].parameters["c"][0] == pytest.approx(0.3, rel=0.05)
     with Fmu(tmp_path / "out" / result.augmented_fmu) as augmented:
@@ -140,7 +140,7 @@ def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
 def test_nothing_to_calibrate_is_no_obstacle(foreign: Callable[..., Path], tmp_path: Path) -> None:
     text = FOREIGN.replace("[calibrate]\nk = [1.5, 2.5]", "[initial]\nx = 1.0").replace("k = 2.0", "k = 2.1")
     write_foreign(tmp_path, foreign(), text)
-    result = close_loop(tmp_path)
+    result = close_loop(tmp_path, jobs=1)
     assert (result.verdict, named(result)) == ("traced", {("quadratic_damping", "shaft")})
     assert result.calibrated == {}
 
@@ -148,7 +148,7 @@ def test_nothing_to_calibrate_is_no_obstacle(foreign: Callable[..., Path], tmp_p
 @pytest.mark.slow
 def test_without_ports_no_force_is_suspected(foreign: Callable[..., Path], tmp_path: Path) -> None:
     write_foreign(tmp_path, foreign(), FOREIGN[: FOREIGN.index("[[ports]]")])
-    result = close_loop(tmp_path)
+    result = close_loop(tmp_path, jobs=1)
     assert result.verdict == "unexplained"
     assert not [a for a in result.alternatives if EFFECTS.get(a.kind) and EFFECTS[a.kind].acts_on == "port"]
 
@@ -158,7 +158,7 @@ def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tm
     rng = np.random.default_rng(11)
     effects = single("coulomb_friction", "roller")
     made = write_record(tmp_path, "one-way", rng, effects=effects, duration=30.0, dt=0.01)
-    result = close_loop(made)
+    result = close_loop(made, jobs=1)
     assert result.verdict == "ambiguous"
     assert named(result) >= {("coulomb_friction", "roller"), ("constant_force", "roller")}
     assert "changes its sign" in result.next_experiment
@@ -171,7 +171,7 @@ def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tm
 def test_a_faulty_sensor_is_not_taken_for_physics(kind: str, place: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
     made = write_record(tmp_path, kind, rng, effects=single(kind, place), duration=30.0, dt=0.01)
-    result = close_loop(made)
+    result = close_loop(made, jobs=1)
     assert result.verdict in ("sensor_fault", "ambiguous")
     assert (kind, place) in named(result)
     assert all(k.startswith("sensor_") for k, _ in named(result))
@@ -189,7 +189,7 @@ def test_a_faulty_sensor_is_not_taken_for_physics(kind: str, place: str, tmp_pat
 )
 def test_what_the_library_lacks_is_not_given_a_name(kind: str, place: str, tmp_path: Path) -> None:
     made = write_record(tmp_path, kind, np.random.default_rng(13), effects=single(kind, place))
-    assert close_loop(made).verdict in ("unexplained", "no_discrepancy")
+    assert close_loop(made, jobs=1).verdict in ("unexplained", "no_discrepancy")
 
 
 @pytest.mark.slow
@@ -207,7 +207,7 @@ def test_effects_of_the_truth_model_are_traced(
     kind: str, place: str, settings: dict[str, float], tmp_path: Path
 ) -> None:
     effects = single(kind, place, **settings)
-    result = close_loop(write_record(tmp_path, kind, np.random.default_rng(14), effects=effects))
+    result = close_loop(write_record(tmp_path, kind, np.random.default_rng(14), effects=effects), jobs=1)
     assert result.verdict == "traced"
     assert named(result) == {(kind, place)}
     assert min(result.gap_closed.values()) > 0.9
@@ -218,7 +218,7 @@ def test_effects_of_the_truth_model_are_traced(
 @pytest.mark.parametrize("name", ["rig-a", "rig-b", "rig-c", "rig-d"])
 def test_the_told_rig_records(name: str) -> None:
     told = json.loads((SHARED / "experiments" / "truth.json").read_text())[name]
-    result = close_loop(SHARED / "experiments" / name)
+    result = close_loop(SHARED / "experiments" / name, jobs=1)
     in_library = {"rig-d": "unexplained"}  # its actuator saturation is not among the effects of the library
     assert result.verdict == in_library.get(name, told["verdict"])
     if result.verdict == "traced":
@@ -233,7 +233,7 @@ def test_the_measured_drive_shows_friction_and_an_offset(tmp_path: Path) -> None
     for file in (ROOT / "scenarios" / "emps").glob("*.toml"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     build_python(Drive(), tmp_path)
-    result = close_loop(tmp_path, data_dir=SHARED / "benchmarks")
+    result = close_loop(tmp_path, data_dir=SHARED / "benchmarks", jobs=1)
     assert named(result) == {("coulomb_friction", "carriage"), ("constant_force", "carriage")}
     found = {n: v for e in result.effects for n, (v, _) in e.parameters.items()}
     found |= {n: v for n, (v, _) in result.calibrated.items()}

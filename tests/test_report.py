@@ -60,7 +60,7 @@ def test_a_record_without_a_discrepancy_has_its_page_and_names_are_escaped(tmp_p
     made = write_null_record(tmp_path, 6998)
     text = made.read_text()
     made.write_text(re.sub(r"^id = .*$", 'id = "<b>bold</b> & sons"', text, flags=re.M))
-    result = close_loop(made, tmp_path / "out")
+    result = close_loop(made, tmp_path / "out", jobs=1)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert result.verdict == "no_discrepancy"
     assert "<b>bold</b>" not in page

@@ -6,6 +6,7 @@ without building an FMU for each.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as cs
 import numpy as np
@@ -38,9 +39,7 @@ def shifts(made: Around, course: Course, moved: Mapping[str, float]) -> dict[str
     own = np.array([moved.get(p.name, p.start) for p in made.parameters])
     z = np.vstack([course.given.T, np.tile(own[:, None], len(course.t))])
     m = course.motion.T
-    parts = (m, _states(made, course, m, z), z)
-    told, rows = made.slim(made.values)
-    values = np.asarray(told.map(len(course.t)).call([parts[i][row][None, :] for i, row in rows])[0])
+    values = made.slim_values.along((m, _states(made, course, m, z), z))
     rest = course.given[:, [made.given.index(name) for name in made.told]].T
     return dict(zip(made.told, values - rest, strict=True))
 
@@ -51,20 +50,29 @@ def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
     names = [s.name for s in made.states]
     if set(names) <= set(known):
         return np.array([known[name] for name in names]).reshape(len(names), len(course.t))
-    rates, rows = made.slim(made.rates)
-    seen = [(i, row) for i, row in rows if i != 1]  # what the states see, linear between the samples
-    x, dt = cs.SX.sym("x", len(names)), cs.SX.sym("dt")
+    step, seen = _step(made)
+    start = np.array([s.start for s in made.states])
+    w = np.array([(m if i == 0 else z)[row] for i, row in seen])
+    run = step.mapaccum(len(course.t) - 1)(start, w[:, :-1], w[:, 1:], np.diff(course.t)[None, :])
+    return np.column_stack([start, np.asarray(run)])
+
+
+@lru_cache(maxsize=8)
+def _step(made: Around) -> tuple[cs.Function, list[tuple[int, int]]]:
+    """step(x, w, w at its end, dt) -> x, and what w is of (m, x, z): what the states see.
+
+    It goes on linearly between samples.
+    """
+    rates, rows = made.slim_rates.function, made.slim_rates.rows
+    seen = [(i, row) for i, row in rows if i != 1]
+    x, dt = cs.SX.sym("x", len(made.states)), cs.SX.sym("dt")
     w0, w1 = cs.SX.sym("w0", len(seen)), cs.SX.sym("w1", len(seen))
 
     def f(w: Expr, state: Expr) -> Expr:
         given = iter(cs.vertsplit(w))
         return rates(*(state[row] if i == 1 else next(given) for i, row in rows))
 
-    step = cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, w0, w1, dt)])
-    start = np.array([s.start for s in made.states])
-    w = np.array([(m if i == 0 else z)[row] for i, row in seen])
-    run = step.mapaccum(len(course.t) - 1)(start, w[:, :-1], w[:, 1:], np.diff(course.t)[None, :])
-    return np.column_stack([start, np.asarray(run)])
+    return cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, w0, w1, dt)]), seen
 
 
 def names_of(levers: Sequence[Mapping[str, Array]]) -> list[str]:

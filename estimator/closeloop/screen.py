@@ -23,7 +23,7 @@ from fmus.effects.site import SPEED
 from fmus.export.outside import Around, around
 
 NOTHING = 1e-9  # of a regressor left after projection: it says nothing new
-TOGETHER = 32  # changes whose responses are worked out at once
+TOGETHER = 128  # changes whose responses are worked out at once
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as cs
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from fmus.effects.site import Site
 
 Array = NDArray[np.float64]
+KEPT = 4  # lengths of records for which a law is kept compiled
 HANDFUL = 3  # shapes that are worth a simulation each
 
 
@@ -67,13 +69,15 @@ class ForceLaw(Effect):
         values: parameters by name, those not given at their start. States by Runge-Kutta steps between
         the samples, the motion linear between them.
         """
-        motion = np.vstack([t, q, v])
-        law = _Compiled(cls, values)
-        if not law.states:
-            return np.array(law.force.map(len(t))(motion, np.zeros((0, len(t))))).ravel()
-        x0 = np.array([s.start for s in cls.states("translation")])
-        x1 = law.step.mapaccum(len(t) - 1)(x0, motion[:, :-1], motion[:, 1:]).full()
-        return np.array(law.force.map(len(t))(motion, np.column_stack([x0, x1]))).ravel()
+        law = _compiled(cls)
+        here = {p.name: p.start for p in cls.parameters("translation")} | dict(values)
+        given = np.vstack([t, q, v, np.tile([[here[n]] for n in law.parameters], len(t))])
+        x = np.zeros((0, len(t)))
+        if law.states:
+            x0 = np.array([s.start for s in cls.states("translation")])
+            x1 = law.steps(len(t) - 1)(x0, given[:, :-1], given[:, 1:]).full()
+            x = np.column_stack([x0, x1])
+        return np.array(law.forces(len(t))(given, x)).ravel()
 
     @classmethod
     def units(cls, of: str) -> Mapping[str, str]:
@@ -115,23 +119,35 @@ class ForceLaw(Effect):
 
 
 class _Compiled:
-    """A law with values: force(motion, x), step(x, motion at both ends) -> x; a motion is (t, q, v)."""
+    """A law as functions: force(w, x), step(x, w at both ends) -> x; w is (t, q, v, parameters).
 
-    def __init__(self, law: type[ForceLaw], values: Mapping[str, float]) -> None:
+    forces(n), steps(n): the same over n samples, kept since they take longer to make than to call.
+    """
+
+    def __init__(self, law: type[ForceLaw]) -> None:
         self.states = [s.name for s in law.states("translation")]
-        m, x = cs.SX.sym("m", 3), cs.SX.sym("x", len(self.states))
+        self.parameters = [p.name for p in law.parameters("translation")]
+        n = 3 + len(self.parameters)
+        w, x = cs.SX.sym("w", n), cs.SX.sym("x", len(self.states))
         memory = {name: x[i] for i, name in enumerate(self.states)}
-        made = law({**{n: cs.SX(v) for n, v in values.items()}, **memory, "clock": m[0]})
-        self.force = cs.Function("force", [m, x], [made.force(m[1], m[2])])
-        rates = made.rates(m[1], m[2])
-        f = cs.Function("f", [m, x], [cs.vertcat(*(rates[name] for name in self.states))])
-        a, b = cs.SX.sym("a", 3), cs.SX.sym("b", 3)
+        values = {name: w[3 + i] for i, name in enumerate(self.parameters)}
+        made = law({**values, **memory, "clock": w[0]})
+        self.forces = lru_cache(KEPT)(cs.Function("force", [w, x], [made.force(w[1], w[2])]).map)
+        rates = made.rates(w[1], w[2])
+        f = cs.Function("f", [w, x], [cs.vertcat(*(rates[name] for name in self.states))])
+        a, b = cs.SX.sym("a", n), cs.SX.sym("b", n)
         dt, middle = b[0] - a[0], (a + b) / 2
         k1 = f(a, x)
         k2 = f(middle, x + dt / 2 * k1)
         k3 = f(middle, x + dt / 2 * k2)
         k4 = f(b, x + dt * k3)
-        self.step = cs.Function("step", [x, a, b], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+        step = cs.Function("step", [x, a, b], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+        self.steps = lru_cache(KEPT)(step.mapaccum)
+
+
+@cache
+def _compiled(law: type[ForceLaw]) -> _Compiled:
+    return _Compiled(law)
 
 
 def _left(law: type[ForceLaw], shape: dict[str, float], t: Array, q: Array, v: Array, force: Array) -> float:
