@@ -17,20 +17,22 @@ CLIPPED_SAMPLES = 8  # equal values in a row that chance and a slow turning poin
 Lines = NDArray[np.integer[Any]]
 
 
-def check_time(file: str, column: str, t: Array, lines: Lines) -> None:
+def check_time(file: str, column: str, t: Array, lines: Lines, row: str = "line") -> None:
     """Every row needs a time after the one before it.
 
-    t: (N,) s, lines: (N,) where each row stands in the file.
+    t: (N,) s; lines: (N,) where each row stands in the file; row: what such a place is called there.
     """
     blank = ~np.isfinite(t)
     if blank.any():
         line = lines[blank.argmax()]
-        raise BadInput(f"{file} line {line}: time column '{column}' holds no number; fill it or drop the row")
+        raise BadInput(
+            f"{file} {row} {line}: time column '{column}' holds no number; fill it or drop the row"
+        )
     back = np.diff(t) <= 0
     if back.any():
         i = int(back.argmax())
         raise BadInput(
-            f"{file} line {lines[i + 1]}: time column '{column}' goes from {t[i]:.9g} to {t[i + 1]:.9g} s; "
+            f"{file} {row} {lines[i + 1]}: time column '{column}' goes from {t[i]:.9g} to {t[i + 1]:.9g} s; "
             "times must increase from row to row"
         )
 

@@ -173,7 +173,7 @@ def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
     _check_units(e, stated)
     columns = {column: sheet.numbers(column) for column in wanted if column != e.time}
     t = stated.seconds(e.time, f"{e.file}: key 'time'")
-    check_time(str(file), e.time, t, np.arange(t.size) + sheet.first)
+    check_time(str(file), e.time, t, np.arange(t.size) + sheet.first, sheet.row)
     return {e.time: t, **columns}, stated
 
 

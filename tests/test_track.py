@@ -594,7 +594,7 @@ def test_words_in_a_column(tmp_path):
     lines = file.read_text().splitlines()
     lines[3] = ",".join(["bridge", *lines[3].split(",")[1:]])
     file.write_text("\n".join(lines))
-    with pytest.raises(BadInput, match="line 4: column 'km' holds 'bridge', not a finite number"):
+    with pytest.raises(BadInput, match="line 4: column 'km' holds 'bridge', not a number"):
         read_track(FILE, tmp_path)
 
 

@@ -9,7 +9,7 @@ from fmus.errors import BadInput
 from fmus.export.native.build import build_native
 from fmus.export.pythonfmu import build_python
 from fmus.model import Model
-from scenarios.running.building import Builder, _model
+from scenarios.running.building import Builder, model_of
 from scenarios.running.declaration import Declaration, Member
 from scenarios.running.friction import CONDITIONS
 from scenarios.validation import of_file
@@ -58,7 +58,7 @@ class Packer(Builder):
             return self.paths[name]
         with of_file(scenario):
             try:
-                model = _model(member, scenario.parent)
+                model = model_of(member, scenario.parent)
                 _set_starts(model, self._starts[name])
                 self.paths[name] = self._form.build(model, self._own / name)
             except BadInput as error:

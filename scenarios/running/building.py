@@ -36,7 +36,7 @@ class Builder:
         try:
             if member.source is not None:
                 return build_script(folder / member.source, out)
-            return _built(_model(member, folder), member.kind, out)
+            return _built(model_of(member, folder), member.kind, out)
         except BadInput as error:
             raise BadInput(f"[{key}] {error}") from error
 
@@ -51,7 +51,11 @@ def _built(model: Model, kind: str, out: Path) -> Path:
     return build_python(model, out)
 
 
-def _model(member: Member, folder: Path) -> Model:
+def model_of(member: Member, folder: Path) -> Model:
+    """The model of a member with its effects and profiles; point files are found in `folder`.
+
+    BadInput, which names the key, where one of them is wrong.
+    """
     from fmus.models import model_class  # here because it loads CasADi, which a foreign FMU does without
 
     chosen = model_class(member.model or "")

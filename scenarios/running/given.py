@@ -12,8 +12,10 @@ from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
 from fmus.host.signals import Source
 from fmus.units import to_si
+from scenarios.checks import check_time
 from scenarios.declaration import Number, Table
-from scenarios.record import READERS
+from scenarios.readers import read_sheet
+from scenarios.readers.units import StatedUnits
 from scenarios.running.declaration import Declaration, Ride
 from scenarios.track.inputs import inputs
 from scenarios.track.journey import Speed
@@ -39,7 +41,9 @@ class Speeds(Table):
 
 
 class Column(Table):
-    """A column of a data file over its time column, s; unit: of the column, by default that of the input."""
+    """A column of a data file over its time column; unit: of the column, by default that which the file
+    states, else that of the input.
+    """
 
     data: str
     time: str
@@ -71,23 +75,29 @@ def _source(given: Any, name: str, fmus: Descriptions, folder: Path) -> Source:
 
 
 def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) -> tuple[Array, Array]:
-    file = folder / c.data
-    if file.suffix.lower() not in READERS:
-        raise BadInput(f"key '{key}.data': '{c.data}' is of no known kind; known are {', '.join(READERS)}")
-    table = READERS[file.suffix.lower()](file)
-    for what, column in (("time", c.time), ("column", c.column)):
-        if column not in table:
-            near = did_you_mean(column, table.columns)
-            raise BadInput(f"key '{key}.{what}': column '{column}' is not in {file}; {near}")
     try:
-        times, values = (table[column].to_numpy(dtype=np.float64) for column in (c.time, c.column))
-    except (TypeError, ValueError) as error:
-        raise BadInput(f"key '{key}': {file} holds what is no number ({error}); mend it") from error
+        sheet = read_sheet(folder / c.data, c.time, (c.time, c.column))
+    except BadInput as error:
+        raise BadInput(f"key '{key}.data': {error}") from error
+    for what, column in (("time", c.time), ("column", c.column)):
+        if column not in sheet.cells:
+            near = did_you_mean(column, sheet.known)
+            why = f"of {sheet.file} {sheet.apart[column]}" if column in sheet.apart else ""
+            raise BadInput(
+                f"key '{key}.{what}': column '{column}' {why or f'is not in {sheet.file}; {near}'}"
+            )
+    stated = StatedUnits(sheet)
+    times, values = stated.seconds(c.time, f"key '{key}.time'"), sheet.numbers(c.column)
+    check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row)
     fmu, _, variable = name.partition(".")
     described = fmus[fmu].variables.get(variable) if fmu in fmus else None
-    if c.unit is not None and described is not None and described.unit is not None:
-        values = to_si(values, c.unit, described.unit, f"key '{key}.unit'")
-    return times, c.factor * values
+    unit = described.unit if described else None
+    if c.unit is not None:
+        stated.check(c.column, 0, c.unit, f"key '{key}':")
+        values = values if unit is None else to_si(values, c.unit, unit, f"key '{key}.unit'")
+        return times, c.factor * values
+    factor, offset = stated.to(c.column, unit, f"key '{key}'")
+    return times, c.factor * (factor * values + offset)
 
 
 def _from_track(d: Declaration, fmus: Descriptions, folder: Path) -> dict[str, Source]:

@@ -1,17 +1,19 @@
 """Measured irregularities from a file, over distance or over time with a speed."""
 
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
-import pandas as pd
 from pydantic import Field, model_validator
 from scipy.integrate import cumulative_trapezoid
 
+from estimator.record import BoolArray
 from fmus.errors import BadInput, did_you_mean
 from fmus.units import to_si
 from scenarios.declaration import Number, Positive, Table
-from scenarios.record import READERS
+from scenarios.readers import read_sheet
+from scenarios.readers.sheet import Sheet
+from scenarios.readers.units import StatedUnits
 from scenarios.track.rails import PLANES, Array, Quantity, check_direction
 from scenarios.track.sources.source import Source
 from scenarios.track.track import Track
@@ -58,62 +60,62 @@ class MeasuredSource(Source):
 
     def track(self, folder: Path) -> Track:
         """The track, from distance 0 at the first row."""
-        file = folder / self.data
-        if file.suffix.lower() not in READERS:
-            raise BadInput(f"data file '{file}' is of no known kind; known are {', '.join(sorted(READERS))}")
-        table = READERS[file.suffix.lower()](file)
+        axes = [a for a in (self.distance, self.time, self.speed) if a is not None]
+        named = {a.column for a in (*axes, *self.columns.values())}
+        rows = _Rows(read_sheet(folder / self.data, axes[0].column, named))
         given: dict[Quantity, Array] = {
-            name: column.factor * _values(file, table, column, "m") for name, column in self.columns.items()
+            name: column.factor * rows.values(column, "m") for name, column in self.columns.items()
         }
-        return Track.from_samples(self._distances(file, table), given)
+        return Track.from_samples(self._distances(rows, axes[0]), given)
 
-    def _distances(self, file: Path, table: pd.DataFrame) -> Array:
+    def _distances(self, rows: "_Rows", axis: Axis) -> Array:
         """Distance of each row (N,) m, from 0; the speed is taken as linear between rows."""
-        if len(table) < 2:
-            raise BadInput(f"{file}: has one row of data; a track needs at least two")
-        axis = next(axis for axis in (self.distance, self.time) if axis is not None)
-        x = _values(file, table, axis, "s" if self.time else "m")
-        _check_increasing(file, table, axis, x)
+        x = rows.values(axis, "s" if self.time else "m")
+        if x.size < 2:
+            raise BadInput(f"{rows.file}: has one row of data; a track needs at least two")
+        back = np.diff(x, prepend=-np.inf) <= 0
+        if back.any():
+            i = int(back.argmax())
+            raise BadInput(
+                f"{rows.place(back)}: column '{axis.column}' goes from {x[i - 1]:.9g} to {x[i]:.9g}; it must "
+                "increase from row to row: sort the rows, and turn a record made backwards"
+            )
         if self.speed is None:
             return np.asarray((x - x[0]) * (self.V or 1.0), dtype=np.float64)
-        speed = _values(file, table, self.speed, "m/s")
+        speed = rows.values(self.speed, "m/s")
         if (speed <= 0).any():
-            line = _line(table, speed <= 0)
             raise BadInput(
-                f"{file} line {line}: speed column '{self.speed.column}' is not greater than 0; "
+                f"{rows.place(speed <= 0)}: speed column '{self.speed.column}' is not greater than 0; "
                 "cut such rows out"
             )
         return np.asarray(cumulative_trapezoid(speed, x, initial=0), dtype=np.float64)
 
 
-def _values(file: Path, table: pd.DataFrame, axis: Axis, unit: str) -> Array:
-    """A column in SI, (N,)."""
-    if axis.column not in table:
-        known = did_you_mean(axis.column, map(str, table.columns))
-        raise BadInput(f"column '{axis.column}' is not in {file}; {known}")
-    cells: pd.Series[Any] = table[axis.column]
-    numbers = pd.to_numeric(cells.astype(str) if cells.dtype == bool else cells, errors="coerce")
-    values = numbers.to_numpy(dtype=np.float64)
-    bad = ~np.isfinite(values)
-    if bad.any():
-        held = cells.iloc[int(bad.argmax())]
-        what = "no number" if pd.isna(held) else f"'{str(held)[:40]}', not a finite number"
-        raise BadInput(
-            f"{file} line {_line(table, bad)}: column '{axis.column}' holds {what}; fill it or drop the row"
-        )
-    return to_si(values, axis.unit, unit, f"{file}: column '{axis.column}'")
+class _Rows:
+    """The columns of a data file in SI."""
 
+    def __init__(self, sheet: Sheet) -> None:
+        self._sheet, self._stated = sheet, StatedUnits(sheet)
+        self.file = sheet.file
 
-def _check_increasing(file: Path, table: pd.DataFrame, axis: Axis, x: Array) -> None:
-    back = np.diff(x, prepend=-np.inf) <= 0
-    if back.any():
-        i = int(back.argmax())
-        raise BadInput(
-            f"{file} line {_line(table, back)}: column '{axis.column}' goes from {x[i - 1]:.9g} to "
-            f"{x[i]:.9g}; it must increase from row to row: sort the rows, and turn a record made backwards"
-        )
+    def values(self, axis: Axis, unit: str) -> Array:
+        """A column, (N,), finite; BadInput where it is not, or where the file states another unit for it."""
+        column, where = axis.column, f"{self.file}: column '{axis.column}'"
+        if column not in self._sheet.cells:
+            near = did_you_mean(column, self._sheet.known)
+            why = f"of {self.file} {self._sheet.apart[column]}" if column in self._sheet.apart else ""
+            raise BadInput(f"column '{column}' {why or f'is not in {self.file}; {near}'}")
+        if unit == "s" and self._sheet.cells[column].dtype.kind in "mM":  # dates have no unit to declare
+            return self._stated.seconds(column, where)
+        self._stated.check(column, 0, axis.unit, f"key '{column}':")
+        values = self._sheet.numbers(column)
+        bad = ~np.isfinite(values)
+        if bad.any():
+            raise BadInput(
+                f"{self.place(bad)}: column '{column}' holds no finite number; fill it or drop the row"
+            )
+        return to_si(values, axis.unit, unit, where)
 
-
-def _line(table: pd.DataFrame, where: Any) -> int:
-    """The line of the file in which the first of the marked rows (N,) stands."""
-    return int(table.index[int(np.argmax(where))]) + 2
+    def place(self, where: BoolArray) -> str:
+        """File and place in it of the first of the marked rows (N,)."""
+        return f"{self.file} {self._sheet.row} {int(where.argmax()) + self._sheet.first}"
