@@ -148,7 +148,7 @@ def test_standard_errors_cover_the_truth_also_in_coloured_noise(seed: int) -> No
         noise = np.convolve(rng.standard_normal(n + tau), np.ones(tau) / np.sqrt(tau), "valid")[:n]
         column = np.sin(np.arange(n) / 300)[:, None]
         estimates.append(float(column[:, 0] @ noise / np.sum(column**2)))
-        errors.append(float(np.sqrt(sandwich(noise, column, np.ones(1))[0, 0])))
+        errors.append(float(np.sqrt(sandwich(noise, column, np.ones(1), np.full(1, np.inf))[0, 0])))
     assert 0.5 < np.median(errors) / np.std(estimates) < 1.6
 
 

@@ -1,6 +1,6 @@
 """Joint fits of hypotheses and their comparison on data that no fit has seen."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +11,12 @@ from estimator.closeloop.fit import BLOCKS, Fit, fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built, label
 from estimator.record import Array
+from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
 BRIEF, LONG = 4, 10  # evaluations of a fit to rank it, and to finish it
 FINALISTS = 5
+ABOARD = 6  # effects in one FMU
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
@@ -72,15 +74,20 @@ class Hypothesis:
 
 
 def hypothesis(
-    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, evaluations: int
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    promise: Promise,
+    size: Array,
+    evaluations: int,
+    known: Mapping[str, Array] | None = None,
 ) -> Hypothesis | None:
     """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
 
-    None where the FMU does not run with them.
+    known: see `fit`. None where the FMU does not run with them.
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
-    found = fit(here, [*unknowns, *own], size, promise.start, evaluations=evaluations)
+    found = fit(here, [*unknowns, *own], size, promise.start, evaluations=evaluations, known=known)
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
@@ -96,10 +103,13 @@ def hypotheses(
     Best first on the identify part; of several with the same label the one that fits better is kept.
     """
     unknowns = base.fit.unknowns
-    # start states hardly matter for the ranking: the brief fits leave them where the base has them
+    # start states hardly matter for the ranking: the brief fits leave them where the base has them, and
+    # what the other unknowns do is taken from the base
     states = {n: v for n, v in base.fit.theta.items() if n in problem.free_states}
     started = replace(problem, declared={**problem.declared, **states})
-    brief = fitted(started, [u for u in unknowns if u.name not in states], promises, size, BRIEF, jobs)
+    known = {u.name: column for u, column in zip(unknowns, base.fit.jacobian.T, strict=True)}
+    others = [u for u in unknowns if u.name not in states]
+    brief = fitted(started, others, promises, size, BRIEF, jobs, known)
     limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
     hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
     again = [Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta}) for h in hopeful]
@@ -107,12 +117,38 @@ def hypotheses(
 
 
 def fitted(
-    problem: Problem, unknowns: Sequence[Unknown], promises: Sequence[Promise], size: Array, evaluations: int,
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    promises: Sequence[Promise],
+    size: Array,
+    evaluations: int,
     jobs: int,
-) -> list[Hypothesis]:  # fmt: skip
+    known: Mapping[str, Array] | None = None,
+) -> list[Hypothesis]:
     """Fit each promise with so many evaluations; one hypothesis a label, best first on the identify part."""
-    tasks = (delayed(hypothesis)(problem, unknowns, p, size, evaluations) for p in promises)
+    where = together(problem, promises)
+    tasks = (
+        delayed(hypothesis)(here, unknowns, p, size, evaluations, known)
+        for here, p in zip(where, promises, strict=True)
+    )
     return best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
+
+
+def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
+    """For each promise the problem with an FMU that has its effects and those of some others, all off.
+
+    To build an FMU may take longer than the fits with it. Effects with a memory would cost steps.
+    """
+    labels = sorted({(c.kind, c.location) for p in promises for c in p.candidates if not c.is_fault})
+    light = [(kind, at) for kind, at in labels if not EFFECTS[kind].states("translation")]
+    size = ABOARD if problem.builder.quick else 1
+    groups = [light[i : i + size] for i in range(0, len(light), size)]
+    found = []
+    for p in promises:
+        own = {(c.kind, c.location) for c in p.candidates}
+        group = next((g for g in groups if own <= set(g)), [])
+        found.append(problem.with_effects(sorted({*problem.effects, *group})))
+    return found
 
 
 def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:

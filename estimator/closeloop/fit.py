@@ -58,8 +58,12 @@ def fit(
     start: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     evaluations: int = 15,
+    known: Mapping[str, Array] | None = None,
 ) -> Fit:
-    """Least squares of the simulation error over the unknowns, from `start` or their own start values."""
+    """Least squares of the simulation error over the unknowns, from `start` or their own start values.
+
+    known: derivatives (m,) of the weighted residual by some of the unknowns, taken as they are.
+    """
     held = dict(fixed or {})
     low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
     scale = np.array([u.scale for u in unknowns])
@@ -75,7 +79,10 @@ def fit(
 
     def jacobian(x: Array) -> Array:
         r, columns = last[x.tobytes()] if x.tobytes() in last else residual(x), []
-        for i in range(len(x)):
+        for i, u in enumerate(unknowns):
+            if known and u.name in known:
+                columns.append(known[u.name])
+                continue
             h = STEP * scale[i] * (1 if x[i] + STEP * scale[i] <= high[i] else -1)
             columns.append((residual(x + h * np.eye(len(x))[i]) - r) / h)
         return np.column_stack(columns)
@@ -88,17 +95,18 @@ def fit(
         residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-5, ftol=1e-6, max_nfev=evaluations
     )
     slopes = np.asarray(found.jac)
-    covariance = sandwich(found.fun, slopes, scale)
+    covariance = sandwich(found.fun, slopes, scale, high - low)
     return Fit(tuple(unknowns), found.x, covariance, found.fun, slopes)
 
 
-def sandwich(residual: Array, jacobian: Array, scale: Array) -> Array:
+def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:
     """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
 
-    Never below the covariance for white residuals of variance 1.
+    Never below the covariance for white residuals of variance 1. width: (n,) between the bounds, which say
+    as much as a uniform distribution between them.
     """
     j = jacobian * scale
-    inverse = pinvh(j.T @ j)
+    inverse = pinvh(j.T @ j + np.diag(12 * (scale / width) ** 2))
     scores = np.array(
         [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
     )

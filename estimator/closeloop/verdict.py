@@ -11,6 +11,7 @@ from estimator.closeloop.detect import NOISES, Detection, signal_size
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
 from estimator.record import Array
+from fmus.effects import EFFECTS
 
 Verdict = Literal[
     "no_discrepancy",
@@ -66,7 +67,10 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
 def equivalent(
     problem: Problem, best: Hypothesis, others: Sequence[Hypothesis], size: Array
 ) -> list[Hypothesis]:
-    """The class of the best hypothesis: those that the held-out data do not tell from it."""
+    """The class of the best hypothesis: those that the held-out data do not tell from it.
+
+    Of a law and a simpler one that it becomes at a limit of its shape the simpler one stays.
+    """
     members = [best]
     for h in others:
         if h is best:
@@ -75,7 +79,22 @@ def equivalent(
         close = mean < SAME * -float(best.scores(problem, size).sum())
         if close or not beats(problem, best, h, size):
             members.append(h)
-    return members
+    return [h for h in members if not any(becomes(h, other) for other in members)]
+
+
+def becomes(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a hypothesis turns into another one, which is simpler, at a limit of its shape."""
+    if h is other or len(h.candidates) != len(other.candidates):
+        return False
+    pairs = list(zip(h.candidates, other.candidates, strict=True))
+    same = [a.label == b.label for a, b in pairs]
+    simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
+    return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))
+
+
+def limits(kind: str) -> tuple[str, ...]:
+    """Kinds of effects that one becomes at a limit; none of a sensor's fault."""
+    return EFFECTS[kind].becomes if kind in EFFECTS else ()
 
 
 def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:

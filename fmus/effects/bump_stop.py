@@ -18,6 +18,7 @@ class BumpStop(ForceLaw):
     kind = "bump_stop"
     source = "piecewise linear spring, Shaw and Holmes, Journal of Sound and Vibration 90 (1983), 129-155"
     amplitudes = ("k",)
+    becomes = ("stiffness_change",)
     places = ("rests",)
     k = Parameter("{F}/{q}", min=0.0, doc="stiffness of the stop")
     gap = Parameter("{q}", 0.01, min=0.0, doc="deflection at which the stop is met")

@@ -22,6 +22,7 @@ class FreePlay(ForceLaw):
         "is lost at most"
     )
     amplitudes = ("k",)
+    becomes = ("stiffness_change",)
     places = ("rests",)
     k = Parameter("{F}/{q}", min=0.0, doc="stiffness that is missing within the clearance")
     gap = Parameter("{q}", 1e-3, min=0.0, doc="half of the clearance")

@@ -16,6 +16,7 @@ class HarmonicExcitation(ForceLaw):
     kind = "harmonic_excitation"
     source = "forced vibration, Inman, Engineering Vibration (2014)"
     amplitudes = ("F_sin", "F_cos")
+    becomes = ("constant_force",)
     places = ("rests", "turns")
     asks = ("clock",)
     of_way = ("n_x",)

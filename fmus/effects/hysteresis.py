@@ -24,6 +24,7 @@ class Hysteresis(ForceLaw):
         "friction"
     )
     amplitudes = ("F_h",)
+    becomes = ("coulomb_friction", "stiffness_change")
     places = ("rests",)
     F_h = Parameter("{F}", min=0.0, doc="force at which it slips")
     q_y = Parameter("{q}", 0.01, min=1e-6, doc="deflection in which the force would build up")

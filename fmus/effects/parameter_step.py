@@ -14,6 +14,7 @@ class ParameterStep(ParameterEffect):
     kind = "parameter_step"
     source = "the abrupt parametric fault, Isermann, Fault-Diagnosis Systems (2006)"
     amplitudes = ("delta",)
+    becomes = ("parameter_offset",)
     asks = ("clock",)
     begins = True
     delta = Parameter("{u}", doc="change")

@@ -16,6 +16,7 @@ class PeriodicForce(ForceLaw):
     kind = "periodic_force"
     source = "order analysis, Randall, Vibration-based Condition Monitoring (2011)"
     amplitudes = ("F_sin", "F_cos")
+    becomes = ("constant_force",)
     places = ("turns",)
     F_sin = Parameter("{F}", doc="part in phase with sin(order q)")
     F_cos = Parameter("{F}", doc="part in phase with cos(order q)")

@@ -15,6 +15,7 @@ class StepForce(ForceLaw):
     kind = "step_force"
     source = "the abrupt additive fault, Isermann, Fault-Diagnosis Systems (2006)"
     amplitudes = ("F_0",)
+    becomes = ("constant_force",)
     asks = ("clock",)
     F_0 = Parameter("{F}", doc="constant resistance after the step")
     t0 = start_time()
