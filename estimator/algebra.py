@@ -1,4 +1,8 @@
-"""The small matrices of the filters: compiled where numba is installed, the same text in numpy where not."""
+"""The small matrices of the filters: compiled where numba is installed, the same text in Python where not.
+
+What a filter does at every step is written out in loops and fills arrays that it is given: at these sizes
+a call of a library, or handing an array back from compiled code, costs more than the sums.
+"""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -6,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from estimator.record import Array
+from estimator.record import Array, BoolArray
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -29,52 +33,140 @@ def symmetric(P: Array) -> Array:
 
 
 @compiled
-def cholesky(P: Array) -> Array:
-    """The lower factor of P (n, n); LinAlgError where there is none."""
-    factor: Array = np.linalg.cholesky(P)  # type: ignore[assignment]
-    return factor
+def factorise(P: Array, L: Array) -> bool:
+    """The lower factor of P (n, n) into L, whose upper part is zero; False where there is none."""
+    n = len(P)
+    for j in range(n):
+        square = P[j, j]
+        for k in range(j):
+            square -= L[j, k] * L[j, k]
+        if not 0.0 < square < np.inf:  # nan is neither
+            return False
+        L[j, j] = np.sqrt(square)
+        for i in range(j + 1, n):
+            rest = P[i, j]
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            L[i, j] = rest / L[j, j]
+    return True
 
 
 @compiled
-def drawn(x: Array, factor: Array, scale: float) -> Array:
+def finite(x: Array) -> bool:
+    """Whether all of x (n,) is."""
+    return not np.isnan(np.sum(x * 0.0))
+
+
+@compiled
+def there(y: Array, found: BoolArray) -> int:
+    """How many of y (m,) are measured, and which, into found (m,)."""
+    n = 0
+    for i in range(len(y)):
+        found[i] = np.isfinite(y[i])
+        n += found[i]
+    return n
+
+
+@compiled
+def draw(x: Array, factor: Array, scale: float, points: Array) -> None:
     """Points (2n + 1, n): x, and x plus and minus the columns of a scaled factor (n, n)."""
     n = len(x)
-    points = np.empty((2 * n + 1, n))
-    points[0] = x
-    for i in range(n):
-        points[1 + i] = x + scale * factor[:, i]
-        points[1 + n + i] = x - scale * factor[:, i]
-    return points
+    for j in range(n):
+        points[0, j] = x[j]
+        for i in range(n):
+            points[1 + i, j] = x[j] + scale * factor[j, i]
+            points[1 + n + i, j] = x[j] - scale * factor[j, i]
 
 
 @compiled
-def moments(points: Array, Wm: Array, Wc: Array, noise: Array) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of weighted points (k, n), with a covariance (n, n) added."""
-    mean = Wm @ points
-    off = points - mean
-    P = off.T @ (Wc.reshape(-1, 1) * off)
-    return mean, (P + P.T) * 0.5 + noise
+def mean(points: Array, weights: Array, x: Array) -> None:
+    """Weighed mean x (n,) of points (k, n)."""
+    for j in range(len(x)):
+        total = 0.0
+        for i in range(len(weights)):
+            total += weights[i] * points[i, j]
+        x[j] = total
 
 
 @compiled
-def cross(Wc: Array, A: Array, a: Array, B: Array, b: Array) -> Array:
-    """Covariance (n, m) of weighted points A (k, n), B (k, m) about a (n,), b (m,)."""
-    return (A - a).T @ (Wc.reshape(-1, 1) * (B - b))
+def cross(A: Array, a: Array, B: Array, b: Array, weights: Array, P: Array) -> None:
+    """Weighed covariance P (n, m) of points A (k, n) about a (n,) and B (k, m) about b (m,)."""
+    P[:] = 0.0
+    for k in range(len(weights)):
+        for i in range(len(a)):
+            off = weights[k] * (A[k, i] - a[i])
+            for j in range(len(b)):
+                P[i, j] += off * (B[k, j] - b[j])
 
 
 @compiled
-def corrected(
-    Wc: Array, X: Array, x: Array, Y: Array, y: Array, S: Array, e: Array, R: Array
-) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of points X (k, n) after innovations e (m,) of their outputs Y (k, m).
+def predict(
+    before: Array, x0: Array, after: Array, Wm: Array, Wc: Array, Q: Array, x: Array, P: Array, C: Array
+) -> None:
+    """Moments of weighed points (k, n) after a step: x (n,), P (n, n) with Q, and C (n, n) with x0 before it.
+
+    C: covariance of what was and what is, before: the points about x0 that were moved.
+    """
+    mean(after, Wm, x)
+    cross(after, x, after, x, Wc, P)
+    P += Q
+    cross(before, x0, after, x, Wc, C)
+
+
+@compiled
+def expect(Y: Array, Wm: Array, Wc: Array, y: Array, S: Array) -> None:
+    """Mean y (m,) and covariance S (m, m) of weighed outputs Y (k, m)."""
+    mean(Y, Wm, y)
+    cross(Y, y, Y, y, Wc, S)
+
+
+@compiled
+def solve(L: Array, b: Array) -> None:
+    """b (n, m) becomes what solves L L' x = b, by forward and backward substitution."""
+    n = len(L)
+    for j in range(b.shape[1]):
+        for i in range(n):
+            rest = b[i, j]
+            for k in range(i):
+                rest -= L[i, k] * b[k, j]
+            b[i, j] = rest / L[i, i]
+        for i in range(n - 1, -1, -1):
+            rest = b[i, j]
+            for k in range(i + 1, n):
+                rest -= L[k, i] * b[k, j]
+            b[i, j] = rest / L[i, i]
+
+
+@compiled
+def correct(
+    Wc: Array, X: Array, x: Array, Y: Array, y: Array, S: Array, e: Array, R: Array, x1: Array, P1: Array
+) -> None:
+    """Mean x1 (n,), covariance P1 (n, n) of points X (k, n) after innovations e (m,) of outputs Y (k, m).
 
     x (n,), y (m,) are their means, S (m, m) the covariance of e, in which R (m, m) is noise. Joseph's form:
-    a sum of squares.
+    a sum of squares. nan where S is not positive definite.
     """
-    K = np.linalg.solve(S, (Y - y).T @ (Wc.reshape(-1, 1) * (X - x))).T
-    rest = (X - x) - (Y - y) @ K.T
-    P = rest.T @ (Wc.reshape(-1, 1) * rest) + K @ (R @ K.T)
-    return x + K @ e, (P + P.T) * 0.5
+    n, m = len(x), len(y)
+    L, gain, rest, none = np.zeros((m, m)), np.empty((m, n)), np.empty(X.shape), np.zeros(n)
+    if not factorise(S, L):
+        L[:] = np.nan
+    cross(Y, y, X, x, Wc, gain)
+    solve(L, gain)  # the gain, transposed
+    for i in range(n):
+        x1[i] = x[i]
+        for a in range(m):
+            x1[i] += gain[a, i] * e[a]
+        for k in range(len(X)):
+            rest[k, i] = X[k, i] - x[i]
+            for a in range(m):
+                rest[k, i] -= gain[a, i] * (Y[k, a] - y[a])
+    cross(rest, none, rest, none, Wc, P1)
+    for i in range(n):
+        for j in range(i + 1):
+            for a in range(m):
+                for b in range(m):
+                    P1[i, j] += gain[a, i] * R[a, b] * gain[b, j]
+            P1[j, i] = P1[i, j]
 
 
 @compiled
@@ -89,9 +181,18 @@ def joseph(x: Array, P: Array, H: Array, e: Array, R: Array) -> tuple[Array, Arr
 
 @compiled
 def log_density(e: Array, S: Array) -> tuple[float, float]:
-    """Logarithm of the normal density of e (m,) with covariance S (m, m), and e' S^-1 e."""
-    square = float(np.sum(e * np.linalg.solve(S, e)))
-    sign, size = np.linalg.slogdet(S)
-    if sign <= 0:
-        return -np.inf, square
-    return -0.5 * (square + float(size) + len(e) * np.log(2 * np.pi)), square
+    """Logarithm of the normal density of e (m,) with covariance S (m, m), and e' S^-1 e.
+
+    -inf and nan where S is not positive definite.
+    """
+    m = len(e)
+    L, x = np.zeros((m, m)), np.empty((m, 1))
+    if not factorise(S, L):
+        return -np.inf, np.nan
+    x[:, 0] = e
+    solve(L, x)
+    square, size = 0.0, m * np.log(2 * np.pi)
+    for i in range(m):
+        square += e[i] * x[i, 0]
+        size += 2 * np.log(L[i, i])
+    return -0.5 * (square + size), square

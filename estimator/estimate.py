@@ -3,11 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Any, Protocol
 
 import numpy as np
 
-from estimator.algebra import cholesky, log_density
+from estimator.algebra import factorise, finite, log_density, there
 from estimator.record import Array, BoolArray
 
 Covariance = Array | Callable[[float], Array]  # constant, or of the length of a step [s]
@@ -104,6 +105,10 @@ class Adapted:
     rejected: Array  # (m,) samples in a row that were gated
 
 
+# of an Estimate: innovation, S, used, gated, log_likelihood, nis
+Facts = tuple[Array, Array, BoolArray, BoolArray, float, float]
+
+
 class Filter(ABC):
     """Estimates x step by step. Q, R: process noise of a step and measurement noise, as covariances.
 
@@ -165,45 +170,57 @@ class Filter(ABC):
             )
             self.factored(x, P, t)
         x1, P1, facts = self._measured(x, P, u, np.asarray(y, dtype=float), t, carried)
-        if facts["used"].any():
+        if x1 is not x:
             x1 = self.system.settled(x1)
             self.factored(x1, P1, t)
-        self.now = Estimate(
-            t, x1, P1, u, x_prior=x, P_prior=P, C=C, carried=carried, memory=self._memory, **facts
-        )
+        self.now = Estimate(t, x1, P1, u, *facts, x, P, C, carried, self._memory)
         return self.now
 
     def _measured(
         self, x: Array, P: Array, u: Array, y: Array, t: float, carried: Array
-    ) -> tuple[Array, Array, dict[str, Any]]:
-        there = np.isfinite(y)
-        nothing = np.zeros(len(y), dtype=np.bool_)
-        if not there.any():
-            return x, P, {"innovation": np.full(len(y), np.nan), "used": nothing, "gated": nothing}
+    ) -> tuple[Array, Array, Facts]:
+        """The same x, P where nothing is to be used."""
+        m = len(y)
+        seen = np.empty(m, np.bool_)
+        n = there(y, seen)
+        if n == 0:
+            return x, P, (np.full(m, np.nan), NONE, seen, seen, 0.0, 0.0)
         expected, S = self._expect(x, P, u, t, carried)
         R = self.R * np.sqrt(np.outer(self._memory.R, self._memory.R)) if self.adapt else self.R
         S, innovation = S + R, y - expected
-        gated = self._gated(innovation, S, there) if self.gate else nothing
-        used = there & ~gated
-        facts = {"innovation": innovation, "S": S, "used": used, "gated": gated}
-        if not used.any():
-            return x, P, facts
-        part = (slice(None), slice(None)) if used.all() else np.ix_(used, used)
-        facts["log_likelihood"], facts["nis"] = log_density(innovation[used], S[part])
-        x, P = self._correct(x, P, used, innovation[used], S[part], R[part])
+        used, gated = seen, np.zeros(m, np.bool_)
+        if self.gate:
+            gated = self._gated(innovation, S, seen)
+            used = seen & ~gated
+            n = int(used.sum())
+        if n == 0:
+            return x, P, (innovation, S, used, gated, 0.0, 0.0)
+        part = innovation, S, R
+        if n < m:
+            both = np.ix_(used, used)
+            part = innovation[used], S[both], R[both]
+        likelihood, nis = log_density(*part[:2])
+        if isnan(nis):
+            self._cannot_weigh(*part[:2], used, t)
+        x, P = self._correct(x, P, used, *part)
         if self.adapt:
             self._adapt(self.adapt, innovation, S, R, used)
-        return x, P, facts
+        return x, P, (innovation, S, used, gated, likelihood, nis)
+
+    def _cannot_weigh(self, innovation: Array, S: Array, used: BoolArray, t: float) -> None:
+        """Raise Diverged with the output that no density can be given for."""
+        checked(innovation, S, [n for n, there in zip(self.system.outputs, used, strict=True) if there], t)
+        raise Diverged(f"at t = {t:g} s outputs are expected without any scatter; give them noise")
 
     def _process_noise(self, dt: float) -> Array:
         Q = self._Q(dt) if callable(self._Q) else self._Q
         return Q * self._memory.Q if self.adapt and self.adapt.process else Q
 
-    def _gated(self, innovation: Array, S: Array, there: BoolArray) -> BoolArray:
+    def _gated(self, innovation: Array, S: Array, seen: BoolArray) -> BoolArray:
         if self.gate is None:
             return np.zeros(len(innovation), dtype=np.bool_)
-        far = there & (innovation**2 > self.gate.deviations**2 * np.diag(S))
-        rejected = np.where(far, self._memory.rejected + 1, np.where(there, 0, self._memory.rejected))
+        far = seen & (innovation**2 > self.gate.deviations**2 * np.diag(S))
+        rejected = np.where(far, self._memory.rejected + 1, np.where(seen, 0, self._memory.rejected))
         far &= rejected <= self.gate.patience
         self._memory = Adapted(self._memory.scatter, self._memory.R, self._memory.Q, rejected)
         return far
@@ -229,14 +246,11 @@ def checked(x: Array, P: Array, names: Sequence[str], t: float) -> Array:
 
     P may be semidefinite to rounding, as where a filter without process noise knows a state exactly.
     """
-    if not np.isfinite(x.sum()):
+    if not finite(x):
         name = names[int(np.argmin(np.isfinite(x)))]
         raise Diverged(f"at t = {t:g} s the estimate of '{name}' is not finite")
-    try:
-        factor: Array = cholesky(P)
-    except np.linalg.LinAlgError:
-        return _semidefinite_factor(P, names, t)
-    return factor if factor[-1, -1] > 0 else _semidefinite_factor(P, names, t)  # nan spreads to there
+    factor: Array = np.zeros(P.shape)
+    return factor if factorise(P, factor) else _semidefinite_factor(P, names, t)
 
 
 def _semidefinite_factor(P: Array, names: Sequence[str], t: float) -> Array:

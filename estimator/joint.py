@@ -5,22 +5,24 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from estimator.access.copies import Copies, Refused
 from estimator.access.exchange import Exchange, continuous_states
 from estimator.access.probe import Access, by_exchange, probe
 from estimator.access.recipe import Way
 from estimator.estimate import Diverged, Estimate
+from estimator.layout import layout
 from estimator.record import Array
 from estimator.shaping import UnknownInput
 from estimator.transform import Transform
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 
-KEPT = 256  # lengths of steps whose noise is kept
+KEPT = 256  # lengths of steps of which transition and noise are kept
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ class Joint:
         compiled: bool = True,
     ) -> None:
         self._stack = ExitStack()
-        self._noise: dict[float, Array] = {}
+        self._steps: dict[float, tuple[Array, Array]] = {}
         self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
         self.outputs, self.inputs = tuple(outputs), tuple(inputs)
         self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
@@ -92,7 +94,7 @@ class Joint:
         put = [*mine, *self.others, *(p.name for p in parameters), *inputs, *fed]
         get = [*mine, *self.others, *(n for n in outputs if n not in (*mine, *self.others))]
         self._check(put, get)
-        self._places(put, get)
+        self._places(get)
         try:
             self._open(put, get, dt, t0, way, compiled)
         except BaseException:
@@ -110,11 +112,7 @@ class Joint:
 
     def noise(self, dt: float) -> Array:
         """Covariance (n, n) of what comes into x in a step of dt [s]."""
-        if dt not in self._noise:
-            if len(self._noise) >= KEPT:
-                self._noise.clear()
-            self._noise[dt] = self._noise_of(dt)
-        return self._noise[dt]
+        return self._over(dt)[1]
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
         """See System. Unknown inputs act over a step with the mean of both its ends, as known ones do."""
@@ -122,48 +120,30 @@ class Joint:
             for part, held in enumerate(u):
                 X, carried = self.f(X, held, t + part * dt / len(u), dt / len(u), carried)
             return X, carried
-        values, after = self.rows(X, u, carried), np.empty_like(X)
-        at = self._n_states + self._n_parameters
-        after[:, self._n_states : at] = X[:, self._n_states : at]
-        for w, columns in zip(self.unknown, self._fed, strict=True):
-            size = len(w.states)
-            F, _ = w.discrete(dt)
-            before = X[:, at : at + size]
-            after[:, at : at + size] = before @ F.T
-            held = (before + after[:, at : at + size]) / 2
-            for column, state in columns:
-                values[:, column] = held[:, state]
-            at += size
-        found = self._asked(lambda: self.copies.advance(values, t, dt))
-        after[:, : self._n_states] = found[:, : self._n_states]
-        return after, found[0, self._n_states : self._n_all].copy()
+        values, after = self.layout.rows(X, u, carried, self.transition(dt))
+        found = self._asked(self.copies.advance, values, t, dt)
+        n = len(self.states)
+        after[:, :n] = found[:, :n]
+        return after, found[0, n : n + len(self.others)].copy()
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """See System; the FMU is asked only for what is not a state."""
         if self._direct is not None:
             return X[:, self._direct]
         values = self.rows(X, u, carried)
-        return self._asked(lambda: self.copies.evaluate(values, t))[:, self._seen]
+        return self._asked(self.copies.evaluate, values, t)[:, self._seen]
 
     def rows(self, X: Array, u: Array, carried: Array) -> Array:
         """What the FMU is given at x of each row (k, n), unknown inputs of this moment, (k, n_put)."""
-        n = self._n_states
-        values = np.empty((len(X), self._n_put))
-        values[:, :n] = X[:, :n]
-        values[:, n : self._n_all] = carried
-        for i, parameter in enumerate(self.parameters):
-            values[:, self._n_all + i] = parameter.transform.theta(X[:, n + i])
-        values[:, self._at_inputs] = u
-        at = n + self._n_parameters
-        for w, columns in zip(self.unknown, self._fed, strict=True):
-            for column, state in columns:
-                values[:, column] = X[:, at + state]
-            at += len(w.states)
-        return values
+        return self.layout.rows(X, u, carried, self._still)[0]
+
+    def transition(self, dt: float) -> Array:
+        """Of the unknown inputs' states over dt [s], (n_w, n_w)."""
+        return self._over(dt)[0]
 
     def settled(self, x: Array) -> Array:
         """See System: cuts off what is bounded by clipping."""
-        for i, p in enumerate(self.parameters, self._n_states):
+        for i, p in enumerate(self.parameters, len(self.states)):
             if p.transform.kind == "clip":
                 x = x.copy()
                 x[i] = p.transform.settled(x[i])
@@ -172,7 +152,7 @@ class Joint:
     def values(self, x: Array, std: Array) -> tuple[Array, Array]:
         """What x (N, n) and its deviations (N, n) mean in the FMU's units, (N, n) each."""
         x, std = x.copy(), std.copy()
-        for i, p in enumerate(self.parameters, self._n_states):
+        for i, p in enumerate(self.parameters, len(self.states)):
             std[:, i] = p.transform.spread(x[:, i], std[:, i])
             x[:, i] = p.transform.theta(x[:, i])
         return x, std
@@ -201,27 +181,31 @@ class Joint:
     ) -> None:
         self.close()
 
-    def _noise_of(self, dt: float) -> Array:
-        Q = np.zeros((len(self.names),) * 2)
-        walks = [*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)]
-        np.fill_diagonal(Q[: len(walks), : len(walks)], np.square(walks) * dt)
-        at = len(walks)
-        for w in self.unknown:
-            size = len(w.states)
-            Q[at : at + size, at : at + size] = w.discrete(dt)[1]
-            at += size
-        return Q
+    def _over(self, dt: float) -> tuple[Array, Array]:
+        """Transition of the unknown inputs and covariance of all noise over dt."""
+        if dt not in self._steps:
+            if len(self._steps) >= KEPT:
+                self._steps.clear()
+            self._steps[dt] = self._worked_out(dt)
+        return self._steps[dt]
 
-    def _places(self, put: list[str], get: list[str]) -> None:
-        """Where things stand in the rows of values that go into the FMU and come out of it."""
-        self._n_states, self._n_parameters = len(self.states), len(self.parameters)
-        self._n_all, self._n_put = self._n_states + len(self.others), len(put)
-        at = self._n_all + self._n_parameters
-        self._at_inputs = slice(at, at + len(self.inputs))
-        self._fed = [[(put.index(n), state) for n, state in w.feeds.items()] for w in self.unknown]
-        self._seen = [get.index(n) for n in self.outputs]
-        direct = all(i < self._n_states for i in self._seen)
-        self._direct = self._seen if direct else None
+    def _worked_out(self, dt: float) -> tuple[Array, Array]:
+        walks = np.array([*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)])
+        shaped = [w.discrete(dt) for w in self.unknown]
+        F = block_diag(*(F for F, _ in shaped)) if shaped else np.empty((0, 0))
+        Q = block_diag(np.diag(walks**2 * dt), *(Q for _, Q in shaped))
+        return np.ascontiguousarray(F, dtype=float), np.ascontiguousarray(Q, dtype=float)
+
+    def _places(self, get: list[str]) -> None:
+        """Where things stand in x, in the rows that go into the FMU and in those that come out of it."""
+        n, transforms = len(self.states), [p.transform for p in self.parameters]
+        self.layout = layout(n, len(self.others), transforms, len(self.inputs), self.unknown)
+        self._still = np.eye(len(self.names) - n - len(transforms))
+        self._seen = [get.index(name) for name in self.outputs]
+        self._direct: slice | list[int] | None = None
+        if all(i < n for i in self._seen):
+            row = self._seen == list(range(len(self._seen)))
+            self._direct = slice(0, len(self._seen)) if row else self._seen
 
     def _open(
         self, put: list[str], get: list[str], dt: float, t0: float, way: Way | None, compiled: bool
@@ -265,8 +249,8 @@ class Joint:
             raise BadInput(f"{d.name}: '{twice[0]}' is named twice among what is set; name it once")
 
     @staticmethod
-    def _asked(call: Callable[[], Array]) -> Array:
+    def _asked(call: Callable[..., Array], *arguments: Any) -> Array:
         try:
-            return call()
+            return call(*arguments)
         except Refused as error:
             raise Diverged(str(error)) from error

@@ -1,16 +1,43 @@
 """Parameters within bounds: a filter's own coordinate z on the whole line, and the parameter theta(z)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
-from typing import Literal
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
+from estimator.algebra import compiled
 from estimator.record import Array
 from fmus.errors import BadInput
 
 Kind = Literal["free", "log", "logit", "clip"]
+KINDS: tuple[Kind, ...] = get_args(Kind)  # their places are the codes of compiled functions
+FREE, LOG, LOGIT, CLIP = range(len(KINDS))
+Whole: TypeAlias = NDArray[np.int64]
 LARGEST = 700.0  # of an exponent; beyond it a double overflows
+
+
+@compiled
+def grown(code: int, low: float, high: float, z: float) -> float:
+    """See Transform."""
+    if code == FREE:
+        return z
+    if code == CLIP:
+        return min(max(z, low), high)
+    e = np.exp(min(max(z, -LARGEST), LARGEST))
+    if code == LOG:
+        return float(low + e)
+    return float(low + (high - low) * (e / (1 + e)))
+
+
+@compiled
+def grow(codes: Whole, low: Array, high: Array, Z: Array, theta: Array) -> None:
+    """Parameters theta (k, p) at coordinates Z (k, p), of transforms with these codes and bounds (p,)."""
+    for i in range(len(codes)):
+        for k in range(len(Z)):
+            theta[k, i] = grown(codes[i], low[i], high[i], Z[k, i])
 
 
 @dataclass(frozen=True)
@@ -27,14 +54,10 @@ class Transform:
 
     def theta(self, z: Array) -> Array:
         """The parameter at coordinates of any shape."""
-        if self.kind == "free":
-            return z
-        if self.kind == "clip":
-            clipped: Array = np.clip(z, self.low, self.high)
-            return clipped
-        e = np.exp(np.clip(z, -LARGEST, LARGEST))
-        grown: Array = self.low + (e if self.kind == "log" else (self.high - self.low) * (e / (1 + e)))
-        return grown
+        given = np.asarray(z, dtype=float)
+        found = np.empty((given.size, 1))
+        grow(*coded([self]), given.reshape(-1, 1), found)
+        return found.reshape(given.shape)
 
     def z(self, theta: float) -> float:
         """The coordinate of a value; BadInput where it lies on or outside the bounds."""
@@ -64,6 +87,13 @@ class Transform:
     def settled(self, z: Array) -> Array:
         """The coordinate that a filter goes on with: only clipping changes it."""
         return self.theta(z) if self.kind == "clip" else z
+
+
+def coded(transforms: Sequence[Transform]) -> tuple[Whole, Array, Array]:
+    """Codes, lower and upper bounds (p,) of transforms, for `grow`."""
+    codes = [KINDS.index(t.kind) for t in transforms]
+    low, high = ([getattr(t, end) for t in transforms] for end in ("low", "high"))
+    return np.array(codes, dtype=np.int64), np.array(low, dtype=float), np.array(high, dtype=float)
 
 
 def bounded(bounds: tuple[float, float] | None) -> Transform:

@@ -1,17 +1,16 @@
-"""Unscented Kalman filter on filterpy, with all sigma points moved through the system at once.
+"""Unscented Kalman filter with filterpy's sigma points, all of which move through the system at once.
 
 filterpy 2.0 draws the sigma points anew after a prediction, so that they hold the process noise too;
-1.4 did not. What is used here does so with either version.
+1.4 did not. What is done here does so with either version. filterpy's own filter calls the system point by
+point and subtracts covariances, which may leave one that is none; where it does not, both agree.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+from filterpy.kalman import MerweScaledSigmaPoints
 
-from estimator.algebra import corrected, cross, drawn, moments
+from estimator.algebra import correct, draw, expect, predict
 from estimator.estimate import (
     Adaptation,
     Covariance,
@@ -34,39 +33,12 @@ class Spread:
     beta: float = 2.0
     kappa: float = 0.0
 
+    def scale(self, n: int) -> float:
+        """How far points of n states lie off the mean, in deviations."""
+        return self.alpha * float(np.sqrt(n + self.kappa))
+
 
 USUAL = Spread()
-
-
-class _Points(MerweScaledSigmaPoints):  # type: ignore[misc]  # filterpy comes without types
-    """filterpy's weights; the points themselves from a factor of P that is checked on the way."""
-
-    def __init__(self, n: int, spread: Spread, factored: Callable[[Array, Array, float], Array]) -> None:
-        super().__init__(n, spread.alpha, spread.beta, spread.kappa)
-        self.factored, self.t = factored, 0.0
-        self.scale = spread.alpha * float(np.sqrt(n + spread.kappa))
-
-    def sigma_points(self, x: Array, P: Array) -> Array:
-        """(2n + 1, n), the mean first."""
-        points: Array = drawn(x, self.factored(x, P, self.t), self.scale)
-        return points
-
-
-class _Batch(UnscentedKalmanFilter):  # type: ignore[misc]
-    """filterpy's filter with one call of the system for all sigma points."""
-
-    def __init__(self, system: System, points: _Points, m: int) -> None:
-        super().__init__(len(system.names), m, 1.0, None, None, points)
-        self.system, self.carried = system, np.empty(0)
-        self.told: tuple[Array, float] = (np.empty(0), 0.0)
-        self.before = self.after = np.empty((0, len(system.names)))
-
-    def compute_process_sigmas(self, dt: float, fx: Any = None, **fx_args: Any) -> None:
-        """Draw the points and move them."""
-        self.before = self.points_fn.sigma_points(self.x, self.P)
-        u, t = self.told
-        self.after, self.carried = self.system.f(self.before, u, t, dt, self.carried)
-        self.sigmas_f = self.after
 
 
 class Ukf(Filter):
@@ -84,40 +56,34 @@ class Ukf(Filter):
         spread: Spread = USUAL,
     ) -> None:
         super().__init__(system, start, Q, R, dt, gate, adapt)
-        self.points = _Points(len(system.names), spread, self.factored)
-        self.ukf = _Batch(system, self.points, len(self.R))
-        self._Y = np.empty((0, len(self.R)))
-        self._y, self._nothing = np.zeros(len(self.R)), np.zeros_like(self.R)
+        n, m = len(system.names), len(self.R)
+        weights = MerweScaledSigmaPoints(n, spread.alpha, spread.beta, spread.kappa)
+        self._Wm, self._Wc, self._scale = weights.Wm, weights.Wc, spread.scale(n)
+        self._before, self._X = (np.empty((2 * n + 1, n)) for _ in range(2))
+        self._Y, self._y = np.empty((2 * n + 1, m)), np.empty(m)
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
-        ukf, now = self.ukf, self.now
-        ukf.x, ukf.P, ukf.Q = now.x, now.P, Q
-        ukf.told, ukf.carried, self.points.t = (u, t), now.carried, t + dt
-        ukf.predict(dt, UT=_moments)
-        C = cross(ukf.Wc, ukf.before, now.x, ukf.after, ukf.x)
-        return ukf.x, ukf.P, C, ukf.carried
+        now, n = self.now, len(self.names)
+        draw(now.x, self.factored(now.x, now.P, t), self._scale, self._before)
+        after, carried = self.system.f(self._before, u, t, dt, now.carried)
+        x, P, C = np.empty(n), np.empty((n, n)), np.empty((n, n))
+        predict(self._before, now.x, after, self._Wm, self._Wc, Q, x, P, C)
+        return x, P, C, carried
 
     def _expect(self, x: Array, P: Array, u: Array, t: float, carried: Array) -> tuple[Array, Array]:
-        ukf = self.ukf
-        if self.now.u is None:  # nothing was predicted, so no points were drawn
-            ukf.x, ukf.P = x, P
-            ukf.sigmas_f = self.points.sigma_points(x, P)
-        self._Y = np.ascontiguousarray(self.system.h(ukf.sigmas_f, u, t, carried))
-        self._y, S = _moments(self._Y, ukf.Wm, ukf.Wc, self._nothing)
+        m = len(self.R)
+        draw(x, self.factored(x, P, t), self._scale, self._X)
+        self._Y = np.ascontiguousarray(self.system.h(self._X, u, t, carried))
+        self._y, S = np.empty(m), np.empty((m, m))
+        expect(self._Y, self._Wm, self._Wc, self._y, S)
         return self._y, S
 
     def _correct(
         self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        Y, y = self._Y, self._y
-        if not used.all():
+        Y, y, n = self._Y, self._y, len(x)
+        if len(innovation) < len(y):
             Y, y = np.ascontiguousarray(Y[:, used]), y[used]
-        # filterpy's own update subtracts covariances, which may leave one that is none
-        found: tuple[Array, Array] = corrected(self.ukf.Wc, self.ukf.sigmas_f, x, Y, y, S, innovation, R)
-        return found
-
-
-def _moments(points: Array, Wm: Array, Wc: Array, noise: Array, *_functions: None) -> tuple[Array, Array]:
-    """What filterpy calls an unscented transform."""
-    found: tuple[Array, Array] = moments(points, Wm, Wc, noise)
-    return found
+        x1, P1 = np.empty(n), np.empty((n, n))
+        correct(self._Wc, self._X, x, Y, y, S, innovation, R, x1, P1)
+        return x1, P1

@@ -334,21 +334,27 @@ def test_the_dual_filter_finds_what_the_joint_one_finds():
     assert dual.P[0, 1] == 0.0
 
 
-@pytest.mark.skipif(not hasattr(algebra.moments, "py_func"), reason="numba is not installed")
+@pytest.mark.skipif(not hasattr(algebra.mean, "py_func"), reason="numba is not installed")
 def test_compiled_and_plain_algebra_agree():
     rng = np.random.default_rng(11)
     L, X, Y = rng.standard_normal((3, 3)), rng.standard_normal((7, 3)), rng.standard_normal((7, 2))
     P, w = L @ L.T + np.eye(3), rng.random(7)
     H, S = rng.standard_normal((2, 3)), np.array([[2.0, 0.3], [0.3, 1.0]])
+    n, m, nn, nm, mm = (np.zeros(shape) for shape in (3, 2, (3, 3), (3, 2), (2, 2)))
     for name, arguments in {
-        "symmetric": (L,), "cholesky": (P,), "drawn": (X[0], L, 1.3), "moments": (X, w, w, P),
-        "cross": (w, X, X[0], Y, Y[0]), "corrected": (w, X, X[0], Y, Y[0], S, Y[1], 0.1 * S),
+        "symmetric": (L,), "factorise": (P, nn), "finite": (X[0],), "there": (Y[0], np.zeros(2, bool)),
+        "draw": (X[0], L, 1.3, X.copy()), "mean": (X, w, n), "cross": (X, X[0], Y, Y[0], w, nm),
+        "predict": (X, X[0], X[::-1].copy(), w, w, P, n, nn, nn.copy()), "expect": (Y, w, w, m, mm),
+        "solve": (np.tril(P), L), "correct": (w, X, X[0], Y, Y[0], S, Y[1], 0.1 * S, n, nn),
         "joseph": (X[0], P, H, Y[0], S), "log_density": (Y[0], S),
     }.items():  # fmt: skip
         function = getattr(algebra, name)
-        for a, b in zip(_parts(function(*arguments)), _parts(function.py_func(*arguments)), strict=True):
+        for a, b in zip(_made(function, arguments), _made(function.py_func, arguments), strict=True):
             assert_allclose(a, b, rtol=1e-12, atol=1e-13)
 
 
-def _parts(result):
-    return result if isinstance(result, tuple) else (result,)
+def _made(function, arguments):
+    """What a function returns, and what becomes of its arguments."""
+    given = [np.copy(a) if isinstance(a, np.ndarray) else a for a in arguments]
+    result = function(*given)
+    return [*(result if isinstance(result, tuple) else (0.0 if result is None else result,)), *given]

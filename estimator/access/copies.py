@@ -76,6 +76,7 @@ class Copies:
         self.close()
 
     def _run(self, values: Array, t: float, dt: float) -> Array:
+        values = np.ascontiguousarray(values)
         loop = self._ready(values, t)
         out = np.empty((len(values), len(self.get)))
         failed = loop.run(values, out, self.t0 if self.way is Way.RESUME else t, dt)

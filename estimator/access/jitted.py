@@ -129,21 +129,21 @@ class JittedLoop:
     """All copies in one compiled loop."""
 
     def __init__(self, f: Functions, recipe: Recipe, saved: Sequence[int] = ()) -> None:
-        constants = recipe.constants if recipe.way is Way.RESTART else np.empty(0)
-        refs = np.concatenate([recipe.set_refs, recipe.constant_refs]) if len(constants) else recipe.set_refs
-        self._n = len(recipe.set_refs)
-        k = len(f.components)
-        self._values = np.tile(np.concatenate([np.zeros(self._n), constants]), (k, 1))
-        self._found = np.empty((k, len(recipe.get_refs)))
+        lost = recipe.way is Way.RESTART and len(recipe.constants) > 0
+        refs = np.concatenate([recipe.set_refs, recipe.constant_refs]) if lost else recipe.set_refs
+        self._n, k = len(recipe.set_refs), len(f.components)
+        # rows of their own only where constants stand behind the values
+        self._rows = np.tile(np.concatenate([np.zeros(self._n), recipe.constants]), (k, 1)) if lost else None
         states = np.array(list(saved) or [0] * k, dtype=np.int64)
-        self._fixed = (f.fmi3, int(recipe.way), f.addresses, np.array(f.components, dtype=np.int64), states)
-        self._refs = np.ascontiguousarray(refs), np.ascontiguousarray(recipe.get_refs)
+        self._fixed = (
+            f.fmi3, int(recipe.way), f.addresses, np.array(f.components, dtype=np.int64), states,
+            np.ascontiguousarray(refs), np.ascontiguousarray(recipe.get_refs),
+        )  # fmt: skip
 
     def run(self, values: Array, out: Array, t: float, dt: float) -> int:
-        """See Loop."""
-        k = len(values)
-        rows, found = self._values[:k], self._found[:k]
-        rows[:, : self._n] = values
-        failed = int(run(*self._fixed, *self._refs, rows, found, float(t), float(dt)))
-        out[:] = found
-        return failed
+        """See Loop; values and out are C-contiguous."""
+        if self._rows is not None:
+            rows = self._rows[: len(values)]
+            rows[:, : self._n] = values
+            values = rows
+        return int(run(*self._fixed, values, out, float(t), float(dt)))
