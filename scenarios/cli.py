@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from fmus.contact.exact import exact_names
 from fmus.effects import EFFECTS, parse_effect
 from fmus.errors import BadInput
 from fmus.host.fmu import FmuError
@@ -63,6 +64,8 @@ def build(
     made = [_model(name, effect or [], given) for name in models or MODELS]
     write = _writer(kind, fmi, platform or [], compiler)
     for model in made:
+        for line in profiles_read(model):
+            said.print(line, markup=False, soft_wrap=True)
         typer.echo(write(model, out))
 
 
@@ -76,6 +79,14 @@ def _model(name: str, effects: list[str], contact: dict[str, str]) -> Model:
             f"--{next(iter(contact)).replace('_', '-')}: {name} has no contact of profiles; leave it out"
         )
     return chosen(parsed, track=Track.parse(**contact))
+
+
+def profiles_read(model: Model) -> list[str]:
+    """How the point files of a wheelset's profiles were read: what was turned round, how it was smoothed."""
+    if not isinstance(model, Wheelset):
+        return []
+    pair = model.track.pair
+    return [f"{p.kind} {p.name}: {p.found}" for p in (pair.wheel, pair.rail) if p.name not in exact_names()]
 
 
 def _writer(kind: str, fmi: int, platforms: list[str], compiler: str | None) -> Callable[[Model, Path], Path]:

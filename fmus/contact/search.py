@@ -19,6 +19,8 @@ STEP = 5e-3  # rad, largest change of roll at once
 FLATTEST = 0.2  # m, least lever of the gaps' difference; 1.5 on the tread, 0.25 on a flange of 70 degrees
 ITERATIONS = 100
 QUASI_ELASTIC = 2e-5  # m, Arnold & Netter 1997; 1e-5 to 5e-5 are in use
+FLANGE_ANGLE = 0.5  # rad, contact angle beyond which the flange is said to touch
+PLACES = 400  # between a contact and the tape circle, where a flange is looked for
 WEIGHTLESS = 30.0  # in gaps of QUASI_ELASTIC; exp(-30) is 1e-13
 
 
@@ -132,7 +134,7 @@ def quasi_elastic_contact(
 
 
 def check_touches(pair: Pair) -> None:
-    """BadInput where the wheelset does not rest on its treads when it is centred."""
+    """BadInput where the wheelset does not sit on its treads, between its flanges, when it is centred."""
     centred = stand(pair, np.zeros(1))
     names = f"wheel {pair.wheel.name} on rail {pair.rail.name}"
     stands = f"gauge {pair.gauge:g} m and back_to_back {pair.back_to_back:g} m"
@@ -144,3 +146,9 @@ def check_touches(pair: Pair) -> None:
     tip = WheelGrid.of(pair).tip
     if centred.left.eta[0] <= tip:
         raise BadInput(f"{names}: the flange stands on the rail with {stands}; correct these")
+    eta = float(centred.left.eta[0])
+    steepest = np.abs(pair.wheel.slope(np.linspace(min(eta, 0.0), max(eta, 0.0), PLACES))).max()
+    if np.arctan(steepest) > FLANGE_ANGLE:
+        raise BadInput(
+            f"{names} with {stands}: the flanges touch when it is centred; correct gauge or back_to_back"
+        )

@@ -12,7 +12,14 @@ from fmus.contact.measured import load_profile
 from fmus.contact.normal import hertz, virtual_penetration
 from fmus.contact.pair import Pair
 from fmus.contact.profile import Profile
-from fmus.contact.search import Contact, check_touches, quasi_elastic_contact, rigid_contact, stand
+from fmus.contact.search import (
+    FLANGE_ANGLE,
+    Contact,
+    check_touches,
+    quasi_elastic_contact,
+    rigid_contact,
+    stand,
+)
 from fmus.errors import BadInput, did_you_mean
 
 G, NU = 8e10, 0.28  # Pa, 1; steel (thesis Table 3.4, Kalker 1990)
@@ -20,7 +27,6 @@ YOUNG = 2 * G * (1 + NU)  # Pa
 SHIFTS = 401  # of the table by default
 REACH = 0.010  # m, half its range by default, and at least
 BEYOND_FLANGE = 0.003  # m, how much further than flange contact the table goes
-FLANGE_ANGLE = 0.5  # rad, contact angle beyond which the flange is said to touch
 B_MIN = 0.05  # 1/m, least lateral curvature of a patch: surfaces of 10 m radius, flat for a rail of 0.07 m
 SEARCHES = ("rigid", "quasi_elastic")
 PATCHES = ("hertz", "virtual_penetration")

@@ -17,7 +17,7 @@ from fmus.component import Component
 from fmus.contact.coefficients import looked_up
 from fmus.contact.friction import friction_coefficient
 from fmus.contact.laws import selected_law
-from fmus.contact.table import FLANGE_ANGLE
+from fmus.contact.search import FLANGE_ANGLE
 from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.port import Port

@@ -6,16 +6,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
-
 from fmus.contact.measured import load_profile
 from fmus.contact.pair import TAPE, Pair
-from fmus.contact.search import check_touches, stand
-from fmus.contact.table import FLANGE_ANGLE
+from fmus.contact.search import check_touches
 from fmus.errors import BadInput
 
 SIZES = ("cant", "gauge", "back_to_back", "r0")
-PLACES = 400  # between a contact and the tape circle, where a flange is looked for
 WAYS = {"cant": "a slope such as 1/20", "gauge": "m, such as 1.435"}
 
 
@@ -43,7 +39,6 @@ class Track:
         """
         track = Track(wheel, rail, **{name: _number(name, given) for name, given in sizes.items()})
         check_touches(track.pair)
-        _check_play(track)
         return track
 
     @property
@@ -63,15 +58,6 @@ class Track:
             f"wheel {Path(self.wheel).stem} (r0 {self.r0:g} m, back to back {self.back_to_back:g} m) on rail "
             f"{Path(self.rail).stem} (cant {cant}, gauge {self.gauge:g} m)"
         )
-
-
-def _check_play(track: Track) -> None:
-    """BadInput where a centred wheelset already touches with its flanges."""
-    pair = track.pair
-    eta = float(stand(pair, np.zeros(1)).left.eta[0])
-    steepest = np.abs(pair.wheel.slope(np.linspace(min(eta, 0.0), max(eta, 0.0), PLACES))).max()
-    if np.arctan(steepest) > FLANGE_ANGLE:
-        raise BadInput(f"{track}: the flanges touch when it is centred; correct gauge or back_to_back")
 
 
 def _number(name: str, given: str | float) -> float:
