@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 from math import exp, inf, pi, sin, tanh
 from typing import Any
 
+from tests.truth.more import NO_MORE, More
+
 
 @dataclass(frozen=True)
 class Torque:
@@ -92,6 +94,7 @@ class Effects:
     mu0_step_time: float = 0.0  # s
     omega_w: SensorFault = field(default_factory=SensorFault)
     omega_r: SensorFault = field(default_factory=SensorFault)
+    more: More = NO_MORE  # at wheel, roller, contact; T_P, f_sync; any parameter
 
 
 NOTHING = Effects()

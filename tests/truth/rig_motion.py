@@ -15,6 +15,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from tests.truth.laws import Crack, ImpactTrain
+from tests.truth.more import At, acting, changed
+from tests.truth.passing import NOT_CHANGED, arrived
 from tests.truth.rig_effects import NOTHING, Effects
 from tests.truth.rig_inputs import Array, Inputs
 
@@ -99,13 +102,43 @@ def held_linear(t: Array, values: Array) -> Callable[[float], float]:
     return at
 
 
-def motion(inputs: Inputs, p: Rig, e: Effects) -> Callable[[float, Array], list[float]]:
-    """Right-hand side for x = omega_w, omega_r [rad/s], theta_w, theta_r [rad], motor torque [N.m]."""
-    request, supply = held_linear(inputs.t, inputs.T_P), held_linear(inputs.t, inputs.f_sync)
+def places(location: str) -> tuple[str, ...]:
+    """Places of a location: itself; ValueError where it is none of the rig's."""
+    if location not in ("wheel", "roller", "contact"):
+        raise ValueError(f"location {location!r} is not one of wheel, roller, contact")
+    return (location,)
+
+
+def motion_at(p: Rig, omega_w: float, omega_r: float, theta_w: float = 0.0, theta_r: float = 0.0) -> At:
+    """Displacement and velocity at each place; at the contact, way and speed of slip of the wheel's rim."""
+    known = {
+        "wheel": (theta_w, omega_w),
+        "roller": (theta_r, omega_r),
+        "contact": (p.r_w * theta_w - p.r_r * theta_r, p.r_w * omega_w - p.r_r * omega_r),
+    }
+    return known.__getitem__
+
+
+def passed(inputs: Inputs, e: Effects) -> Inputs:
+    """What arrives of the inputs."""
+    how = e.more.inputs
+    T_P, f_sync = (
+        arrived(inputs.t, u, how.get(name, NOT_CHANGED))
+        for name, u in (("T_P", inputs.T_P), ("f_sync", inputs.f_sync))
+    )
+    return Inputs(inputs.t, T_P, f_sync)
+
+
+def motion(inputs: Inputs, declared: Rig, e: Effects) -> Callable[[float, Array], list[float]]:
+    """Right-hand side for x = omega_w, omega_r [rad/s], theta_w, theta_r [rad], motor torque, memory."""
+    here = passed(inputs, e)
+    request, supply = held_linear(here.t, here.T_P), held_linear(here.t, here.f_sync)
     lag, delay = e.actuator.lag, e.actuator.delay
+    changes, extra = e.more.changes, acting(e.more, places)
 
     def rates(t: float, x: Array) -> list[float]:
-        omega_w, omega_r, theta_w, theta_r, given = x.tolist()
+        omega_w, omega_r, theta_w, theta_r, given, *z = x.tolist()
+        p = changed(declared, changes, t)
         T_P = e.actuator.asked(request(t - delay))
         T_P_dot = 0.0
         if lag > 0:
@@ -114,7 +147,12 @@ def motion(inputs: Inputs, p: Rig, e: Effects) -> Callable[[float, Array], list[
         F_x = creep_force(p, omega_r * p.r_r, omega_w * p.r_w, mu0)
         T_w = -T_P - F_x * p.r_w + e.wheel.total(t, theta_w, omega_w)
         T_r = motor_torque(p, supply(t), omega_r) + F_x * p.r_r + e.roller.total(t, theta_r, omega_r)
-        return [T_w / p.J_w, T_r / p.J_r, omega_w, omega_r, T_P_dot]
+        at = motion_at(p, omega_w, omega_r, theta_w, theta_r)
+        for place, force in extra.forces(t, at, z):
+            T_w += force * {"wheel": 1.0, "contact": p.r_w}.get(place, 0.0)
+            T_r += force * {"roller": 1.0, "contact": -p.r_r}.get(place, 0.0)
+        own = [T_w / p.J_w, T_r / p.J_r, omega_w, omega_r, T_P_dot]
+        return own + extra.rates(t, at, z)
 
     return rates
 
@@ -127,13 +165,15 @@ def steady_state(
     Raises ValueError where there is no such speed.
     """
     p, t0 = parameters, float(inputs.t[0])
-    rates = motion(inputs, p, effects)
     given = effects.actuator.asked(float(inputs.T_P[0]))
+
+    rates, extra = motion(inputs, p, effects), acting(effects.more, places)
 
     def accelerations(z: Array) -> list[float]:
         omega_r, creepage = z[0], z[1] * 1e-4
         omega_w = omega_r * p.r_r / p.r_w * (1 - creepage)
-        return rates(t0, np.array([omega_w, omega_r, 0.0, 0.0, given]))[:2]
+        memory = extra.rest(motion_at(p, omega_w, omega_r))
+        return rates(t0, np.array([omega_w, omega_r, 0.0, 0.0, given, *memory]))[:2]
 
     synchronous = 2 * pi * float(inputs.f_sync[0]) / p.pole_pairs
     found = root(accelerations, [synchronous, 0.0], tol=1e-12)
@@ -158,10 +198,13 @@ def simulate(
     given = effects.actuator.asked(float(inputs.T_P[0]))
     span = (float(inputs.t[0]), float(inputs.t[-1]))
     hit = [e.impact_width / 4 for e in (effects.wheel, effects.roller) if e.impact]
+    hit += [law.width / 4 for _, law in effects.more.laws if isinstance(law, ImpactTrain)]
+    hit += [law.width / 40 for _, law in effects.more.laws if isinstance(law, Crack)]  # at 40 rad/s
+    memory = acting(effects.more, places).rest(motion_at(parameters, speeds[0], speeds[1]))
     solution = solve_ivp(
         motion(inputs, parameters, effects),
         span,
-        np.array([*speeds, 0.0, 0.0, given]),
+        np.array([*speeds, 0.0, 0.0, given, *memory]),
         method="LSODA",
         t_eval=np.clip(inputs.t, *span),
         rtol=1e-8,

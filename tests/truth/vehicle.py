@@ -12,11 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.truth.more import Kinks
+from tests.truth.passing import arrived_with_rate
 from tests.truth.rig import measured
 from tests.truth.rig_effects import SensorFault
 from tests.truth.vehicle_effects import CORNERS, NOTHING, TYPICAL, Effects, Law, Push, single
 from tests.truth.vehicle_inputs import (
+    Array,
     Profile,
+    Rails,
     Track,
     measured_rails,
     rough_rails,
@@ -60,6 +64,7 @@ NOISE: Mapping[str, float] = {  # standard deviation of each measured output
     "phi_x3_dot": 0.001,
 }
 INPUTS = tuple(f"u_{c}{end}" for c in CORNERS for end in ("", "_dot"))
+RAILS = ("left", "right")
 FINER = 2  # samples of the true track in one of the record, so that its smooth curve is the one run over
 
 
@@ -73,13 +78,39 @@ def true_run(
     parameters: Vehicle = DECLARED,
     effects: Effects = NOTHING,
 ) -> tuple[Track, Motion]:
-    """Track and true motion of a run at V [m/s] from rest, sampled every dt [s]."""
+    """Track as it is recorded, and true motion of a run at V [m/s] from rest, sampled every dt [s]."""
     fine = np.arange(FINER * round(duration / dt) + 1, dtype=np.float64) * dt / FINER
     spacing = parameters.a1 + parameters.a2
-    track = run_over(profile(rng, V * duration), fine, V, spacing)
+    rails = profile(rng, V * duration)
+    track = run_over(rails, fine, V, spacing)
+    kinked = run_over(with_kinks(rails, effects.more.kinks), fine, V, spacing)
     rows = slice(None, None, FINER)
-    true = simulate(track, parameters, effects, fine[rows])
+    true = simulate(passed(kinked, effects), parameters, effects, fine[rows])
     return Track(fine[rows], track.u[rows], track.u_dot[rows]), true
+
+
+def with_kinks(rails: Rails, kinks: Mapping[str, Kinks]) -> Rails:
+    """Rails with kinks that no record shows, by rail: left, right."""
+
+    def kinked(s: Array) -> tuple[Array, Array]:
+        z, dz = rails(s)
+        for rail, dips in kinks.items():
+            more, slope = dips.heights(s)
+            side = RAILS.index(rail)
+            z[:, side] += more
+            dz[:, side] += slope
+        return z, dz
+
+    return kinked if kinks else rails
+
+
+def passed(track: Track, effects: Effects) -> Track:
+    """What arrives of a track under the wheels, where inputs u_fl ... arrive otherwise than recorded."""
+    u, u_dot = track.u.copy(), track.u_dot.copy()
+    for name, how in effects.more.inputs.items():
+        i = CORNERS.index(name.removeprefix("u_"))
+        u[:, i], u_dot[:, i] = arrived_with_rate(track.t, u[:, i], u_dot[:, i], how)
+    return Track(track.t, u, u_dot)
 
 
 def experiment_toml(

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.truth.more import NO_MORE, More
 from tests.truth.rig_effects import SensorFault
 from tests.truth.vehicle_inputs import Array
 
@@ -66,12 +67,14 @@ class Push:
 class Effects:
     """All that the truth has beyond the declared vehicle; the default is nothing.
 
-    laws by location of SUSPENSIONS, pushes by location of BODIES, faults by output.
+    laws by location of SUSPENSIONS, pushes by location of BODIES, faults by output; more at any location,
+    input or parameter, with kinks under the sides fl, fr, rl, rr.
     """
 
     laws: Mapping[str, Law] = field(default_factory=dict)
     pushes: Mapping[str, Push] = field(default_factory=dict)
     faults: Mapping[str, SensorFault] = field(default_factory=dict)
+    more: More = NO_MORE
 
 
 NOTHING = Effects()

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from tests.truth.laws import ImpactTrain
+from tests.truth.more import At, acting, changed
 from tests.truth.vehicle_effects import CORNERS, NOTHING, SUSPENSIONS, Effects
 from tests.truth.vehicle_inputs import Array, Track
 
 COORDINATES = ("z1", "phi_y1", "phi_x1", "z2", "phi_x2", "z3", "phi_x3")
 MOVED = {"body": 0, "bogie_front": 3, "bogie_rear": 5}  # coordinate on which a push acts
+ELEMENTS = tuple(f"{level}_{c}" for level in ("secondary", "primary") for c in CORNERS)
 LONGEST_STEP = 0.02  # s, so that no dip is stepped over
 
 
@@ -98,9 +101,14 @@ def structure(p: Vehicle) -> Structure:
         E[i, bogie] = -lifted(0.0, side * p.c1)[[0, 2]]
         E[4 + i, bogie] = lifted(0.0, side * p.c2)[[0, 2]]
         R[4 + i, i] = 1.0
+    return Structure(E, R, *strengths(p))
+
+
+def strengths(p: Vehicle) -> tuple[Array, Array, Array]:
+    """Stiffness and damping (8,) of the suspensions, and inertia (7,)."""
     k = np.repeat([p.k1, p.n_primary * p.k2], 4)
     b = np.repeat([p.b1, p.n_primary * p.b2], 4)
-    return Structure(E, R, k, b, np.array([p.m1, p.J_y1, p.J_x1, p.m2, p.J_x2, p.m2, p.J_x2]))
+    return k, b, np.array([p.m1, p.J_y1, p.J_x1, p.m2, p.J_x2, p.m2, p.J_x2])
 
 
 def matrices(p: Vehicle) -> Matrices:
@@ -114,26 +122,51 @@ def elements(location: str) -> list[int]:
     """Numbers of the suspensions at a location; ValueError where it is none."""
     if location not in SUSPENSIONS:
         raise ValueError(f"location {location!r} is not one of {', '.join(SUSPENSIONS)}")
-    names = [f"{level}_{c}" for level in ("secondary", "primary") for c in CORNERS]
-    return [i for i, name in enumerate(names) if name == location or name.startswith(f"{location}_")]
+    return [i for i, name in enumerate(ELEMENTS) if name == location or name.startswith(f"{location}_")]
 
 
-def motion(track: Track, p: Vehicle, e: Effects) -> Callable[[float, Array], Array]:
-    """Right-hand side for x = q, q_dot (14,)."""
-    s, at = structure(p), track.interpolator()
+def places(location: str) -> list[str]:
+    """Single places that a location stands for: suspensions, or a body; ValueError where it is none."""
+    return [location] if location in MOVED else [ELEMENTS[i] for i in elements(location)]
+
+
+def motion_at(x: Array, d: Array, v: Array) -> At:
+    """Displacement and velocity at a body or suspension."""
+
+    def at(place: str) -> tuple[float, float]:
+        if place in MOVED:
+            return float(x[MOVED[place]]), float(x[7 + MOVED[place]])
+        i = ELEMENTS.index(place)
+        return float(d[i]), float(v[i])
+
+    return at
+
+
+def motion(track: Track, declared: Vehicle, e: Effects) -> Callable[[float, Array], Array]:
+    """Right-hand side for x = q, q_dot (14,), memory."""
+    s, rail = structure(declared), track.interpolator()
     laws = [(elements(location), law) for location, law in e.laws.items()]
     pushes = [(MOVED[location], push) for location, push in e.pushes.items()]
+    changes, extra = e.more.changes, acting(e.more, places)
 
     def rates(t: float, x: Array) -> Array:
-        u, u_dot = at(t)
-        d, v = s.E @ x[:7] - s.R @ u, s.E @ x[7:] - s.R @ u_dot
-        force = -s.k * d - s.b * v
+        k, b, inertia = strengths(changed(declared, changes, t)) if changes else (s.k, s.b, s.inertia)
+        u, u_dot = rail(t)
+        d, v = s.E @ x[:7] - s.R @ u, s.E @ x[7:14] - s.R @ u_dot
+        force = -k * d - b * v
         for i, law in laws:
-            force[i] += law.force(t, d[i], v[i], s.k[i], s.b[i])
-        Q = s.E.T @ force
+            force[i] += law.force(t, d[i], v[i], k[i], b[i])
+        push_up = np.zeros(7)
+        at, z = motion_at(x, d, v), x[14:].tolist()
+        for place, more in extra.forces(t, at, z):
+            if place in MOVED:
+                push_up[MOVED[place]] += more
+            else:
+                force[ELEMENTS.index(place)] += more
+        Q = s.E.T @ force + push_up
         for j, push in pushes:
             Q[j] += push.force(t)
-        return np.concatenate([x[7:], Q / s.inertia])
+        return np.concatenate([x[7:14], Q / inertia, extra.rates(t, at, z)])
 
     return rates
 
@@ -150,22 +183,25 @@ def simulate(
     x0: q, q_dot at the first sample of the track, at rest if not given.
     Raises ValueError where the integration fails.
     """
-    rates = motion(track, parameters, effects)
     start = np.zeros(14) if x0 is None else np.asarray(x0, dtype=np.float64)
+    rates, s = motion(track, parameters, effects), structure(parameters)
+    d, v = s.E @ start[:7] - s.R @ track.u[0], s.E @ start[7:] - s.R @ track.u_dot[0]
+    memory = acting(effects.more, places).rest(motion_at(start, d, v))
     t = track.t if times is None else times
     span = (float(track.t[0]), float(track.t[-1]))
+    hit = [law.width / 4 for _, law in effects.more.laws if isinstance(law, ImpactTrain)]
     solution = solve_ivp(
         rates,
         span,
-        start,
+        np.concatenate([start, memory]),
         method="LSODA",
         t_eval=np.clip(t, *span),
         rtol=1e-8,
         atol=1e-10,
-        max_step=LONGEST_STEP,
+        max_step=min([LONGEST_STEP, *hit]),
     )
     if not solution.success:
         raise ValueError(f"track: integration stopped at {solution.t[-1]:g} s: {solution.message}")
     x = solution.y.T
     dot = np.array([rates(now, row) for now, row in zip(t, x, strict=True)])
-    return Motion(t, x[:, :7], x[:, 7:], dot[:, 7:])
+    return Motion(t, x[:, :7], x[:, 7:14], dot[:, 7:14])

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.truth.passing import NOT_CHANGED, arrived_with_rate
 from tests.truth.rig import measured
 from tests.truth.rig_effects import SensorFault
 from tests.truth.wheelset_effects import NOTHING, TYPICAL, Effects, single
@@ -52,10 +53,26 @@ def true_run(
     form: Form = SAME,
     **irregularity: float,
 ) -> tuple[Run, Array]:
-    """Track and true states (n, 6) of a run at V [m/s] from rest; irregularity: see random_alignment."""
+    """Track as it is recorded, and true states (n, 6) of a run at V [m/s] from rest.
+
+    irregularity: see random_alignment.
+    """
     t: Array = np.arange(round(duration / dt) + 1, dtype=np.float64) * dt
     run = random_alignment(rng, t, V, **irregularity)
-    return run, simulate(run, parameters, effects, form)
+    return run, simulate(passed(run, effects), parameters, effects, form)
+
+
+def passed(run: Run, effects: Effects) -> Run:
+    """What arrives of a run, where speed or alignment arrive otherwise than recorded, and hidden kinks."""
+    more = effects.more
+    V = run.V * (1 + more.inputs.get("V", NOT_CHANGED).gain)
+    times = np.linspace(run.t[0], run.t[-1], len(run.y_irr))
+    how = more.inputs.get("y_irr", NOT_CHANGED)
+    y, y_dot = arrived_with_rate(times, run.y_irr, run.y_irr_dot, how)
+    for kinks in more.kinks.values():
+        aside, slope = kinks.heights(run.V * times)
+        y, y_dot = y + aside, y_dot + run.V * slope
+    return Run(V, run.t, y, y_dot)
 
 
 def experiment_toml(

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tests.truth.more import NO_MORE, Change, More
 from tests.truth.rig_effects import SensorFault
 from tests.truth.vehicle_effects import Law, Push
 
@@ -25,20 +26,12 @@ CONDITIONS: Mapping[str, tuple[float, ...]] = {  # thesis Table 4.1, in the orde
 
 
 @dataclass(frozen=True)
-class Change:
-    """Change of one friction parameter: delta from t0 [s] on, and rate [1/s] since the start."""
-
-    delta: float = 0.0
-    t0: float = 0.0
-    rate: float = 0.0
-
-
-@dataclass(frozen=True)
 class Effects:
     """All that the truth has beyond the declared wheelset; the default is nothing.
 
     laws by location of SUSPENSIONS, pushes by location of BODIES, changes by name of FRICTION, faults by
-    output; condition: name of CONDITIONS that holds from condition_time [s] on.
+    output; condition: name of CONDITIONS that holds from condition_time [s] on; more at any location, input
+    or parameter, with kinks of the alignment.
     """
 
     laws: Mapping[str, Law] = field(default_factory=dict)
@@ -47,6 +40,7 @@ class Effects:
     faults: Mapping[str, SensorFault] = field(default_factory=dict)
     condition: str = ""
     condition_time: float = 0.0  # s
+    more: More = NO_MORE
 
     def friction(e, t: float, declared: tuple[float, ...]) -> tuple[float, ...]:
         """mu0, A, B, k_A, k_S at time t [s], from the declared ones."""
@@ -55,8 +49,7 @@ class Effects:
             values = CONDITIONS[e.condition]
         for name, change in e.changes.items():
             i = FRICTION.index(name)
-            more = change.rate * t + (change.delta if t >= change.t0 else 0.0)
-            values = (*values[:i], max(values[i] + more, 1e-3), *values[i + 1 :])
+            values = (*values[:i], max(values[i] + change.at(t), 1e-3), *values[i + 1 :])
         return values
 
 

@@ -15,13 +15,23 @@ from math import atan, cos, exp, hypot, pi, sin, sqrt
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from tests.truth.more import At, acting, changed
 from tests.truth.wheelset_contact import LAMBDA, LOAD, Array, G, contacts, kalker
 from tests.truth.wheelset_effects import NOTHING, Effects
 from tests.truth.wheelset_track import Run
 
-FINE = 1e-5  # m between rows of the tables
-COORDINATES = ("y", "psi", "y_dot", "psi_dot", "y_m", "y_m_dot")
 Row = tuple[float, ...]
+
+FINE = 1e-5  # m between rows of the tables
+PULLS: Mapping[str, Row] = {  # what a force at a place does to y, psi and y_m
+    "wheelset_lateral": (1.0, 0.0, 0.0),
+    "wheelset_yaw": (0.0, 1.0, 0.0),
+    "primary_lateral": (1.0, 0.0, -1.0),
+    "primary_yaw": (0.0, 1.0, 0.0),
+    "suspended_mass": (0.0, 0.0, 1.0),
+    "contact": (1.0, 0.0, 0.0),
+}
+COORDINATES = ("y", "psi", "y_dot", "psi_dot", "y_m", "y_m_dot")
 
 
 @dataclass(frozen=True)
@@ -149,18 +159,38 @@ def contact_forces(
     return F, M, phi_dot
 
 
-def rates(p: Wheelset, e: Effects, form: Form, V: float) -> Callable[[float, float, float, Row], Row]:
-    """Right-hand side (t, y_irr, y_irr_dot, x) -> x_dot for x in the order of COORDINATES."""
-    declared = (p.mu0, p.A, p.B, p.k_A, p.k_S)
+def places(location: str) -> tuple[str, ...]:
+    """Places of a location: itself; ValueError where it is none of the wheelset's."""
+    if location not in PULLS:
+        raise ValueError(f"location {location!r} is not one of {', '.join(PULLS)}")
+    return (location,)
+
+
+def motion_at(x: Row, y_irr: float, y_irr_dot: float) -> At:
+    """Displacement and velocity at each place."""
+    y, psi, y_dot, psi_dot, y_m, y_m_dot = x[:6]
+    known = {
+        "wheelset_lateral": (y, y_dot),
+        "primary_lateral": (y - y_m, y_dot - y_m_dot),
+        "suspended_mass": (y_m, y_m_dot),
+        "contact": (y - y_irr, y_dot - y_irr_dot),
+    }
+    return lambda place: known.get(place, (psi, psi_dot))
+
+
+def rates(declared: Wheelset, e: Effects, form: Form, V: float) -> Callable[[float, float, float, Row], Row]:
+    """Right-hand side (t, y_irr, y_irr_dot, x) -> x_dot for x in the order of COORDINATES, then memory."""
     lateral, yaw = e.laws.get("primary_lateral"), e.laws.get("primary_yaw")
-    on_wheelset, on_mass = e.pushes.get("wheelset_lateral"), e.pushes.get("suspended_mass")
-    k, b = 2 * p.k_y, 2 * p.b_y
-    k_yaw, b_yaw = 2 * p.d**2 * p.k_x, 2 * p.d**2 * p.b_x
+    on_wheelset, on_suspended = e.pushes.get("wheelset_lateral"), e.pushes.get("suspended_mass")
+    changes, extra = e.more.changes, acting(e.more, places)
 
     def dot(t: float, y_irr: float, y_irr_dot: float, x: Row) -> Row:
-        y, psi, y_dot, psi_dot, y_m, y_m_dot = x
+        p = changed(declared, changes, t)
+        k, b = 2 * p.k_y, 2 * p.b_y
+        k_yaw, b_yaw = 2 * p.d**2 * p.k_x, 2 * p.d**2 * p.b_x
+        y, psi, y_dot, psi_dot, y_m, y_m_dot = x[:6]
         d, v = y - y_m, y_dot - y_m_dot
-        friction = e.friction(t, declared)
+        friction = e.friction(t, (p.mu0, p.A, p.B, p.k_A, p.k_S))
         F, M, phi_dot = contact_forces(
             p, form, friction, V, (y - y_irr, y_dot - y_irr_dot, psi, y_dot, psi_dot)
         )
@@ -171,8 +201,13 @@ def rates(p: Wheelset, e: Effects, form: Form, V: float) -> Callable[[float, flo
         if yaw:
             M += float(yaw.force(t, psi, psi_dot, k_yaw, b_yaw))  # type: ignore[arg-type]
         pushed = on_wheelset.force(t) if on_wheelset else 0.0
-        mass = on_mass.force(t) if on_mass else 0.0
-        return y_dot, psi_dot, (F + spring + pushed) / p.m_w, M / p.I_wz, y_m_dot, (mass - spring) / p.m_m
+        mass = on_suspended.force(t) if on_suspended else 0.0
+        at, z = motion_at(x, y_irr, y_irr_dot), x[6:]
+        for place, force in extra.forces(t, at, z):
+            on_y, on_psi, on_mass = PULLS[place]
+            pushed, M, mass = pushed + on_y * force, M + on_psi * force, mass + on_mass * force
+        own = y_dot, psi_dot, (F + spring + pushed) / p.m_w, M / p.I_wz, y_m_dot, (mass - spring) / p.m_m
+        return *own, *extra.rates(t, at, z)
 
     return dot
 
@@ -188,9 +223,10 @@ def simulate(
 
     start: states that are not zero at first. Raises ValueError where the wheelset runs off its table.
     """
+    x: Row = tuple((start or {}).get(name, 0.0) for name in COORDINATES)
     dot, h = rates(parameters, effects, form, run.V), float(run.t[1] - run.t[0])
     y, y_dot = run.y_irr.tolist(), run.y_irr_dot.tolist()  # at each sample and in the middle
-    x: Row = tuple((start or {}).get(name, 0.0) for name in COORDINATES)
+    x = (*x, *acting(effects.more, places).rest(motion_at(x, y[0], y_dot[0])))
     found = [x]
     for i, t in enumerate(run.t[:-1].tolist()):
         first, middle, last = ((y[j], y_dot[j]) for j in (2 * i, 2 * i + 1, 2 * i + 2))
@@ -200,7 +236,7 @@ def simulate(
         k4 = dot(t + h, *last, moved(x, h, k3))
         x = tuple(v + h / 6 * (a + 2 * (b + c) + d) for v, a, b, c, d in zip(x, k1, k2, k3, k4, strict=True))
         found.append(x)
-    states = np.array(found)
+    states = np.array(found)[:, : len(COORDINATES)]
     if not np.isfinite(states).all():
         raise ValueError("run: the motion diverges")
     return states
