@@ -10,10 +10,12 @@ from estimator.closeloop.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, hypotheses, ranked
 from estimator.closeloop.detect import Detection, detect
 from estimator.closeloop.missing_force import MissingForce, missing_forces
+from estimator.closeloop.moments import at_their_moments
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, changes, screen
+from estimator.closeloop.screen import Promise, Screening, screen
+from estimator.closeloop.twins import twins, with_twins
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
 
@@ -59,7 +61,8 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     candidates += fault_candidates(problem.record, noise)
     tell(f"screening {len(candidates)} candidates by their effect on the linearised FMU")
-    change = list(zip(candidates, changes(problem, base.fit, candidates, size, forces), strict=True))
+    screening = Screening(problem, base.fit, size, forces)
+    change = list(zip(candidates, screening.changes(candidates), strict=True))
     promises = screen(base.fit, [((c,), g) for c, g in change])
     tell("testing for a discrepancy against simulated records without one")
     detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
@@ -67,6 +70,9 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early)
+    alike = twins(change)
+    doubled = {label for others in alike.values() for label in others}
+    promises = [p for p in at_their_moments(screening, base.fit, promises, LEADING) if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, chosen, size, jobs)
@@ -74,8 +80,10 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     floor_known = not np.isnan(problem.record.noise_std).any()
     if not (floor_known and any(explains(problem, h, base, noise, size) for h in singles)):
         tell("trying pairs of effects")
-        pairs, freed = try_pairs(problem, base, singles, change, size, jobs)
+        single = [(c, g) for c, g in change if c.label not in doubled]
+        pairs, freed = try_pairs(problem, base, singles, single, size, jobs)
         singles = best_by_label([*singles, *freed])
+    singles = with_twins(singles, alike)
     singles, pairs = (ranked(problem, h, size) for h in (singles, pairs))
     judgement = judge(problem, base, singles, pairs, noise, size)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement)

@@ -8,7 +8,7 @@ import numpy as np
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import LONG, Hypothesis, fitted, hypotheses
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, built, changes, screen
+from estimator.closeloop.screen import Promise, Screening, built, screen
 from estimator.record import Array
 
 PARTNERS = 12  # leading candidates among which pairs are screened
@@ -62,7 +62,7 @@ def _partners(
 ) -> list[Promise]:
     others = [c for c in candidates if c.label != best.label]
     here = built(problem, best.candidates)
-    change = changes(here, best.fit, others, size)
+    change = Screening(here, best.fit, size).changes(others)
     promises = screen(best.fit, [((c,), g) for c, g in zip(others, change, strict=True)])[:PROMISES]
     return [
         Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in promises

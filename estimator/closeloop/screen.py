@@ -8,13 +8,14 @@ the joint fit decides.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.levers import Course, names_of, shifts
-from estimator.closeloop.linear import linearise, responses, shows_its_state
+from estimator.closeloop.linear import Linearised, linearise, responses, shows_its_state
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import faulty
@@ -23,6 +24,8 @@ from fmus.effects.site import SPEED
 from fmus.export.outside import Around, around
 
 NOTHING = 1e-9  # of a regressor left after projection: it says nothing new
+ALIKE = 1e-2  # of the singular values of a candidate's regressors: below it they are shared out evenly
+TRUSTED = 5.0  # scales from which a linear answer is not trusted further
 TOGETHER = 128  # changes whose responses are worked out at once
 
 
@@ -56,6 +59,91 @@ def built(problem: Problem, candidates: Sequence[Candidate]) -> Problem:
     return replace(here, declared={**problem.declared, **fixed})
 
 
+class Screening:
+    """Works out what candidates would change; the FMU is run and linearised when first asked for.
+
+    size: (n_y,) of a residual that counts as one. forces: at each port, with the motion there that it
+    makes; a law is worked out along that motion, since the FMU without the law may move quite differently.
+    """
+
+    def __init__(self, problem: Problem, base: Fit, size: Array, forces: Sequence[MissingForce] = ()) -> None:
+        self.problem, self.theta, self.size, self.forces = problem, base.theta, size, forces
+        self._made: dict[str, Around] = {}
+        self._local: tuple[list[str], Linearised] | None = None
+
+    def changes(self, candidates: Sequence[Candidate]) -> list[Array]:
+        """Change of the weighted residual by each candidate's amplitudes at their scales, (m, k) each."""
+        physical = [c for c in candidates if not c.is_fault]
+        moved = {c: self._moved(c) for c in physical}
+        columns = iter(self._answers([change for c in physical for change in moved[c]]))
+        own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
+        own |= _faults(self.problem, self.theta, [c for c in candidates if c.is_fault], self.size)
+        return [own[c] for c in candidates]
+
+    @property
+    def length(self) -> float:
+        """Of the run that is fitted, s."""
+        return float(self._free.t[-1])
+
+    def _moved(self, c: Candidate) -> list[dict[str, Array]]:
+        """What each amplitude of a candidate changes of what the FMU is given."""
+        if c.label not in self._made:
+            self._made[c.label] = around(self.problem.builder.outside(), [(c.kind, c.location)])
+        course = self._courses.get(c.location, self._free)
+        return [shifts(self._made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
+
+    @cached_property
+    def _free(self) -> Course:
+        """The free run of the first run of the record, up to its last sample that is fitted."""
+        problem, theta = self.problem, self.theta
+        description = problem.builder.outside().description
+        names = [*description.inputs, *description.parameters]
+        plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
+        motion = [name for p in problem.ports for name in (p.displacement, p.velocity)]
+        [full, *_] = problem.simulate(theta, motion)
+        known = plant.fmu.description.variables
+        start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
+        columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
+        given = [columns.get(n, np.full(last, start[n])) for n in names]
+        t = run.t[:last] - run.t[0]
+        speed = columns.get(SPEED, np.zeros(last))
+        way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
+        return Course(t, full[:last, len(plant.outputs) :], np.column_stack(given), way)
+
+    @cached_property
+    def _courses(self) -> dict[str, Course]:
+        """For each port the course with the motion that its missing force makes."""
+        return {m.port.name: _along(self._free, m) for m in self.forces if m.motion is not None}
+
+    @cached_property
+    def _states(self) -> Array | None:
+        """States of the free run (n, n_x); None where the FMU does not show all of them."""
+        plant = self.problem.plant
+        [full, *_] = self.problem.simulate(self.theta, plant.states)
+        x: Array = full[: _last(self.problem), len(plant.outputs) :]
+        return x if shows_its_state(self.problem, self.theta, x) else None
+
+    def _answers(self, moved: Sequence[Mapping[str, Array]]) -> list[Array]:
+        """Change of the weighted residual on the identify part by each change of levers, (m,) each."""
+        problem, last = self.problem, _last(self.problem)
+        if not moved:
+            return []
+        if self._states is None:
+            return [_simulated(problem, self.theta, change, self.size) for change in moved]
+        levers, local = self._linearised(names_of(moved), self._states)
+        fit = problem.record.runs[0].fit[:last]
+        found: list[Array] = []
+        for i in range(0, len(moved), TOGETHER):
+            y = responses(local, levers, moved[i : i + TOGETHER], last)[fit]
+            found += list(-(y / self.size[:, None]).reshape(-1, y.shape[2]).T)
+        return found
+
+    def _linearised(self, levers: list[str], x: Array) -> tuple[list[str], Linearised]:
+        if self._local is None or not set(levers) <= set(self._local[0]):
+            self._local = levers, linearise(self.problem, self.theta, x, np.arange(len(x)), levers)
+        return self._local
+
+
 def changes(
     problem: Problem,
     base: Fit,
@@ -63,58 +151,8 @@ def changes(
     size: Array,
     forces: Sequence[MissingForce] = (),
 ) -> list[Array]:
-    """Change of the weighted residual by each candidate's amplitudes at their scales, (m, k) each.
-
-    forces: at each port, with the motion there that it makes; a law is worked out along that motion, since
-    the FMU without the law may move quite differently.
-    """
-    physical = [c for c in candidates if not c.is_fault]
-    moved = _moved(problem, base.theta, physical, forces)
-    flat = [change for c in physical for change in moved[c]]
-    columns = iter(_answers(problem, base.theta, flat, size))
-    own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
-    own |= _faults(problem, base.theta, [c for c in candidates if c.is_fault], size)
-    return [own[c] for c in candidates]
-
-
-def _moved(
-    problem: Problem,
-    theta: Mapping[str, float],
-    candidates: Sequence[Candidate],
-    forces: Sequence[MissingForce],
-) -> dict[Candidate, list[dict[str, Array]]]:
-    """What each amplitude of each candidate changes of what the FMU is given."""
-    if not candidates:
-        return {}
-    site = problem.builder.outside()
-    free = _course(problem, theta, [*site.description.inputs, *site.description.parameters])
-    courses = {m.port.name: _along(free, m) for m in forces if m.motion is not None}
-    made: dict[str, Around] = {}
-    found: dict[Candidate, list[dict[str, Array]]] = {}
-    for c in candidates:
-        if c.label not in made:
-            made[c.label] = around(problem.builder.outside(), [(c.kind, c.location)])
-        course = courses.get(c.location, free)
-        found[c] = [shifts(made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
-    return found
-
-
-def _course(problem: Problem, theta: Mapping[str, float], names: Sequence[str]) -> Course:
-    """The free run of the first run of the record, up to its last sample that is fitted.
-
-    names: inputs and parameters of the FMU, in this order.
-    """
-    plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
-    motion = [name for p in problem.ports for name in (p.displacement, p.velocity)]
-    [full, *_] = problem.simulate(theta, motion)
-    known = plant.fmu.description.variables
-    start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
-    columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
-    given = [columns.get(n, np.full(last, start[n])) for n in names]
-    t = run.t[:last] - run.t[0]
-    speed = columns.get(SPEED, np.zeros(last))
-    way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
-    return Course(t, full[:last, len(plant.outputs) :], np.column_stack(given), way)
+    """What `Screening.changes` gives, once."""
+    return Screening(problem, base, size, forces).changes(candidates)
 
 
 def _along(free: Course, missing: MissingForce) -> Course:
@@ -126,27 +164,6 @@ def _along(free: Course, missing: MissingForce) -> Course:
 
 def _last(problem: Problem) -> int:
     return int(np.flatnonzero(problem.record.runs[0].fit)[-1]) + 1
-
-
-def _answers(
-    problem: Problem, theta: Mapping[str, float], moved: Sequence[Mapping[str, Array]], size: Array
-) -> list[Array]:
-    """Change of the weighted residual on the identify part by each change of levers, (m,) each."""
-    if not moved:
-        return []
-    plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
-    fit = run.fit[:last]
-    [full, *_] = problem.simulate(theta, plant.states)
-    x = full[:last, len(plant.outputs) :]
-    if not shows_its_state(problem, theta, x):
-        return [_simulated(problem, theta, change, size) for change in moved]
-    levers = names_of(moved)
-    local = linearise(problem, theta, x, np.arange(last), levers)
-    found: list[Array] = []
-    for i in range(0, len(moved), TOGETHER):
-        y = responses(local, levers, moved[i : i + TOGETHER], last)[fit]
-        found += list(-(y / size[:, None]).reshape(-1, y.shape[2]).T)
-    return found
 
 
 def _simulated(
@@ -197,15 +214,17 @@ def _promise(base: Fit, basis: Array, candidates: tuple[Candidate, ...], raw: Ar
     size, left = np.linalg.norm(raw, axis=0) + 1e-300, np.linalg.norm(g, axis=0)
     usable = left > NOTHING * size
     beta = np.zeros(len(amplitudes))
-    beta[usable] = np.linalg.lstsq(g[:, usable] / size[usable], -r, rcond=NOTHING)[0] / size[usable]
+    beta[usable] = np.linalg.lstsq(g[:, usable] / size[usable], -r, rcond=ALIKE)[0] / size[usable]
     low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
     beta = np.clip(beta, low, high)
     gain = float(r @ r - np.sum((r + g @ beta) ** 2))
+    beta = np.clip(beta, -TRUSTED, TRUSTED)
     start = {u.name: float(b * u.scale) for u, b in zip(amplitudes, beta, strict=True)}
     start |= {u.name: u.start for c in candidates for u in c.shape}
     if len(base.values):
         shift = np.linalg.lstsq(base.jacobian, -(base.residual + raw @ beta), rcond=None)[0]
         low, high = (np.array([getattr(u, side) for u in base.unknowns]) for side in ("low", "high"))
-        moved = np.clip(base.values + shift, low, high)
+        trusted = TRUSTED * np.array([u.scale for u in base.unknowns])
+        moved = np.clip(base.values + np.clip(shift, -trusted, trusted), low, high)
         start |= {u.name: float(v) for u, v in zip(base.unknowns, moved, strict=True)}
     return Promise(candidates, gain, start)

@@ -28,7 +28,7 @@ class Smoothed:
 def smooth(local: Linearised, residual: Array, noise: Array, dt: Array) -> Smoothed:
     """The force at each lever alone that explains a residual (N, n_y), of noise (n_y,), steps dt (N-1,).
 
-    Rauch, Tung and Striebel's smoother; of several random walks the one that makes the residual most likely.
+    Of several random walks the one that makes the residual most likely.
     """
     guess = _first_guess(local, residual, dt)
     alone = np.arange(len(guess))[:, None]
@@ -77,43 +77,61 @@ class _Filter:
         self.A[:, :, :n, n:] = np.moveaxis(local.B[:, :, groups], 2, 1)
         self.C = np.zeros((points, n_g, residual.shape[1], n + r))
         self.C[:, :, :, :n], self.C[:, :, :, n:] = local.C[:, None], np.moveaxis(local.D[:, :, groups], 2, 1)
-        self.x = self.x_before = np.empty((0, n_g, n + r))
-        self.P = self.P_before = np.empty((0, n_g, n + r, n + r))
+        self.x, self.P = np.empty((0, n_g, n + r)), np.empty((0, n_g, n + r, n + r))
+        self.score, self.weight, self.rest = self.x, self.P, self.P  # see `run`
 
     def run(self, keep: bool) -> Array:
-        """Filter; log likelihood of each group, (n_g,)."""
+        """Filter; log likelihood of each group, (n_g,).
+
+        keep: for the way back the states and covariances after each sample, C' S⁻¹ e (score), C' S⁻¹ C
+        (weight) and I - K C (rest).
+        """
         steps, (n_g, m) = len(self.residual), self.Q.shape[:2]
         x, P, likelihood = np.zeros((n_g, m)), self.Q.copy(), np.zeros(n_g)
         if keep:
-            self.x, self.x_before = np.empty((steps, n_g, m)), np.empty((steps, n_g, m))
-            self.P, self.P_before = np.empty((steps, n_g, m, m)), np.empty((steps, n_g, m, m))
+            self.x, self.score = np.empty((steps, n_g, m)), np.empty((steps, n_g, m))
+            self.P, self.weight, self.rest = (np.empty((steps, n_g, m, m)) for _ in range(3))
         for k in range(steps):
+            C = self.C[self.near[k]]
+            Ct = np.swapaxes(C, 1, 2)
+            PC = P @ Ct
+            S = C @ PC + self.R
+            e = self.residual[k] - (C @ x[..., None])[..., 0]
+            solved = np.linalg.solve(S, np.concatenate([e[..., None], np.swapaxes(PC, 1, 2)], axis=2))
+            likelihood -= 0.5 * (np.sum(e * solved[..., 0], axis=1) + np.linalg.slogdet(S)[1])
+            K = np.swapaxes(solved[..., 1:], 1, 2)
+            rest = np.eye(m) - K @ C
+            x = x + (K @ e[..., None])[..., 0]
+            P = rest @ P @ np.swapaxes(rest, 1, 2) + K @ self.R @ np.swapaxes(K, 1, 2)  # Joseph's form
             if keep:
-                self.x_before[k], self.P_before[k] = x, P
-            H = self.C[self.near[k]]
-            PH = P @ np.swapaxes(H, 1, 2)
-            S = H @ PH + self.R
-            e = self.residual[k] - (H @ x[..., None])[..., 0]
-            weight = np.linalg.solve(S, np.concatenate([e[..., None], np.swapaxes(PH, 1, 2)], axis=2))
-            likelihood -= 0.5 * (np.sum(e * weight[..., 0], axis=1) + np.linalg.slogdet(S)[1])
-            x = x + (PH @ weight[..., :1])[..., 0]
-            P = P - PH @ weight[..., 1:]
-            if keep:
-                self.x[k], self.P[k] = x, P
+                self.x[k], self.P[k], self.rest[k] = x, P, rest
+                self.score[k] = (Ct @ solved[..., :1])[..., 0]
+                self.weight[k] = Ct @ np.linalg.solve(S, C)
             if k < steps - 1:
                 F = self.A[self.near[k]]
                 x, P = (F @ x[..., None])[..., 0], F @ P @ np.swapaxes(F, 1, 2) + self.Q * self.dt[k]
-                P = (P + np.swapaxes(P, 1, 2)) / 2
         return likelihood
 
     def smoothed(self) -> tuple[Array, Array, Array]:
-        """States (n_g, N, n), forces and their standard deviations (n_g, N, r)."""
+        """States (n_g, N, n), forces and their standard deviations (n_g, N, r).
+
+        Bryson and Frazier's way back, which inverts no covariance (Bierman 1973).
+        """
         self.run(keep=True)
-        x, P, n = self.x.copy(), self.P.copy(), self.n
-        for k in range(len(x) - 2, -1, -1):
-            across = self.P[k] @ np.swapaxes(self.A[self.near[k]], 1, 2)
-            G = across @ np.linalg.pinv(self.P_before[k + 1], hermitian=True)
-            x[k] += (G @ (x[k + 1] - self.x_before[k + 1])[..., None])[..., 0]
-            P[k] += G @ (P[k + 1] - self.P_before[k + 1]) @ np.swapaxes(G, 1, 2)
-        std = np.sqrt(np.maximum(np.diagonal(P, axis1=2, axis2=3)[..., n:], 0))
+        n, last = self.n, len(self.x) - 1
+        x, variance = self.x.copy(), np.empty((*self.x.shape[:2], self.x.shape[2] - n))
+        adjoint, information = np.zeros_like(x[0]), np.zeros_like(self.P[0])
+        for k in range(last, -1, -1):
+            if k < last:
+                F = self.A[self.near[k]]
+                Ft = np.swapaxes(F, 1, 2)
+                adjoint, information = (Ft @ adjoint[..., None])[..., 0], Ft @ information @ F
+            P = self.P[k]
+            x[k] += (P @ adjoint[..., None])[..., 0]
+            gained = P[..., n:, :] @ information @ P[..., :, n:]
+            variance[k] = np.diagonal(P[..., n:, n:] - gained, axis1=1, axis2=2)
+            back = np.swapaxes(self.rest[k], 1, 2)
+            adjoint = self.score[k] + (back @ adjoint[..., None])[..., 0]
+            information = self.weight[k] + back @ information @ self.rest[k]
+        std = np.sqrt(np.maximum(variance, 0))
         return np.swapaxes(x[..., :n], 0, 1), np.swapaxes(x[..., n:], 0, 1), np.swapaxes(std, 0, 1)
