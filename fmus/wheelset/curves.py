@@ -13,12 +13,14 @@ import numpy as np
 from fmus.contact.arguments import Array
 from fmus.contact.normal import hertz, virtual_penetration
 from fmus.contact.table import SEARCHES, contact_table
+from fmus.variables import Expr
 from fmus.wheelset.track import Track
 
 G, NU, LOAD = 8e10, 0.28, 55e3  # Pa, 1, N: the patches are tabulated for these and scale from here
 E = 2 * G * (1 + NU)
 SPACING = 5e-5  # m between tabulated shifts
 CUBIC = 3
+EVEN = {"lookup_mode": ["exact"]}  # of evenly spaced knots: the place is computed, not searched
 FIELDS = ("growth", "delta", "lift", "a_hertz", "b_hertz", "a_virtual", "b_virtual", "lift_slope")
 
 
@@ -42,9 +44,13 @@ def _curves(track: Track, search: str) -> cs.Function:
     knots = shifts[0] + SPACING * np.arange(-3, len(shifts) + 3)
     q = cs.MX.sym("q")
     inside = cs.fmin(cs.fmax(q, shifts[0]), shifts[-1])
-    spline = cs.bspline(inside, cs.DM(rows.ravel()), [list(knots)], [CUBIC], rows.shape[1], {})
-    slope = cs.jacobian(spline[FIELDS.index("lift")], q)
-    return cs.Function(search, [q], [cs.vertcat(spline, slope)], ["shift"], ["contact"])
+
+    def spline(columns: Array) -> Expr:
+        return cs.bspline(inside, cs.DM(columns.ravel()), [list(knots)], [CUBIC], columns.shape[1], EVEN)
+
+    lift = FIELDS.index("lift")
+    slope = cs.jacobian(spline(rows[:, lift : lift + 1]), q)  # of it alone, not of all columns
+    return cs.Function(search, [q], [cs.vertcat(spline(rows), slope)], ["shift"], ["contact"])
 
 
 def _spline_coefficients(rows: Array) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -48,6 +48,17 @@ class Wheel(NamedTuple):
     delta: Expr
     a: Expr
     b: Expr
+
+
+@cache
+def patch_scale() -> cs.Function:
+    """Function (load N, shear modulus Pa, Poisson's ratio) -> size of a patch over the tabulated one.
+
+    It grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu).
+    """
+    load, shear, nu = cs.SX.sym("load"), cs.SX.sym("shear"), cs.SX.sym("nu")
+    scale = (load / LOAD * (G / (1 - NU)) / (shear / (1 - nu))) ** (1 / 3)
+    return cs.Function("patch_scale", [load, shear, nu], [scale], ["load", "G", "nu"], ["scale"])
 
 
 class Wheelset(Model):
@@ -231,6 +242,12 @@ class Wheelset(Model):
         return phi, (left["lift_slope"] + right["lift_slope"]) * rate_of_shift / base
 
     @cached_property
+    def _scale(m) -> Expr:
+        """Size of the patches over the table's; called, as otherwise each use would work it out anew."""
+        (scale,) = m.call(patch_scale(), m.F_n, m.G, m.nu)
+        return scale
+
+    @cached_property
     def _wheels(m) -> dict[str, Wheel]:
         return {side: m._wheel(side, sign) for side, sign in SIDES.items()}
 
@@ -243,11 +260,9 @@ class Wheelset(Model):
         xi_x = (m.V * (1 - r / m.r0) - sign * m.s * m.psi_dot) / V
         xi_y = (m.y_dot + r * phi_dot - m.V * m.psi) / V
         xi_s = (m.psi_dot - sign * m.V / m.r0 * delta) / V
-        # a patch grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu)
-        scale = (m.F_n / LOAD * (G / (1 - NU)) / (m.G / (1 - m.nu))) ** (1 / 3)
         virtual = m.patch > 0.5
         a, b = (
-            scale * k * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"])
+            m._scale * k * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"])
             for x, k in (("a", m.k_a), ("b", m.k_b))
         )
         mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2 + S_MIN**2), m.mu0, m.A, m.B)
@@ -263,7 +278,12 @@ class Wheelset(Model):
         c11, c22, c23, c33 = m.call(looked_up(), a / b, m.nu)
         kalker = (c11, c22, m.k_spin * c23, m.k_spin * c33)
         area = m.G * a * b
-        given = (m.f11 / area, m.f22 / area, m.f23 / area**1.5 * m.G**0.5, m.f33 / area**2 * m.G)
+        given = (
+            m.f11 / area,
+            m.f22 / area,
+            m.f23 / (area * cs.sqrt(area)) * cs.sqrt(m.G),
+            m.f33 / area**2 * m.G,
+        )
         linear = m.creep_law < 0.5
         return [
             cs.if_else(cs.logic_and(linear, own > 0), own, table)

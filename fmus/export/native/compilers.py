@@ -10,8 +10,10 @@ from pathlib import Path
 
 from fmus.errors import BadInput, did_you_mean
 
-# no fused multiply-add, so that every build rounds alike; -s leaves symbols of the debugger out
-STRICT = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-fPIC")
+# no fused multiply-add, so that every build rounds alike; without errno a root is one instruction, of the
+# same value; -s leaves symbols of the debugger out
+NUMBERS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
+STRICT = (*NUMBERS, "-fvisibility=hidden", "-shared", "-fPIC")
 # nothing but the FMI functions has a name outside, and those have no prefix in a shared library
 DEFINED = tuple(f"-DFMI{n}_OVERRIDE_FUNCTION_PREFIX" for n in (2, 3))
 
