@@ -9,33 +9,40 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from estimator.closeloop.chain import Outcome
+from estimator.closeloop.freeform import curve_of
+from estimator.closeloop.honesty import Honesty
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import KINDS
 from fmus.host.archive import describe
 from scenarios.figures.channels import record_plots, residual_plots, spectrum_plots
 from scenarios.figures.errors import error_plot
 from scenarios.figures.forces import OTHERS, force_plots, laws_found
+from scenarios.figures.free_form import free_form_plot
 from scenarios.figures.headline import headline_plot
 from scenarios.figures.sheet import Plot
 from scenarios.page import error_table, sections
 from scenarios.page.case import Case
 from scenarios.page.glossary import effect_words, glossary, hypothesis_words
-from scenarios.page.rejected import best_wrong, detection_words, rejected, tried
+from scenarios.page.power_table import power_rows
+from scenarios.page.rejected import chance_words, detection_words, rejected, tried
 from scenarios.page.typography import number, unit
 from scenarios.page.wording import missed_words, story
-from scenarios.result import Result
+from scenarios.result import Result, best_wrong
 
 HERE = Path(__file__).parent
 ROWS = 15  # of the table of rejected hypotheses
 Values = dict[str, Any]
 
 
-def write_report(folder: Path, problem: Problem, found: Outcome, result: Result) -> None:
+def write_report(
+    folder: Path, problem: Problem, found: Outcome, result: Result, honesty: Honesty | None = None
+) -> None:
     """Write report.html and the figures into a folder.
 
     The page holds its figures and its style and asks for nothing else.
     """
-    case = Case(problem, found, result, glossary(problem, found.judgement.members))
+    free = (honesty.free_form,) if honesty and honesty.free_form else ()
+    case = Case(problem, found, result, glossary(problem, (*found.judgement.members, *free)), honesty)
     env = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -54,19 +61,22 @@ def write_report(folder: Path, problem: Problem, found: Outcome, result: Result)
 
 def _figures(case: Case, folder: Path) -> Values:
     """Draw all figures, write them, and embed them."""
-    problem, found, words = case.problem, case.found, case.words
+    problem, found, words, free = case.problem, case.found, case.words, case.free_form
+
+    errors = error_table.error_values(case)
 
     def embed(plots: Iterable[Plot]) -> list[Values]:
         data = [(p.caption, base64.b64encode(p.write(folder)).decode()) for p in plots]
         return [{"caption": c, "source": f"data:image/png;base64,{d}"} for c, d in data]
 
     return {
-        "headline_figure": embed([headline_plot(problem, found, words)]),
+        "headline_figure": embed([headline_plot(problem, found, words, free)]),
         "record_figures": embed(record_plots(problem, words)),
         "force_figures": embed(force_plots(found, words)),
-        "error_figures": embed([error_plot(error_table.error_values(case), words)] if found.singles else []),
-        "residual_figures": embed(residual_plots(problem, found, words)),
-        "spectrum_figures": embed(spectrum_plots(problem, found, words)),
+        "free_form_figures": embed([free_form_plot(found, free, words)] if free else []),
+        "error_figures": embed([error_plot(errors, words, free is not None)] if found.singles else []),
+        "residual_figures": embed(residual_plots(problem, found, words, free)),
+        "spectrum_figures": embed(spectrum_plots(problem, found, words, free)),
     }
 
 
@@ -87,6 +97,8 @@ def _law(case: Case) -> Values:
         "laws": list(sections.laws(case)),
         "calibrated": list(sections.calibrated(case)),
         "has_effect": case.found.chosen is not None,
+        "has_after": case.after is not None,
+        "curve": curve_of(case.free_form) if case.free_form else None,
     }
 
 
@@ -101,6 +113,9 @@ def _rejection(case: Case) -> Values:
         "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
         "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
         "detection": detection_words(case.found),
+        "chance": chance_words(case.found, case.honesty) if case.honesty else "",
+        "black_box": case.honesty.black_box if case.honesty else None,
+        "power": power_rows(case),
         "tried": [(at, ", ".join(map(effect_words, kinds))) for at, kinds in tried(case.problem).items()],
         "faults": ", ".join(map(effect_words, KINDS)),
         "known_noise": not any(c["noise"].endswith("(estimated)") for c in sections.channels(case)),
@@ -109,7 +124,7 @@ def _rejection(case: Case) -> Values:
 
 def _use(case: Case, folder: Path) -> Values:
     """How to run the augmented FMU and how to repeat the run."""
-    chosen, fmu = case.found.chosen, folder / case.result.augmented_fmu
+    chosen, fmu = case.after, folder / case.result.augmented_fmu
     effects = [c for c in (chosen.candidates if chosen else ()) if not c.is_fault]
     theta = chosen.fit.theta if chosen else {}
     known = describe(fmu).variables if fmu.is_file() else {}

@@ -10,8 +10,13 @@ import numpy as np
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis, lead
+from estimator.closeloop.freeform import curve_of
+from estimator.closeloop.honesty import Honesty
+from estimator.closeloop.power import Visible
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.regressors import is_wave
 from estimator.closeloop.verdict import Verdict, gap_closed
+from estimator.record import Array
 
 Figure = list[float]  # value and standard error
 
@@ -36,7 +41,12 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Result:
-    """The contract's result of close-loop; `error` holds RMSE on the test part by output."""
+    """The contract's result of close-loop; `error` holds RMSE on the test part by output.
+
+    There `placebo` is that of the best wrong effect, `black_box` that of the calibrated FMU with a linear
+    model of its residual. power: the smallest effects that the record would have shown, null where none;
+    free_form: where nothing explains, the curve that comes nearer, which `after` and the FMU then hold.
+    """
 
     experiment: str
     verdict: Verdict
@@ -51,6 +61,9 @@ class Result:
     detection: dict[str, Any]
     notes: list[str] = field(default_factory=list)
     augmented_fmu: str = ""
+    power: list[dict[str, Any]] = field(default_factory=list)
+    nomination: dict[str, Any] = field(default_factory=dict)
+    free_form: dict[str, Any] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
         """Write as JSON, whole or not at all."""
@@ -59,13 +72,19 @@ class Result:
         part.replace(path)
 
 
-def result_of(name: str, problem: Problem, found: Outcome, seconds: float, augmented: Path | None) -> Result:
+def result_of(
+    name: str,
+    problem: Problem,
+    found: Outcome,
+    seconds: float,
+    augmented: Path | None,
+    honesty: Honesty | None = None,
+) -> Result:
     """Put an outcome into the contract's words."""
     members = found.judgement.members
-    best = found.chosen or found.base
-    errors = {"declared": found.declared, "before": found.base, "after": best}
-    rms = {k: h.rms(problem) for k, h in errors.items()}
-    rms["noise"] = found.noise
+    curve = honesty.free_form if honesty else None
+    best = found.chosen or curve or found.base
+    rms = errors(problem, found, best, honesty)
     outputs = problem.record.outputs
     closed = gap_closed(rms["before"], rms["after"], found.noise)
     return Result(
@@ -78,7 +97,7 @@ def result_of(name: str, problem: Problem, found: Outcome, seconds: float, augme
         wall_seconds=round(seconds, 1),
         reason=found.judgement.reason,
         next_experiment=found.judgement.next_experiment,
-        gap_closed={o: float(closed[j]) for j, o in enumerate(outputs)} if members else {},
+        gap_closed={o: float(closed[j]) for j, o in enumerate(outputs)} if members or curve else {},
         detection={
             "p_value": found.detection.p_value,
             "material": found.detection.material,
@@ -86,7 +105,45 @@ def result_of(name: str, problem: Problem, found: Outcome, seconds: float, augme
         },
         notes=[n.sentence for n in problem.record.notes],
         augmented_fmu=augmented.name if augmented else "",
+        power=[_line(v) for v in honesty.power] if honesty else [],
+        nomination=_nomination(honesty) if honesty else {},
+        free_form=_curve(curve) if curve else {},
     )
+
+
+def errors(problem: Problem, found: Outcome, best: Hypothesis, honesty: Honesty | None) -> dict[str, Array]:
+    """RMSE on the test part, free run, of everything that is compared, (n_y,) each, and the noise floor."""
+    compared = {"declared": found.declared, "before": found.base, "after": best}
+    wrong = best_wrong(found)
+    if wrong:
+        compared["placebo"] = wrong
+    rms = {k: h.rms(problem) for k, h in compared.items()}
+    if honesty:
+        rms["black_box"] = honesty.black_box.rms
+    return rms | {"noise": found.noise}
+
+
+def best_wrong(found: Outcome) -> Hypothesis | None:
+    """The best single hypothesis that was rejected: an error that any effect of the kind would reach."""
+    members = found.judgement.members
+    return next((h for h in found.singles if h not in members), None)
+
+
+def _line(v: Visible) -> dict[str, Any]:
+    """A line of the power statement; JSON has no infinity."""
+    sizes = {k: x if np.isfinite(x) else None for k, x in (("smallest", v.smallest), ("largest", v.largest))}
+    return {"kind": v.kind, "location": v.location, "parameter": v.parameter, **sizes, "shape": v.shape}
+
+
+def _nomination(h: Honesty) -> dict[str, Any]:
+    stable = {label: share for label, share in h.stability.items() if share > 0}
+    return {"decoy_gain": h.decoy_gain, "stability": stable}
+
+
+def _curve(h: Hypothesis) -> dict[str, Any]:
+    c = curve_of(h)
+    lines = {name: getattr(c, name).tolist() for name in ("x", "force", "std")}
+    return {"kind": c.kind, "location": c.location, "against": c.against, **lines}
 
 
 def effects_of(h: Hypothesis) -> list[Effect]:
@@ -99,7 +156,7 @@ def _parameters(h: Hypothesis, c: Candidate) -> dict[str, Figure]:
     if c.is_fault:
         return {c.kind.removeprefix("sensor_"): _figure(h, c.amplitudes[0].name)}
     found = {u.name.removeprefix(prefix): _figure(h, u.name) for u in c.unknowns}
-    if len(c.amplitudes) == 2:  # a sine and a cosine: their size is what an engineer asks for
+    if is_wave(c):  # the size of sine and cosine together is what an engineer asks for
         values, errors = np.array([found[u.name.removeprefix(prefix)] for u in c.amplitudes]).T
         size = float(np.hypot(*values))
         found["amplitude"] = [size, float(np.hypot(*(values * errors)) / size) if size else 0.0]

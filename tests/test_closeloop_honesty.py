@@ -1,6 +1,9 @@
 """What a report owes beside the finding, against what statistics says it must be."""
 
+import json
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,21 +13,28 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from estimator.closeloop.blackbox import LARGEST, black_box
-from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
+from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.decoys import decoy, decoy_gain, leading, lines
+from estimator.closeloop.detect import Detection
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.freeform import curve_of, dependences, free_form, left_out, resolved
+from estimator.closeloop.honesty import honesty
 from estimator.closeloop.missing_force import missing_forces
 from estimator.closeloop.power import power, threshold
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.regressors import Calibration, alike, lengths
+from estimator.closeloop.screen import changes
 from estimator.closeloop.stability import stability
+from estimator.closeloop.verdict import Judgement
 from estimator.record import Array, Record, Run
 from fmus.effects import EFFECTS, offers
 from fmus.effects.free_form import CONTROLS, FreeForm
 from fmus.export.hypotheses import ModelBuilder
 from fmus.models import MODELS
+from scenarios.report import write_report
+from scenarios.result import result_of
 
 SEEDS = st.integers(0, 10_000)
 FREE_FORMS = sorted(k for k, e in EFFECTS.items() if issubclass(e, FreeForm))
@@ -400,21 +410,71 @@ def base_of(record: Record, builder: ModelBuilder) -> tuple[Problem, Hypothesis]
     return asked, Hypothesis((), fitted(left), tuple(asked.residuals({})))
 
 
-def test_a_force_without_a_name_becomes_a_curve_and_a_better_fmu(drive: ModelBuilder) -> None:
+@pytest.fixture(scope="module")
+def nameless(drive: ModelBuilder) -> tuple[Problem, Outcome, Hypothesis | None]:
+    """A record that no law explains, what the chain would have of it, and the force of free form."""
     asked, base = base_of(drive_record(law, np.random.default_rng(12)), drive)
     forces = missing_forces(asked, {}, NOISE)
-    first = dependences(asked, forces)[0]
+    found = free_form(asked, base, forces, NOISE, 1)
+    detection = Detection(0.006, {"size of the held-out residual": 50.0}, True)
+    told = Judgement("unexplained", (), "nothing fits")
+    return asked, Outcome(base, base, NOISE, NOISE, detection, tuple(forces), (), (base,), (), told), found
+
+
+def test_a_force_without_a_name_becomes_a_curve_and_a_better_fmu(
+    nameless: tuple[Problem, Outcome, Hypothesis | None],
+) -> None:
+    asked, outcome, found = nameless
+    first = dependences(asked, outcome.forces)[0]
     assert (first.kind, first.against) == ("free_form_velocity", "velocity")
     assert first.share > 0.9
-    found = free_form(asked, base, forces, NOISE, 1)
     assert found is not None
     assert found.label == "free_form_velocity@carriage"
-    assert np.all(found.rms(asked) < 0.1 * base.rms(asked))
+    assert np.all(found.rms(asked) < 0.1 * outcome.base.rms(asked))
     curve = curve_of(found)
     visited = np.abs(curve.x) < np.quantile(np.abs(asked.record.runs[0].y[:, 1]), 0.95)
     error = (curve.force - law(curve.x))[visited]
     assert np.sqrt(np.mean(error**2)) < 0.05 * np.std(law(curve.x))
     assert np.all(curve.std[visited] < 1.0)  # N
+
+
+def test_the_page_and_the_result_hold_what_a_report_owes(
+    nameless: tuple[Problem, Outcome, Hypothesis | None], tmp_path: Path
+) -> None:
+    asked, outcome, curve = nameless
+    faults = fault_candidates(asked.record, NOISE)
+    forces = physical_candidates(
+        (("constant_force", "carriage"), ("periodic_force", "carriage")),
+        asked.builder.outside(), asked.record, outcome.forces,
+    )  # fmt: skip
+    chosen = [*faults, *forces]
+    change = list(zip(chosen, changes(asked, outcome.base.fit, chosen, NOISE, outcome.forces), strict=True))
+    owed = honesty(asked, outcome.base, change, NOISE, LEVEL, np.random.default_rng(1), curve)
+    result = result_of("<nameless>", asked, outcome, 1.0, None, owed)
+    write_report(tmp_path, asked, outcome, result, owed)
+    result.write(tmp_path / "result.json")
+    written = json.loads((tmp_path / "result.json").read_text())
+    for name, e in written["error"].items():
+        assert e["after"] < 0.1 * e["before"]
+        assert e["after"] < e["black_box"] < e["before"]
+        assert e["placebo"] == e["before"]  # the best wrong effect here is none
+        assert 0.9 < written["gap_closed"][name] <= 1.0
+    assert {(v["kind"], v["location"]) for v in written["power"]} == {(c.kind, c.location) for c in chosen}
+    assert written["effects"] == []
+    assert written["free_form"]["location"] == "carriage"
+    assert len(written["free_form"]["x"]) == len(written["free_form"]["std"]) > 10
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    text = " ".join(re.sub(r"<style.*?</style>|<[^>]+>", " ", page, flags=re.S).split())
+    for words in (
+        "black box",
+        "with free form",
+        "What this record would have shown",
+        "Force of free form at",
+    ):
+        assert words in text
+    assert "Periodic force" in text
+    assert not re.search(r"\b(nan|inf)\b", text)
+    assert (tmp_path / "free_form.svg").is_file()
 
 
 def test_no_force_of_free_form_where_nothing_is_missing(drive: ModelBuilder) -> None:

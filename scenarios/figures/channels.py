@@ -33,8 +33,10 @@ SEGMENTS = 8  # of the held-out part, between which the spectrum is averaged
 Series = list[tuple[str, Hypothesis, str]]
 
 
-def series(found: Outcome) -> Series:
-    """Whose residuals are drawn: name, hypothesis and colour."""
+def series(found: Outcome, free: Hypothesis | None) -> Series:
+    """Whose residuals are drawn: name, hypothesis and colour; free: the force of free form, if any."""
+    if found.chosen is None and free:
+        return [("calibrated", found.base, BEFORE), ("with a force of free form", free, AFTER)]
     if found.chosen is None:
         good = found.judgement.verdict == "no_discrepancy"
         colour = AFTER if good else BEFORE
@@ -59,10 +61,12 @@ def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
         yield Plot(f"record{ending}", figure, "The record. The shaded part is held out: no fit has seen it.")
 
 
-def residual_plots(problem: Problem, found: Outcome, words: Glossary) -> Iterator[Plot]:
-    """Residual of each output over time, and again at the scale of the noise where an effect was found."""
-    record, shown = problem.record, series(found)
-    zoom = found.chosen is not None
+def residual_plots(
+    problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None
+) -> Iterator[Plot]:
+    """Residual of each output over time, and again at the scale of the noise where something was added."""
+    record, shown = problem.record, series(found, free)
+    zoom = found.chosen is not None or free is not None
     for ending, some in sheets(record.outputs, 1 if zoom else 3):
         layout = [[f"{n}{z}"] for n in some for z in ("", "+")[: 1 + zoom]]
         heights = [h for _ in some for h in (1.6, 1.0)[: 1 + zoom]]
@@ -96,14 +100,17 @@ def draw_residual(ax: Axes, record: Record, shown: Series, j: int, noise: float)
         ax.axhline(level, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
 
 
-def spectrum_plots(problem: Problem, found: Outcome, words: Glossary) -> Iterator[Plot]:
+def spectrum_plots(
+    problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None
+) -> Iterator[Plot]:
     """Amplitude spectral density of the held-out residual of each output, with the level of the noise."""
     for ending, some in sheets(problem.record.outputs, 6):
         rows = [some[i : i + 2] for i in range(0, len(some), 2)]
         layout = [row if len(row) == 2 or len(rows) == 1 else [*row, "."] for row in rows]
         figure, axes = sheet(0.5 + 2.2 * len(rows), layout)
         for name in some:
-            _spectrum(axes[name], problem, found, problem.record.outputs.index(name))
+            j = problem.record.outputs.index(name)
+            _spectrum(axes[name], problem, series(found, free), j, found.noise[j])
             density = f"{unit(words.unit(name)) or '1'} per √Hz"
             name_axes(axes[name], "frequency in Hz", f"density in {density}", name)
         legend(figure, axes[some[0]])
@@ -116,14 +123,14 @@ SPECTRUM = (
 )
 
 
-def _spectrum(ax: Axes, problem: Problem, found: Outcome, j: int) -> None:
+def _spectrum(ax: Axes, problem: Problem, shown: Series, j: int, noise: float) -> None:
     k = int(np.argmax([run.test.sum() for run in problem.record.runs]))
     run = problem.record.runs[k]
     rate = 1 / float(np.median(np.diff(run.t)))
-    for name, h, colour in series(found):
+    for name, h, colour in shown:
         f, density = _density(h.residuals[k][run.test, j], rate)
         ax.loglog(f, density, color=colour, linewidth=1.1, label=name)
-    level = found.noise[j] * np.sqrt(2 / rate)
+    level = noise * np.sqrt(2 / rate)
     ax.axhline(level, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="noise")
     low, high = np.log10(ax.get_ylim())
     ax.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))

@@ -7,9 +7,16 @@ from scenarios.figures.sheet import AFTER, BEFORE, CLOUD, INK, NOISE, Plot, name
 from scenarios.page.glossary import Glossary
 from scenarios.page.typography import number, quantity
 
-COLOURS = {"declared": CLOUD, "before": BEFORE, "after": AFTER, "wrong": NOISE}
-NAMES = {"declared": "as declared", "before": "before", "after": "after", "wrong": "best wrong effect"}
-ALONE = {"declared": "as declared", "before": "calibrated", "wrong": "nearest effect"}  # none was found
+COLOURS = {"declared": CLOUD, "before": BEFORE, "after": AFTER, "placebo": NOISE, "black_box": NOISE}
+NAMES = {
+    "declared": "as declared",
+    "before": "before",
+    "after": "after",
+    "placebo": "best wrong effect",
+    "black_box": "black box",
+}
+FREE = NAMES | {"before": "calibrated", "after": "with free form", "placebo": "nearest effect"}
+ALONE = {k: v for k, v in FREE.items() if k != "after"}  # nothing was added
 STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labelled in each decade, by the decades that are shown
 LABELS = 3  # decades that have room for a label
 CAPTION = (
@@ -18,9 +25,13 @@ CAPTION = (
 )
 
 
-def error_plot(errors: dict[str, dict[str, float]], words: Glossary) -> Plot:
-    """Bars of the errors of each output, by output and by the keys of NAMES and `noise`."""
-    names = NAMES if all("after" in values for values in errors.values()) else ALONE
+def error_plot(errors: dict[str, dict[str, float]], words: Glossary, free: bool) -> Plot:
+    """Bars of the errors of each output, by output and by the keys of NAMES and `noise`.
+
+    free: what was added is a force of free form, not an effect.
+    """
+    added = all("after" in values for values in errors.values())
+    names = (FREE if free else NAMES) if added else ALONE
     outputs = list(errors)
     rows = [outputs[i : i + 2] for i in range(0, len(outputs), 2)]
     layout = [row if len(row) == 2 or len(rows) == 1 else [*row, "."] for row in rows]

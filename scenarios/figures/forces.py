@@ -100,12 +100,12 @@ def _legible(force: Array) -> slice:
 
 def _against(ax: Axes, x: Array, m: MissingForce, words: Glossary, name: str, more: str = "") -> None:
     ax.plot(x, m.force, ".", color=CLOUD, markersize=1.5, alpha=0.5, rasterized=True)
-    ax.plot(*_averages(x, m.force), "o", color=AFTER, markersize=3, label="missing force")
+    ax.plot(*averages(x, m.force), "o", color=AFTER, markersize=3, label="missing force")
     x_label = label(f"{name}{more}", words.unit(name))
     name_axes(ax, x_label, label("force", words.unit(m.port.force)))
 
 
-def _averages(x: Array, y: Array) -> tuple[Array, Array]:
+def averages(x: Array, y: Array) -> tuple[Array, Array]:
     """Means of x and y (n,) in bins of x that hold enough of them."""
     edges = np.linspace(x.min(), x.max(), BINS + 1)
     place = np.clip(np.digitize(x, edges) - 1, 0, BINS - 1)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from estimator.closeloop.chain import Outcome
+from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.problem import Problem
 from scenarios.figures.channels import draw_residual, series, time_label
 from scenarios.figures.forces import draw_law, laws_found
@@ -11,13 +12,13 @@ from scenarios.page.glossary import Glossary
 from scenarios.page.typography import label
 
 
-def headline_plot(problem: Problem, found: Outcome, words: Glossary) -> Plot:
+def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None) -> Plot:
     """Residual of the output that stands out most from its noise, and the first law found, if any."""
     j = int(np.argmax(found.base.rms(problem) / found.noise))
     name, laws = problem.record.outputs[j], laws_found(found)
     ratios = [1.35, 1] if laws else [1]
     figure, axes = sheet(2.7, [["residual", "law"][: len(ratios)]], width_ratios=ratios)
-    draw_residual(axes["residual"], problem.record, series(found), j, found.noise[j])
+    draw_residual(axes["residual"], problem.record, series(found, free), j, found.noise[j])
     name_axes(axes["residual"], time_label(problem.record), label("residual", words.unit(name)), name)
     legend(figure, axes["residual"])
     caption = f"Residual of {name} in free simulation, held-out part shaded."

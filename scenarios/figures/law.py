@@ -55,6 +55,6 @@ def law_at(h: Hypothesis | None, missing: MissingForce) -> Law | None:
         effect = EFFECTS.get(c.kind)
         if c.location == missing.port.name and effect and issubclass(effect, ForceLaw):
             prefix = f"{c.kind}_{c.location}_"
-            own = {n.removeprefix(prefix): x for n, x in h.fit.theta.items() if n.startswith(prefix)}
+            own = {n.removeprefix(prefix): x for n, x in h.theta.items() if n.startswith(prefix)}
             return Law(c, effect, own, missing)
     return None

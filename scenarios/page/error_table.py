@@ -1,22 +1,18 @@
 """Errors before and after, as headline numbers and as a table."""
 
 from scenarios.page.case import Case
-from scenarios.page.rejected import best_wrong
 from scenarios.page.typography import HELD, NOTHING, label, number, percent, quantity, short
 
-KINDS = ("declared", "before", "after", "wrong")
+KINDS = ("declared", "before", "after", "placebo", "black_box")
 Row = dict[str, str]
 
 
 def error_values(case: Case) -> dict[str, dict[str, float]]:
-    """Errors on the held-out part by output; `after` and `wrong` only where there is an effect."""
-    wrong, chosen = best_wrong(case.found), case.found.chosen
-    found = {}
-    for j, (output, values) in enumerate(case.result.error.items()):
-        found[output] = {k: v for k, v in values.items() if k != "after" or chosen}
-        if wrong:
-            found[output]["wrong"] = float(wrong.rms(case.problem)[j])
-    return found
+    """Errors on the held-out part by output; `after` only where something was added."""
+    return {
+        output: {k: v for k, v in values.items() if k != "after" or case.after}
+        for output, values in case.result.error.items()
+    }
 
 
 def error_rows(case: Case) -> list[Row]:
@@ -35,11 +31,11 @@ def gap_cards(case: Case) -> list[Row]:
     cards = []
     for output, e in case.result.error.items():
         of = case.words.unit(output)
-        over = e["after"] if case.found.chosen else e["before"]
+        over = e["after"] if case.after else e["before"]
         figure, said = f"{number(over / e['noise'], 2)}{HELD}×", "the noise floor"
         if output in case.gaps:
             figure, said = percent(case.gaps[output]), "of the gap closed"
-        error = number(e["before"]) + (f" → {number(e['after'])}" if case.found.chosen else "")
+        error = number(e["before"]) + (f" → {number(e['after'])}" if case.after else "")
         row = {"output": output, "figure": figure, "said": said, "error": quantity(error, of)}
         cards.append(row | {"noise": quantity(short(e["noise"], 3), of)})
     return cards

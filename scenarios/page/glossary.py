@@ -37,9 +37,13 @@ class Glossary:
     def unit_of_parameter(self, c: Candidate, parameter: str) -> str:
         """Unit of a parameter of a candidate; `amplitude` is that of its sine and cosine."""
         if c.is_fault:
-            return _FAULT_UNITS[c.kind].format(self.unit(c.location))
+            return self.unit_of_fault(c.kind, c.location)
         full = f"{c.kind}_{c.location}_{parameter}"
         return self.unit(full if full in self.variables else c.amplitudes[0].name)
+
+    def unit_of_fault(self, kind: str, output: str) -> str:
+        """Unit of the size of a sensor's fault."""
+        return _FAULT_UNITS[kind].format(self.unit(output))
 
     def meaning_of_parameter(self, c: Candidate, parameter: str) -> str:
         """What a parameter of a candidate is."""

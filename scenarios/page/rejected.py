@@ -8,6 +8,7 @@ import numpy as np
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis, lead
 from estimator.closeloop.detect import LEVEL, NOISES, REPLICATES
+from estimator.closeloop.honesty import Honesty
 from estimator.closeloop.pairs import SIGNIFICANT, idle
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.verdict import EXPLAINED, GAP, explains, gap_closed
@@ -34,12 +35,6 @@ def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
     others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
     others.sort(key=lambda h: lead(problem, best, h, found.size)[0])
     return [_row(problem, found, h) for h in others]
-
-
-def best_wrong(found: Outcome) -> Hypothesis | None:
-    """The best single hypothesis that was rejected: an error that any effect of the kind would reach."""
-    members = found.judgement.members
-    return next((h for h in found.singles if h not in members), None)
 
 
 def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
@@ -108,6 +103,21 @@ def detection_words(found: Outcome) -> str:
         f"counts) and {size}. It was held against {REPLICATES} records that the calibrated FMU gives with "
         "noise alone, calibrated like the measured one."
     )
+
+
+def chance_words(found: Outcome, honesty: Honesty) -> str:
+    """What decoys reached, and how stable the nomination of the finding is."""
+    chi2 = float(found.base.fit.residual @ found.base.fit.residual)
+    words = "No regressor of this record is broad enough in frequency to be held against chance ones."
+    if honesty.decoy_gain:
+        reached = percent(honesty.decoy_gain / chi2)
+        words = f"Ones that mean nothing but have the spectra of the leading ones explain {reached} of it."
+    named = [c for h in found.judgement.members for c in h.candidates]
+    for label, name in {c.label: candidate_words(c) for c in named}.items():
+        if label in honesty.stability:
+            often = percent(honesty.stability[label])
+            words += f" In {often} of random halves of the record {name} is among the leading ones."
+    return f"In the screening, effects were ranked by what they explain of the residual. {words}"
 
 
 def tried(problem: Problem) -> dict[str, list[str]]:

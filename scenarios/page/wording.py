@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.freeform import curve_of
 from scenarios.page.case import Case
 from scenarios.page.glossary import Glossary, candidate_words, hypothesis_words, parameter_name
 from scenarios.page.typography import HELD, capital, percent, quantity, with_error
@@ -122,11 +123,23 @@ def _sensor_fault(case: Case) -> Story:
 def _unexplained(case: Case) -> Story:
     singles = case.found.singles
     near = f" The nearest, {hypothesis_words(singles[0])}, does not suffice." if singles else ""
+    headline = f"The model lacks something that the library does not hold.{near}"
+    real = "The residual is real, but no effect that was tried brings it down to the noise. "
+    if case.free_form is None:
+        return Story(
+            headline,
+            f"{real}Nothing is claimed and nothing was added to the model. The missing forces in section 2 "
+            "show where to look.",
+            "No law is claimed. What was tried, and what speaks against it, stands in section 6.",
+        )
+    curve = curve_of(case.free_form)
     return Story(
-        f"The model lacks something that the library does not hold.{near}",
-        "The residual is real, but no effect that was tried brings it down to the noise. Nothing is claimed "
-        "and nothing was added to the model. The missing forces in section 2 show where to look.",
-        "No law is claimed. What was tried, and what speaks against it, stands in section 6.",
+        f"{headline} {gap_words(case, 'A force of free form closes')}",
+        f"{real}No cause is claimed. The augmented FMU holds a force of free form at {curve.location}, a "
+        f"curve over the {curve.against} there (section 3): it is nearer to the measurement, in the range "
+        "of this record.",
+        "No law is claimed. The curve was fitted inside the FMU together with the calibrated parameters; of "
+        "several ports and quantities it left the least. Its form may hint at the cause.",
     )
 
 
