@@ -255,7 +255,7 @@ def resonant(u: Array, frequency: float, damping: float, dt: float = 0.02) -> Ar
 
 
 @given(seed=SEEDS, frequency=st.floats(0.3, 5.0), damping=st.floats(0.03, 0.5))
-@settings(max_examples=10)
+@settings(max_examples=6)
 def test_a_black_box_takes_a_linear_residual_down_to_the_noise(
     seed: int, frequency: float, damping: float
 ) -> None:
@@ -269,7 +269,7 @@ def test_a_black_box_takes_a_linear_residual_down_to_the_noise(
 
 
 @given(seed=SEEDS)
-@settings(max_examples=10)
+@settings(max_examples=6)
 def test_a_black_box_makes_nothing_of_noise(seed: int) -> None:
     rng = np.random.default_rng(seed)
     residual = rng.standard_normal((3000, 2))
