@@ -111,7 +111,7 @@ def test_what_calibration_takes_over_and_what_bounds_forbid_cannot_be_shown() ->
     g = smooth(rng, 2)
     hidden, bound = candidate("hidden"), candidate("bound")
     bound = Candidate(bound.kind, "bound", (Unknown("share", 0.0, 0.0, 1e-6, 1.0),))
-    offset = Candidate("parameter_offset", "mu0", (Unknown("parameter_offset_mu0_delta", 0, -9, 9, 1.0),))
+    offset = Candidate("parameter_offset", "mu0", (Unknown("parameter_offset_mu0_delta", 0, -99, 99, 1.0),))
     change = [(hidden, g[:, :1]), (bound, g[:, 1:]), (offset, g[:, 1:])]
     base = fitted(np.zeros(M), g[:, :1])
     assert {v.location: np.isinf(v.smallest) for v in power(base, change, LEVEL, rng)} == {
@@ -125,6 +125,8 @@ def test_what_calibration_takes_over_and_what_bounds_forbid_cannot_be_shown() ->
     )
     assert 1e-3 < free.smallest < 9.0
     assert np.isinf(tight.smallest)
+    weak = [(offset, 1e-3 * g[:, 1:])]  # 0.05 of the parameter shows so little that all of it would be needed
+    assert np.isinf(power(base, weak, LEVEL, rng)[0].smallest)
 
 
 def test_the_statement_halves_with_twice_the_response_and_names_the_shape_that_shows_most() -> None:

@@ -17,10 +17,12 @@ from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Unknown
 from estimator.closeloop.regressors import Calibration, Changes, alike, columns_of, is_wave, lengths
 from estimator.record import Array
+from fmus.effects.parameter_effect import SMALL
 
 POWER = 0.8
 DRAWS = 4000  # of noise, from which the threshold of the largest of all directions is found
 ROWS = 2000  # random sums that stand for a long regressor
+WITHIN_LIMITS = ("parameter_offset", "parameter_step")  # a drift ends at the limits, at any rate
 PHASES = 90  # of a sine and a cosine, of which the least visible counts
 
 
@@ -60,9 +62,8 @@ def power(
     needed = threshold(cosines, level, rng) + float(norm.ppf(chance))
     found: dict[tuple[str, str, str], Visible] = {}
     for (c, _), at in zip(change, columns_of(change), strict=True):
-        for name, size in _sizes(c, left[at], cosines[at, at], needed):
-            possible = size if size <= _room(c, room) else np.inf
-            one = Visible(c.kind, c.location, name, possible, possible, _shape(c))
+        for name, size in _sizes(c, left[at], cosines[at, at], needed, room):
+            one = Visible(c.kind, c.location, name, size, size, _shape(c))
             key = (c.kind, c.location, name)
             found[key] = _both(found[key], one) if key in found else one
     return [found[key] for key in sorted(found)]
@@ -82,29 +83,32 @@ def threshold(cosines: Array, level: float, rng: np.random.Generator) -> float:
     return float(np.quantile(drawn, 1 - level))
 
 
-def _sizes(c: Candidate, left: Array, cosines: Array, needed: float) -> list[tuple[str, float]]:
-    """Smallest amplitude by name; of a sine and a cosine in the phase that shows least."""
+def _sizes(
+    c: Candidate, left: Array, cosines: Array, needed: float, room: Mapping[str, float]
+) -> list[tuple[str, float]]:
+    """Smallest amplitude by name, inf beyond what it can be; of a wave in the phase that shows least."""
+    scale = np.array([u.scale for u in c.amplitudes])
     if is_wave(c):
-        scale = np.array([u.scale for u in c.amplitudes])
         angles = np.linspace(0, np.pi, PHASES, endpoint=False)
         parts = np.vstack([np.cos(angles), np.sin(angles)]) * (left / scale)[:, None]
         shown = np.abs(cosines @ parts).max(axis=0).min()  # on the better of both directions
-        return [("amplitude", _within(needed, shown, c.amplitudes[0], 1.0))]
+        return [("amplitude", float(needed / shown) if shown > 0 else np.inf)]
+    sizes = np.where(left > 0, needed * scale / np.where(left > 0, left, 1.0), np.inf)
     return [
-        (_name(c, u), _within(needed, length, u, u.scale))
-        for u, length in zip(c.amplitudes, left, strict=True)
+        (_name(c, u), float(size) if size <= _most(c, u, room) else np.inf)
+        for u, size in zip(c.amplitudes, sizes, strict=True)
     ]
 
 
-def _within(needed: float, shown: float, u: Unknown, scale: float) -> float:
-    """The amplitude that gives `needed` where `scale` gives `shown`; inf where bounds do not let it."""
-    size = needed / shown * scale if shown > 0 else np.inf
-    return float(size) if size <= max(u.high, -u.low) else np.inf
+def _most(c: Candidate, u: Unknown, room: Mapping[str, float]) -> float:
+    """The largest amplitude for which the statement holds: within bounds and limits.
 
-
-def _room(c: Candidate, room: Mapping[str, float]) -> float:
-    """The largest offset or step of a parameter; drifts end where their limits are, at any rate."""
-    return room.get(c.location, np.inf) if c.kind in ("parameter_offset", "parameter_step") else np.inf
+    A change of a parameter as large as itself is far from its first order.
+    """
+    most = max(u.high, -u.low)
+    if c.kind.startswith("parameter_"):
+        most = min(most, u.scale / SMALL)
+    return min(most, room.get(c.location, np.inf)) if c.kind in WITHIN_LIMITS else most
 
 
 def _name(c: Candidate, u: Unknown) -> str:
