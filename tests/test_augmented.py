@@ -33,6 +33,7 @@ from scenarios.closing import augment
 from scenarios.exchange import import_ssp
 from scenarios.exchange.augmented import coupling_step
 from scenarios.running import run
+from tests.test_ssp import installed, told
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
 DT, END = 0.01, 4.0
@@ -128,6 +129,19 @@ def test_a_package_of_base_and_effects_runs_as_the_container_does(foreign, base,
     with Fmu(base) as fmu:
         off = fmu.simulate(t, {"F": (u[1:] + u[:-1]) / 2}, ["q", "q_dot"], {"M": 97.0, "q": 0.1})
     assert (np.abs(off - expected).max(axis=0) > 10 * NEAR[name] * np.abs(expected).max(axis=0)).all()
+
+
+@pytest.mark.slow
+def test_another_tool_runs_the_package(tmp_path):
+    """ecos hands on outputs a step late where they follow inputs at once; the package is made for that."""
+    installed("ecospy", "tbb")
+    base = build_native(MODELS["drive"](), tmp_path / "Sledge.fmu")  # needs no Python in a tool without
+    builder, name = ForeignBuilder(base, (PORT,), tmp_path / "work"), "drag_and_lag"
+    _, package = handed_over(builder, tmp_path / "out", EFFECTS[name], FOUND[name])
+    assert run(import_ssp(package, tmp_path / "back"), tmp_path / "run").ok
+    ours = read_recording(tmp_path / "run" / "run.parquet").data[["base.q", "base.q_dot"]].to_numpy()
+    found = told("ssp_ecos.py", package, COUPLING_STEP, round(END / COUPLING_STEP), "base.q", "base.q_dot")
+    assert (np.abs(found - ours).max(axis=0) <= 1e-3 * np.abs(ours).max(axis=0)).all()
 
 
 def test_both_say_where_their_values_come_from(foreign):
