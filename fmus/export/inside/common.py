@@ -25,11 +25,17 @@ MODEL: dict[str, Any] = json.loads((HERE / "model.json").read_text(encoding="utf
 VARIABLES: list[dict[str, Any]] = MODEL["variables"]
 SIZES: list[int] = MODEL["sizes"]  # how many states, inputs, parameters, outputs, in this order
 SETTABLE = sum(SIZES[:3])
-LIMITS = {
-    i: (-math.inf if v["min"] is None else v["min"], math.inf if v["max"] is None else v["max"])
-    for i, v in enumerate(VARIABLES)
-    if v["causality"] in ("parameter", "input") and (v["min"], v["max"]) != (None, None)
-}
+START = array("d", [v["start"] for v in VARIABLES])
+LARGEST = sys.float_info.max
+
+
+def limits(key: str, without: float) -> list[float]:
+    """Least or largest value of each variable that can be set; nothing that is not finite lies between."""
+    given = [v[key] if v["causality"] in ("parameter", "input") else None for v in VARIABLES[:SETTABLE]]
+    return [without if v is None else min(max(v, -LARGEST), LARGEST) for v in given]
+
+
+LEAST, MOST = limits("min", -LARGEST), limits("max", LARGEST)
 
 
 def caught(method: Any) -> Any:
@@ -62,13 +68,15 @@ def let_go_in_time(binaries: Path) -> None:
 class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     """One instance: values of all variables in the order of the model description."""
 
+    computed = SETTABLE  # variables from here on are brought up to date when they are asked for
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         if "resources" in kwargs:
             let_go_in_time(Path(kwargs["resources"]).parent / "binaries" / "linux64")
         self.description, self.author = MODEL["description"], None
         self.guid, self.version = MODEL["guid"], MODEL["version"]
-        self.values = array("d", [v["start"] for v in VARIABLES])
+        self.values = START[:]
         self.failure, self.stale = "", True
 
     def refresh(self) -> None:
@@ -88,7 +96,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         """Values by reference; outputs are computed when first asked for after a change."""
         values = self.values
         try:
-            if self.stale:
+            if self.stale and max(vrs, default=-1) >= self.computed:
                 self.refresh()
                 self.stale = False
             return [values[i] for i in vrs]
@@ -99,16 +107,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     @caught
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set states, inputs and parameters; what cannot be set stops the next step."""
-        self.stale = True
+        self.stale, known = True, self.values
         for i, value in zip(vrs, values, strict=True):
-            if i >= SETTABLE:
-                raise ValueError(f"{VARIABLES[i]['name']} is computed and cannot be set")
-            if not math.isfinite(value):
-                raise ValueError(f"{VARIABLES[i]['name']} = {value} is not a finite number")
-            low, high = LIMITS.get(i, (-math.inf, math.inf))
-            if not low <= value <= high:
-                raise ValueError(f"{VARIABLES[i]['name']} = {value:g} is outside {low:g} to {high:g}")
-            self.values[i] = value
+            if i >= SETTABLE or not LEAST[i] <= value <= MOST[i]:
+                raise ValueError(why_not(i, value))
+            known[i] = value
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         """There are none; PythonFMU would raise an error that no host survives."""
@@ -182,6 +185,17 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
             for i in computed:
                 SubElement(unknowns, "Unknown", index=str(i + 1))
         return root
+
+
+def why_not(i: int, value: float) -> str:
+    """Why a variable does not take a value."""
+    name = VARIABLES[i]["name"]
+    if i >= SETTABLE:
+        return f"{name} is computed and cannot be set"
+    if not math.isfinite(value):
+        return f"{name} = {value} is not a finite number"
+    low, high = (math.copysign(math.inf, v) if abs(v) == LARGEST else v for v in (LEAST[i], MOST[i]))
+    return f"{name} = {value:g} is outside {low:g} to {high:g}"
 
 
 def complete(node: Element, v: dict[str, Any]) -> None:

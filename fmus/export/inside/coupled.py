@@ -39,6 +39,8 @@ IDLE: list[carried.Carried] = []  # carried instances whose slave is gone, for r
 class Slave(common.Slave):
     """One instance of the carried FMU with its laws."""
 
+    computed = 0  # the states too are read from the carried FMU
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self.touched = set(BASE["restarted"])  # settable variables whose value the carried FMU must be told

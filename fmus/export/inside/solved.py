@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -16,21 +17,34 @@ STEP, OUTPUTS = (
 )
 
 
+Engine = tuple["array[float]", Stepper, Any, Any]  # values, their step, the call for the outputs, its buffer
+IDLE: list[Engine] = []  # whose slave is gone, for reuse: PythonFMU makes a new slave at every reset
+
+
+def engine() -> Engine:
+    """An array of all values, and the functions that work on its memory and hold no value of their own."""
+    values = common.START[:]
+    memory = memoryview(values)
+    x, u, p, y = (memory[a:b] for a, b in pairwise(accumulate(common.SIZES, initial=0)))
+    buffer: Any  # its type stubs ask for a size that a memoryview has
+    buffer, compute = OUTPUTS.buffer()
+    for i, part in enumerate((x, u, p)):
+        buffer.set_arg(i, part)
+    buffer.set_res(0, y)
+    return values, Stepper(STEP, x, u, p, common.MODEL["step_size"]), compute, buffer
+
+
 class Slave(common.Slave):
     """One instance of a model."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        # the functions work on the array's memory and hold no value of their own
-        memory = memoryview(self.values)
-        x, u, p, y = (memory[a:b] for a, b in pairwise(accumulate(common.SIZES, initial=0)))
-        self.stepper = Stepper(STEP, x, u, p, common.MODEL["step_size"])
-        buffer: Any  # its type stubs ask for a size that a memoryview has
-        buffer, self.compute = OUTPUTS.buffer()
-        for i, part in enumerate((x, u, p)):
-            buffer.set_arg(i, part)
-        buffer.set_res(0, y)
-        self.buffer = buffer
+        self.values, self.stepper, self.compute, self.buffer = IDLE.pop() if IDLE else engine()
+        self.values[:] = common.START
+
+    def __del__(self) -> None:
+        if hasattr(self, "buffer"):
+            IDLE.append((self.values, self.stepper, self.compute, self.buffer))
 
     def refresh(self) -> None:
         """Compute the outputs from states, inputs and parameters."""
