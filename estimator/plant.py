@@ -81,8 +81,3 @@ class Plants:
 
 PLANTS = Plants()
 Finalize(None, PLANTS.close, exitpriority=10)  # before the folders of their FMUs are deleted
-
-
-def held(u: Array) -> Array:
-    """Inputs (N, n_u) as held over the N - 1 steps: the mean of both ends."""
-    return (u[1:] + u[:-1]) / 2

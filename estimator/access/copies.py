@@ -61,7 +61,7 @@ class Copies:
     def close(self) -> None:
         """Free all instances."""
         for fmu, state in zip(self._fmus, self._saved, strict=False):
-            if not fmu._instance._fatal:
+            if not fmu.instance.dead:
                 forget(fmu, state)
         self._saved.clear()
         self._fmus.clear()

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fmus.host.fmu import Fmu
-from fmus.host.instance import FATAL
+from fmus.host.fmu import Fmu, FmuError
+from fmus.host.instance import CallFailed, address_of
 
 ROLES = ("set", "get", "step", "reset", "setup", "enter", "exit", "restore")
 NAMES = {
@@ -38,23 +38,18 @@ class Functions:
 
 def functions(copies: list[Fmu]) -> Functions:
     """The functions of instances of one FMU. The instances must outlive them."""
-    # the host keeps FMPy's object to itself; here is the only place that looks behind it
-    slaves = [fmu._instance._slave for fmu in copies]
+    instances = [fmu.instance for fmu in copies]
     names = NAMES[copies[0].description.fmi_version[:3]]
-    found = {role: getattr(slaves[0].dll, n, None) for role, n in zip(ROLES, names, strict=True) if n}
+    library = instances[0].library
+    found = {role: getattr(library, n, None) for role, n in zip(ROLES, names, strict=True) if n}
     calls = {role: call for role, call in found.items() if call is not None}
     addresses = [cast(calls[role], c_void_p).value if role in calls else 0 for role in ROLES]
     return Functions(
         copies[0].description.fmi_version.startswith("3"),
         calls,
-        tuple(address_of(s.component) for s in slaves),
+        tuple(instance.component for instance in instances),
         np.array(addresses, dtype=np.int64),
     )
-
-
-def address_of(pointer: Any) -> int:
-    """The address that a pointer of FMPy's holds."""
-    return int(getattr(pointer, "value", pointer) or 0)
 
 
 def setter(f: Functions, component: int, references: NDArray[np.uint32], values: Any) -> Call:
@@ -106,17 +101,13 @@ def saved_in_initialisation(fmu: Fmu, start: Mapping[str, float], t0: float) -> 
 
     Raises FmuError where the FMU refuses one of it.
     """
-    instance = fmu._instance
-
-    def prepared() -> Any:
-        instance._call(instance._slave.reset)
-        instance.set(fmu.references(start), list(start.values()))
-        instance._enter_initialisation(t0)
+    instance = fmu.instance
+    try:
+        instance.enter(fmu.references(start), list(start.values()), t0)
         state = instance.state()
-        instance._call(instance._slave.exitInitializationMode)
-        return state
-
-    state = fmu._safely(prepared)
+        instance.leave()
+    except CallFailed as error:
+        raise FmuError(f"{fmu.name}: {error}") from error
     fmu.time = t0
     return address_of(state)
 
@@ -128,8 +119,6 @@ def forget(fmu: Fmu, state: int) -> None:
 
 def reason(fmu: Fmu, status: int) -> str:
     """Why an instance refused a raw call; after a fatal failure it is not even freed."""
-    said = fmu._instance.messages
-    words = said[-1] if said else f"it gave status {status} and no reason"
-    if status == FATAL:
-        fmu._instance._fatal = words
-    return words
+    fmu.instance.failed("a raw call", status)
+    said = fmu.instance.messages
+    return said[-1] if said else f"it gave status {status} and no reason"

@@ -136,6 +136,16 @@ class Instance(ABC):
         """Whether it failed fatally, after which no call may be made."""
         return bool(self._fatal)
 
+    @property
+    def library(self) -> Any:
+        """The FMU's functions as ctypes knows them, for loops of raw calls."""
+        return self._slave.dll
+
+    @property
+    def component(self) -> int:
+        """The instance's address: the first argument of those functions."""
+        return address_of(self._slave.component)
+
     def failed(self, what: str, status: int) -> str:
         """What failed and why, for a raw call whose status is above WARNING."""
         return self._failed(what, status)
@@ -221,6 +231,11 @@ class Instance(ABC):
     def _reason(self, what: str) -> str:
         said = f": {self.messages[-1]}" if self.messages else ""
         return what + said
+
+
+def address_of(pointer: Any) -> int:
+    """The address that a pointer of FMPy's holds."""
+    return int(getattr(pointer, "value", pointer) or 0)
 
 
 def heard(instance: str, status: int, message: bytes | None) -> None:
