@@ -1,12 +1,12 @@
 """A filter's way through a record: what it believed at each sample, and how well it foresaw the next."""
 
-from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from estimator.algebra import compiled
 from estimator.estimate import Diverged, Estimate
 from estimator.record import Array, BoolArray
 
@@ -89,7 +89,7 @@ def filtered(
     filter: Steps, s: Samples, tell: Callable[[float], None] = lambda _: None, keep: bool = False
 ) -> History:
     """Take a filter through samples; one that diverges stops with what it has. tell: hears the share done."""
-    rows, kept, last, broken = _Rows(len(filter.names), s.y.shape[1]), [], filter.now, ""
+    rows, kept, last, broken = _Rows(len(s.t), len(filter.names), s.y.shape[1]), [], filter.now, ""
     steps = s.steps.tolist()
     for k in range(len(s.t)):
         try:
@@ -109,26 +109,39 @@ def filtered(
 
 
 class _Rows:
-    """Rows of a history that grows."""
+    """Rows of a history: time, NIS, likelihood, freedom; then x, deviations, innovations, what was gated."""
 
-    def __init__(self, n: int, m: int) -> None:
-        self._n, self._m, self._rows, self._facts = n, m, array("d"), array("d")
+    def __init__(self, most: int, n: int, m: int) -> None:
+        self._rows, self._ends, self._k = np.empty((most, 4 + 2 * n + 2 * m)), np.cumsum([4, n, n, m]), 0
+        self._unknown = np.full((m, m), np.nan)
 
     def add(self, e: Estimate) -> None:
-        self._rows.extend((e.t, *e.x.tolist(), *np.sqrt(np.diag(e.P)).tolist()))
-        std = np.sqrt(np.diag(e.S)) if e.S.size else np.nan
-        self._rows.extend((e.innovation / std).tolist())
-        self._rows.extend(e.gated.tolist())
-        self._facts.extend((e.nis, float(e.used.sum()), e.log_likelihood))
+        row, S = self._rows[self._k], e.S if e.S.size else self._unknown
+        row[0], row[1], row[2] = e.t, e.nis, e.log_likelihood
+        note(e.x, e.P, e.innovation, S, e.used, e.gated, row[3:])
+        self._k += 1
 
     def history(
         self, names: tuple[str, ...], last: Estimate, broken: str, kept: Sequence[Estimate]
     ) -> History:
-        n, m = self._n, self._m
-        rows = np.array(self._rows).reshape(-1, 1 + 2 * n + 2 * m)
-        nis, freedom, likelihood = np.array(self._facts).reshape(-1, 3).T
-        t, x, std, innovation, gated = np.split(rows, np.cumsum([1, n, n, m]), axis=1)
+        facts, x, std, innovation, gated = np.split(self._rows[: self._k], self._ends, axis=1)
+        t, nis, likelihood, freedom = facts.T
         return History(
-            names, t[:, 0], x, std, innovation, nis, freedom, gated > 0, float(likelihood.sum()),
+            names, t, x, std, innovation, nis, freedom, gated > 0, float(likelihood.sum()),
             last, broken, tuple(kept),
         )  # fmt: skip
+
+
+@compiled
+def note(
+    x: Array, P: Array, innovation: Array, S: Array, used: BoolArray, gated: BoolArray, row: Array
+) -> None:
+    """Fill a row from its freedom on; innovations (m,) are over the deviations expected in S (m, m)."""
+    n, m = len(x), len(innovation)
+    row[0] = 0.0
+    for i in range(n):
+        row[1 + i], row[1 + n + i] = x[i], np.sqrt(P[i, i])
+    for i in range(m):
+        row[0] += used[i]
+        row[1 + 2 * n + i] = innovation[i] / np.sqrt(S[i, i]) if S[i, i] > 0 else np.nan
+        row[1 + 2 * n + m + i] = gated[i]
