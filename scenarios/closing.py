@@ -10,6 +10,7 @@ from pathlib import Path
 from joblib import cpu_count
 
 from estimator.closeloop.chain import Outcome, trace
+from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.problem import Problem
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
@@ -103,18 +104,25 @@ def _starts(description: FmuDescription, calibrate: Iterable[str]) -> dict[str, 
 
 
 def augment(
-    builder: Builder, e: Experiment, problem: Problem, found: Outcome, folder: Path, tell: Tell
+    builder: Builder,
+    e: Experiment,
+    problem: Problem,
+    found: Outcome,
+    folder: Path,
+    tell: Tell,
+    instead: Hypothesis | None = None,
 ) -> tuple[Path, ...]:
     """Write the FMU with the effects found; declared and found values are its start values. All files.
 
     The first is a PythonFMU build. The second is of our models the native build, of a foreign FMU an SSP
-    package of it and the effects; `tell` hears why where there is none.
+    package of it and the effects; `tell` hears why where there is none. instead: what is built in where no
+    hypothesis was chosen.
     """
     from scenarios.exchange.augmented import export_augmented  # here because it imports from this file
 
-    best = found.chosen or found.base
+    best = found.chosen or instead or found.base
     effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
-    starts, origin = {**problem.declared, **best.theta}, origin_of(e, found)
+    starts, origin = {**problem.declared, **best.theta}, origin_of(e, best, found.judgement.verdict)
     files = [builder.final(effects, starts, folder, origin)]
     try:
         if isinstance(builder, ModelBuilder):
@@ -127,14 +135,13 @@ def augment(
     return tuple(files)
 
 
-def origin_of(e: Experiment, found: Outcome) -> Origin:
-    """The experiment with the estimates of the best hypothesis; faults of sensors are none of the FMU."""
-    best = found.chosen or found.base
+def origin_of(e: Experiment, best: Hypothesis, verdict: str) -> Origin:
+    """The experiment with the estimates of a hypothesis; faults of sensors are none of the FMU."""
     faults = {u.name for c in best.candidates if c.is_fault for u in c.unknowns}
     errors = {n: s if isfinite(s) else None for n, s in best.fit.std.items() if n not in faults}
     return Origin(
         experiment=e.id,
         estimates={n: (best.fit.theta[n], s) for n, s in errors.items()},
         data={file.name: checksum(file) for file in e.data_files},
-        verdict=found.judgement.verdict,
+        verdict=verdict,
     )
