@@ -192,6 +192,15 @@ def test_a_broken_covariance_is_never_carried_on(P, words):
         Ukf(made, Estimate(0.0, start.x, P), Q, R, DT)
 
 
+def test_outputs_without_any_scatter_are_named():
+    made, start, _, R = system(np.random.default_rng(1))
+    blind = Linear(made.F, made.B, 0 * made.H, made.D, NAMES, OUTPUTS)
+    with pytest.raises(Diverged, match="at t = 0 s the variance of 'seen' is 0"):
+        Ukf(blind, start, np.eye(3), 0 * R, DT).step(np.zeros(1), np.array([3.0, 3.0]))
+    with pytest.raises(Diverged, match="variance of 'felt' is -"):
+        Ukf(made, start, np.eye(3), np.diag([1.0, -1e3]), DT).step(np.zeros(1), np.zeros(2))
+
+
 def test_a_state_that_leaves_the_numbers_ends_the_filter_with_what_it_has():
     made, start, Q, R = system(np.random.default_rng(1))
     wild = Linear(made.F * 1e200, made.B, made.H, made.D, NAMES, OUTPUTS)

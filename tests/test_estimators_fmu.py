@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from numpy.testing import assert_allclose, assert_array_equal
 
 from estimator.access.recipe import Way
@@ -127,6 +128,58 @@ def identity(joint):
 
     n = len(joint.names)
     return Linear(np.eye(n), np.zeros((n, 1)), np.eye(n)[:2], np.zeros((2, 1)), joint.names, joint.outputs)
+
+
+def test_with_an_fmu_it_is_filterpys_unscented_filter_to_the_ninth_digit(built):
+    """The wheelset with its friction and the alignment behind a shaping filter, as in the friction row."""
+    rng, dt, outputs = np.random.default_rng(8), 1e-3, ["y", "psi", "y_dot", "psi_dot"]
+    spreads = {"y": 1e-3, "psi": 1e-3, "y_dot": 1e-2, "psi_dot": 1e-2, "y_m": 1e-3, "y_m_dot": 1e-2}
+    states = [UnknownState(n, 0.1 * std, std, 1e-3 * std) for n, std in spreads.items()]
+    friction = [UnknownParameter("mu0", 0.4, 0.1, bounded((0.01, 0.6)), 0.005)]
+    alignment = [Shaped("y_irr", 0.8e-3, 1.5, "y_irr_dot", 1.0)]
+    R = np.diag([1e-4, 1e-5, 1e-3, 1e-3]) ** 2
+    with Joint(
+        built("wheelset"), outputs, states, friction, alignment, constants={"V": 40.0}, dt=dt
+    ) as joint:
+        start = joint.start()
+        ours = Ukf(joint, start, joint.noise, R, dt)
+        ours.step(np.empty(0), np.full(4, np.nan))
+
+        def move(x, dt):
+            return joint.f(x[None], np.empty(0), 0.0, dt, start.carried)[0][0]
+
+        points = MerweScaledSigmaPoints(9, 1.0, 2.0, 0.0)
+        theirs = UnscentedKalmanFilter(9, 4, dt, lambda x: x[:4], move, points)
+        theirs.x, theirs.P, theirs.Q, theirs.R = start.x, start.P, joint.noise(dt), R
+        for _ in range(40):
+            y = rng.standard_normal(4) * [2e-4, 2e-5, 2e-3, 2e-3]
+            theirs.predict()
+            theirs.update(y)
+            found = ours.step(np.empty(0), y)
+            size = np.sqrt(np.diag(found.P))
+            assert_allclose(found.x / size, theirs.x / size, atol=1e-9)
+            assert_allclose(found.P / np.outer(size, size), theirs.P / np.outer(size, size), atol=1e-9)
+            assert found.log_likelihood == pytest.approx(theirs.log_likelihood, abs=1e-8)
+
+
+def test_the_oscillators_filter_believes_what_it_should_over_50_seeds(vdp):
+    """Truth drawn from what is believed: then errors scatter as the covariance says."""
+    R, last = np.array([[VDP_NOISE**2]]), []
+    t = VDP_DT * np.arange(400)
+    u = np.sin(0.7 * t)[:, None]
+    with vdp_joint(vdp) as joint:
+        start, Q = joint.start(), joint.noise(VDP_DT)
+        for seed in range(50):
+            rng = np.random.default_rng(1000 + seed)
+            x, carried = rng.multivariate_normal(start.x, start.P), start.carried
+            filter = Ukf(joint, start, joint.noise, R, VDP_DT)
+            for k in range(len(t)):
+                if k:
+                    held = (u[k] + u[k - 1]) / 2
+                    x = rng.multivariate_normal(joint.f(x[None], held, t[k - 1], VDP_DT, carried)[0][0], Q)
+                e = filter.step(u[k], x[:1] + VDP_NOISE * rng.standard_normal(1))
+            last.append(((e.x[2] - x[2]) / np.sqrt(e.P[2, 2])) ** 2)
+    assert mean_band(np.array(last), np.ones(50)).within
 
 
 def test_states_that_are_not_estimated_move_with_the_mean(built, torque):
