@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import secrets
+import signal
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,6 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="leave out the others")
     parser.add_argument("--only-make", action="store_true", help="make the records, answer none")
     a = parser.parse_args(arguments)
+    for stopping in (signal.SIGINT, signal.SIGTERM):  # both end the record's process too
+        signal.signal(stopping, signal.default_int_handler)
     seed = secrets.randbelow(10**6) if a.seed is None else a.seed
     chosen = [p for p in plans(seed, a.count) if p.system in a.systems]
     challenge = Challenge(a.out / f"seed-{seed}-{a.count}", seed, a.limit, a.cores)

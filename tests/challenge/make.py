@@ -13,7 +13,6 @@ from tests.challenge.truth import Item, Truth
 from tests.truth.more import More, made
 from tests.truth.rig import measured
 from tests.truth.rig_effects import SensorFault
-from tests.truth.rig_inputs import Array
 from tests.truth.wheelset_effects import CONDITIONS, FRICTION
 from tests.truth.wheelset_motion import Wheelset
 
@@ -21,24 +20,38 @@ LOWEST = 60.0  # s, over which a drift of mu0 goes on
 SHARE = {"limit_share": "limit", "slew_share": "slew"}
 WORSE = ("wet", "low", "very_low")  # than dry
 DIGITS = 8
+ATTEMPTS = 8
 
 
 def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
     """Write the record's folder, then the file of its truth; what is there already is kept.
 
-    Raises ValueError where the truth cannot be simulated.
+    Sizes under which the system leaves what its model can say (a wheel locks, a flange climbs) are drawn
+    again. Raises ValueError where that does not help.
     """
     told = truths / f"{plan.name}.json"
     if told.exists():
         return Truth.read(told)
-    rng = np.random.default_rng([seed, plan.index, len(plan.group)])
+    for attempt in range(ATTEMPTS):
+        try:
+            truth, text, columns = tried(plan, np.random.default_rng([seed, plan.index, attempt]))
+        except ValueError as error:
+            why = error
+            continue
+        write(records / plan.name, text, columns)
+        truth.write(told)
+        return truth
+    kinds = " and ".join(f"{e.kind}@{location}" for e, location in plan.entries)
+    raise ValueError(f"{plan.name}: {ATTEMPTS} draws of {kinds} failed, the last: {why}")
+
+
+def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
+    """A record with one draw of conditions and sizes: truth, experiment.toml, columns of the data."""
     raw = [(e, location, e.sizes(rng)) for e, location in plan.entries]
     here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
     items = tuple(Item(e.kind, p, settled(e.kind, p, sizes, here)) for e, p, sizes in raw)
     truth, seen = measure(plan, items, here, rng)
-    write(records / plan.name, plan.name, here, seen, effect_of(items, here))
-    truth.write(told)
-    return truth
+    return truth, here.toml(plan.name, effect_of(items, here)), {"time": here.t, **here.inputs, **seen}
 
 
 def _lowest_mu0(sizes: list[tuple[str, dict[str, Any]]]) -> float:
@@ -140,17 +153,10 @@ def measure(
     return truth, seen
 
 
-def write(home: Path, name: str, here: Bench, seen: Outputs, more: More) -> None:
+def write(home: Path, text: str, columns: Outputs) -> None:
     """experiment.toml and data.csv, as of a measured record."""
     home.mkdir(parents=True, exist_ok=True)
-    columns: list[Array] = [here.t, *here.inputs.values(), *seen.values()]
-    header = ",".join(["time", *here.inputs, *seen])
-    np.savetxt(
-        home / "data.csv",
-        np.column_stack(columns),
-        fmt=f"%.{DIGITS}g",
-        delimiter=",",
-        header=header,
-        comments="",
-    )
-    (home / "experiment.toml").write_text(here.toml(name, more), encoding="utf-8")
+    table = np.column_stack([*columns.values()])
+    head = ",".join(columns)
+    np.savetxt(home / "data.csv", table, fmt=f"%.{DIGITS}g", delimiter=",", header=head, comments="")
+    (home / "experiment.toml").write_text(text, encoding="utf-8")

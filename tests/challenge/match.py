@@ -58,8 +58,8 @@ def other_names(system: str, item: Item) -> set[Pair]:
     if system == "wheelset" and kind in LAWS:
         if at in ("primary_yaw", "wheelset_yaw") and not kind.endswith("_change"):
             found |= {(kind, "primary_yaw"), (kind, "wheelset_yaw")}  # one port under two names
-        if at == "wheelset_lateral" and kind in OF_NO_MOTION:
-            found.add((kind, "contact"))  # both push the wheelset aside
+        if at in ("wheelset_lateral", "contact") and kind in OF_NO_MOTION:
+            found |= {(kind, "wheelset_lateral"), (kind, "contact")}  # both push the wheelset aside
     if system in ("vehicle", "wheelset") and at.startswith(SUSPENSIONS):
         if kind == "viscous_damping":
             found.add(("damping_change", at))  # the damper with more of it

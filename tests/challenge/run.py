@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
@@ -99,12 +100,11 @@ def _waited(process: subprocess.Popen[str], until: float, stop: Event) -> str | 
 
 def _end(process: subprocess.Popen[str]) -> None:
     """End a process with all that it started."""
-    try:
+    with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        return
-    finally:
-        process.wait()
+    process.wait()
+    if process.stderr:
+        process.stderr.close()
 
 
 def run(

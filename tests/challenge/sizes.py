@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 Draw = Callable[[np.random.Generator], float]
-
-
-@dataclass(frozen=True)
-class OfPeak:
-    """A share of the largest magnitude of the input that the effect acts on."""
-
-    share: float
 
 
 def log(low: float, high: float) -> Draw:
