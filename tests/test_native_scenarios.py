@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fmus.export.native.build import build_native
+from fmus.export.provenance import provenance
 from fmus.export.pythonfmu import build_python
 from fmus.host.recording import read_recording
 from scenarios.running import run
@@ -27,7 +28,7 @@ class Forced(Builder):
 
     def __init__(self, folder, build):
         super().__init__(folder)
-        self._own, self._build_model, self._known = folder, build, {}
+        self._own, self._build_model, self._known, self._used = folder, build, {}, {}
 
     def path(self, member, key, scenario):
         if member.model is None:
@@ -36,7 +37,12 @@ class Forced(Builder):
         if recipe not in self._known:
             out = self._own / f"forced{len(self._known)}"
             self._known[recipe] = self._build_model(model_of(member, scenario.parent), out)
+        self._used.setdefault(scenario, set()).add(self._known[recipe])
         return self._known[recipe]
+
+    def made(self, scenario):
+        """The FMUs of our models that a scenario got."""
+        return self._used[scenario]
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +58,8 @@ def test_a_scenario_is_the_same_by_every_build(file, builders, tmp_path):
         assert run(file, tmp_path / name, builder=builder).ok
         files = sorted(p for p in (tmp_path / name).glob("*.parquet") if "measured" not in p.name)
         found[name] = {p.name: read_recording(p).data for p in files}
+        kinds = {(provenance(fmu)["kind"], provenance(fmu)["fmi"]) for fmu in builder.made(file)}
+        assert kinds == {("python" if name == "python" else "native", 3 if name == "fmi3" else 2)}
     assert found["python"]
     for variant, expected in found["python"].items():
         native = found["fmi2"][variant]
