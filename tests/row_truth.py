@@ -13,11 +13,12 @@ import numpy as np
 
 from scenarios.rows import ROWS
 from scenarios.rows.case import TIME, Case, Record
+from tests.row_truth_charles import of_charles
+from tests.row_truth_mal import of_mal, piece
 from tests.row_truth_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
 from tests.truth.rig_inputs import Inputs, trapezium
 from tests.truth.vehicle_effects import Law
-from tests.truth.wheelset_track import Run
 
 WRONG_PATCH = {"a": 3.4e-3, "b": 2.4e-3}  # m; the filter believes in a circle of 2.7 mm
 LARGEST_TORQUE = 852.0  # N.m, thesis 4.5
@@ -26,8 +27,12 @@ REST = 5.0  # s without torque at the beginning and the end, thesis 4.5
 
 def truth(case: Case) -> Record:
     """The record of a case, by the truth model of its kind."""
-    if "alignment_sd" in case.true:
+    if "gauge_sd" in case.true:
         return of_ward(case)
+    if "alignment_sd" in case.true:
+        return of_charles(case)
+    if case.judged:
+        return of_mal(case)
     return {"wheelset": of_wheelset, "testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
 
 
@@ -50,12 +55,6 @@ def of_wheelset(case: Case) -> Record:
     states = dict(zip(wheelset.COORDINATES, np.vstack(parts).T, strict=True))
     given = {"y_irr": run.y_irr[::2], "y_irr_dot": run.y_irr_dot[::2]}
     return Record({TIME: t, **given, **noisy(case, states, rng)})
-
-
-def piece(run: Run, first: int, last: int) -> Run:
-    """The samples `first` to `last` of a run."""
-    middle = slice(2 * first, 2 * last + 1)
-    return Run(run.V, run.t[first : last + 1], run.y_irr[middle], run.y_irr_dot[middle])
 
 
 def of_rig(case: Case) -> Record:

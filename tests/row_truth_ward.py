@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from scenarios.rows.case import TIME, Case, Record
+from scenarios.rows.case import TIME, TRUE, Case, Record
 from tests.truth.wheelset_contact import contacts
 from tests.truth.wheelset_track import random_alignment
 
@@ -83,4 +83,11 @@ def of_ward(case: Case) -> Record:
     true = dict(zip(names, np.array(rows).T, strict=True))
     seen = {n: true[n] + rng.normal(0.0, std, len(t)) for n, std in case.noise.items()}
     given = {"y_irr": d[::8], "y_irr_dot": d_dot[::8], "gauge_irr": gauge[::8]}
-    return Record({TIME: t, **given, **seen})
+    true["conicity"] = conicity(g, true["y"] - d[::8])
+    return Record({TIME: t, **given, **seen, **{n + TRUE: true[n] for n in case.judged}})
+
+
+def conicity(g, y):
+    """Half the difference of the rolling radii over the shift y (n,), m, at nominal gauge."""
+    y = np.where(np.abs(y) < 1e-4, 1e-4, y)
+    return (np.interp(y, g.y, g.r) - np.interp(-y, g.y, g.r)) / (2 * y)

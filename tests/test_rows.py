@@ -77,11 +77,22 @@ def test_a_truth_jumps_when_its_case_says_so(small):
     assert case.truth("r_w", case.times).tolist() == [0.35, 0.35, 0.3, 0.3, 0.3]
 
 
+def test_a_truth_goes_through_all_its_jumps_within_the_run(small):
+    further = ((0.015, {"r_w": 0.25}), (0.5, {"r_w": 0.2}))
+    case = replace(small, later={"r_w": 0.3}, when=0.01, further=further)
+    assert case.truth("r_w", case.times).tolist() == [0.35, 0.35, 0.3, 0.25, 0.25]
+    assert [when for when, _ in case.jumps] == [0.01, 0.015]
+
+
 @pytest.mark.parametrize("model", ANY_MODEL)
 def test_twin_and_truth_measure_what_a_case_asks_for(model):
     dt = 1e-3 if model == "wheelset" else 0.01
-    row = next(r for r in ROWS.values() if r.model == model)
-    case = replace(row.cases[-1], duration=11.0 if model == "testrig" else 4.0, when=2.0, dt=dt)
+    row = {
+        "testrig": "rolling_radius",
+        "vehicle7dof": "secondary_stiffness",
+        "wheelset": "contact_force_ekf",
+    }[model]
+    case = replace(ROWS[row].cases[-1], duration=11.0 if model == "testrig" else 4.0, when=2.0, dt=dt)
     for record in (twin(native(model))(case), truth(case)):
         assert set(record.columns) == set(case.columns)
         assert all(len(x) == len(case.times) and np.isfinite(x).all() for x in record.columns.values())

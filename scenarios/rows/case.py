@@ -12,6 +12,7 @@ from fmus.errors import BadInput, did_you_mean
 from scenarios.readers import read_sheet
 
 TIME = "time"
+TRUE = "_true"  # ending of a column that holds what no sensor sees
 DIGITS = 9  # significant ones of a record in a file
 
 
@@ -20,7 +21,8 @@ class Case:
     """A run that is to be measured. Units are SI, variables those of the model.
 
     inputs, noise: what a record holds besides the time; noise: standard deviation of each measured output.
-    true: parameters that differ from the declared ones; later: those that jump at `when` [s], and to what.
+    true: parameters that differ from the declared ones; later: those that jump at `when` [s], and to what;
+    further: jumps after that one. judged: outputs whose true course is to be known too, in NAME_true.
     speed: m/s, on the rig Hz of the supply. More than that, such as the track, is the truth's own.
     """
 
@@ -34,12 +36,20 @@ class Case:
     true: Mapping[str, float] = field(default_factory=dict)
     later: Mapping[str, float] = field(default_factory=dict)
     when: float = inf
+    further: tuple[tuple[float, Mapping[str, float]], ...] = ()
+    judged: tuple[str, ...] = ()
     seed: int = 1
 
     @property
     def columns(self) -> tuple[str, ...]:
         """What a record of it holds."""
-        return TIME, *self.inputs, *self.noise
+        return TIME, *self.inputs, *self.noise, *(name + TRUE for name in self.judged)
+
+    @property
+    def jumps(self) -> tuple[tuple[float, Mapping[str, float]], ...]:
+        """Times [s] within the run at which parameters jump, in order, and to what."""
+        every = ((self.when, self.later), *self.further) if self.later else ()
+        return tuple((when, to) for when, to in every if when < self.duration)
 
     @property
     def times(self) -> Array:
@@ -48,8 +58,11 @@ class Case:
 
     def truth(self, name: str, t: Array) -> Array:
         """A true parameter at times t (N,)."""
-        first = self.true[name]
-        return np.where(t >= self.when, self.later.get(name, first), first)
+        found = np.full_like(t, self.true[name])
+        for when, to in self.jumps:
+            if name in to:
+                found[t >= when] = to[name]
+        return found
 
 
 @dataclass(frozen=True)

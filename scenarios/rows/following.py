@@ -3,12 +3,23 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Protocol
 
 import numpy as np
 
 from estimator.estimate import Diverged, Filter
-from estimator.joint import Joint
 from estimator.record import Array
+
+
+class Named(Protocol):
+    """A system whose coordinates have names, and values in units of their own."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates."""
+
+    def values(self, x: Array, std: Array) -> tuple[Array, Array]:
+        """What x (N, n) and its deviations (N, n) mean, (N, n) each."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +40,7 @@ class Followed:
         return float((self.t[-1] - self.t[0]) / self.seconds)
 
 
-def follow(filter: Filter, joint: Joint, t: Array, u: Array, y: Array) -> Followed:
+def follow(filter: Filter, joint: Named, t: Array, u: Array, y: Array) -> Followed:
     """Lead a filter on that system through inputs u (N, k) and outputs y (N, m) at times t (N,)."""
     x, spread = np.full((2, len(t), len(joint.names)), np.nan)
     likelihood, nis, reason = 0.0, 0.0, ""
@@ -47,7 +58,7 @@ def follow(filter: Filter, joint: Joint, t: Array, u: Array, y: Array) -> Follow
     return Followed(t, *named(joint, x, spread), likelihood, nis / len(t), took, reason)
 
 
-def named(joint: Joint, x: Array, std: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+def named(joint: Named, x: Array, std: Array) -> tuple[dict[str, Array], dict[str, Array]]:
     """Coordinates (N, n) and their deviations (N, n) by name, in the FMU's units."""
     value, spread = (dict(zip(joint.names, c.T, strict=True)) for c in joint.values(x, std))
     return value, spread

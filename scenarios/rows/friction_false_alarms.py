@@ -15,13 +15,14 @@ from scenarios.rows.parameter_figure import Line, Panel, parameter_figure
 from scenarios.rows.row import Measured, Row, Tell
 
 PROBABILITY = 0.95  # of mu0 below the critical value, from which on railfmi estimate warns
+RAILS = ("dry", "wet")
 PARTS, LENGTH = 6, 600.0  # runs that make the hour, and their duration, s
 THIN = 50  # samples of the figure
 
 CASES = tuple(
     replace(case, name=f"{case.name}-{seed}", duration=LENGTH, seed=seed)
     for case in CONDITIONS
-    if case.name in ("dry", "wet")
+    if case.name in RAILS
     for seed in range(11, 11 + PARTS)
 )
 
@@ -51,7 +52,9 @@ def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
         thin = slice(None, None, THIN)
         line = Line(found.t[thin], found.value["mu0"][thin], found.std["mu0"][thin])
         panels.append(Panel(case.name, [case.truth("mu0", line.t)], {"estimated": line}, "mu0", (0.0, 0.6)))
-    return Outcome(ROW.name, findings, [parameter_figure(ROW.name, panels)], NOTES)
+    sheets = {on: [p for p in panels if p.title.startswith(on)] for on in RAILS}
+    plots = [parameter_figure(f"{ROW.name}_{on}", shown) for on, shown in sheets.items() if shown]
+    return Outcome(ROW.name, findings, plots, NOTES)
 
 
 def _begun(on: BoolArray) -> float:

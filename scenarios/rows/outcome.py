@@ -34,6 +34,11 @@ class Finding:
             return None
         return self.ours <= self.target if self.bound == "<=" else self.ours >= self.target
 
+    @property
+    def wanted(self) -> str:
+        """The target with its bound; empty where there is none."""
+        return "" if self.target is None else f"{self.bound} {self.target:.4g}"
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -45,9 +50,24 @@ class Outcome:
     notes: Sequence[str] = ()
 
     @property
+    def missed(self) -> list[Finding]:
+        """What does not meet its target."""
+        return [f for f in self.findings if f.met is False]
+
+    @property
+    def aimed(self) -> int:
+        """How many findings have a target."""
+        return sum(f.target is not None for f in self.findings)
+
+    @property
+    def met(self) -> int:
+        """How many of them meet it."""
+        return self.aimed - len(self.missed)
+
+    @property
     def ok(self) -> bool:
         """Whether every target is met."""
-        return all(f.met is not False for f in self.findings)
+        return not self.missed
 
     def write(self, folder: Path) -> None:
         """Write result.json, table.md and the figures."""
@@ -65,10 +85,9 @@ def table(findings: Sequence[Finding]) -> str:
     lines = ["| case | what | source | ours | target | met |", "|---|---|---|---|---|---|"]
     for f in findings:
         source = "" if f.source is None else f"{f.source:.4g}"
-        target = "" if f.target is None else f"{f.bound} {f.target:.4g}"
         met = {None: "", True: "yes", False: "**no**"}[f.met]
         what = f"{f.what} [{f.unit}]" if f.unit != "1" else f.what
-        lines.append(f"| {f.case} | {what} | {source} | {f.ours:.4g} | {target} | {met} |")
+        lines.append(f"| {f.case} | {what} | {source} | {f.ours:.4g} | {f.wanted} | {met} |")
         if f.note:
             lines[-1] = lines[-1].removesuffix(" |") + f" {f.note} |"
     return "\n".join(lines) + "\n"

@@ -1,6 +1,7 @@
 """Records made by the FMU itself: for trying a row, not for judging it, since nothing in them is unknown."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
-from scenarios.rows.case import TIME, Case, Record, Source
+from scenarios.rows.case import TIME, TRUE, Case, Record, Source
 from scenarios.track.spectra import SPECTRA, Spectrum
 from scenarios.track.statistics import CHOCEN_DOBRIKOV
 
@@ -28,21 +29,23 @@ def twin(fmu: Path) -> Source:
         _check(case, fmu)
         rng, t = np.random.default_rng(case.seed), case.times
         inputs = INPUTS[case.model](case, t, rng)
-        at = min(round(case.when / case.dt), len(t) - 1) if case.later else len(t) - 1
+        edges = [0, *(round(when / case.dt) for when, _ in case.jumps), len(t) - 1]
+        start = {**({"V": case.speed} if case.model == "wheelset" else {}), **case.true}
+        found = []
         with Fmu(fmu) as plant:
             states = list(plant.description.states)
-            wanted = [*case.noise, *states]
-            constant = {"V": case.speed} if case.model == "wheelset" else {}
-            start = {**constant, **case.true}
-            first = {n: u[: at + 1] for n, u in inputs.items()}
-            y = plant.simulate(t[: at + 1], first, wanted, start)
-            if at < len(t) - 1:
-                now = dict(zip(states, y[-1, len(case.noise) :].tolist(), strict=True))
-                rest = {n: u[at:] for n, u in inputs.items()}
-                later = plant.simulate(t[at:], rest, wanted, {**start, **case.later, **now})
-                y = np.vstack([y, later[1:]])
+            wanted = [*case.noise, *case.judged, *states]
+            for i, (first, last) in enumerate(pairwise(edges)):
+                start = {**start, **(case.jumps[i - 1][1] if i else {})}
+                part = slice(first, last + 1)
+                y = plant.simulate(t[part], {n: u[part] for n, u in inputs.items()}, wanted, start)
+                found.append(y[min(i, 1) :])
+                start |= dict(zip(states, y[-1, -len(states) :].tolist(), strict=True))
+        y = np.vstack(found)
         seen = {n: y[:, i] + rng.normal(0.0, std, len(t)) for i, (n, std) in enumerate(case.noise.items())}
-        return Record({TIME: t, **inputs, **seen})
+        at = len(case.noise)
+        true = {n + TRUE: y[:, at + i] for i, n in enumerate(case.judged)}
+        return Record({TIME: t, **inputs, **seen, **true})
 
     return make
 
@@ -51,7 +54,7 @@ def _check(case: Case, fmu: Path) -> None:
     """BadInput where the FMU is not what a case was measured on."""
     with Archive(fmu) as archive:
         known = archive.description.variables
-    for name in (*case.inputs, *case.noise, *case.true):
+    for name in (*case.inputs, *case.noise, *case.judged, *case.true):
         if name not in known:
             raise BadInput(f"case '{case.name}': the FMU has no '{name}' to make a record with; give records")
 
