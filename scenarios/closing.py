@@ -57,10 +57,10 @@ def close_loop(
         finally:
             PLANTS.close()
         if folder is None:
-            return result_of(declared.id, problem, found, time.monotonic() - begun, None)
+            return result_of(declared.id, problem, found, time.monotonic() - begun, ())
         tell("building the augmented FMU and writing the report")
         augmented = augment(builder, declared, problem, found, folder, tell)
-        result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented[0])
+        result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented)
         write_report(folder, problem, found, result)
         result.write(folder / "result.json")
         return result
@@ -110,17 +110,15 @@ def augment(
     found: Outcome,
     folder: Path,
     tell: Tell,
-    instead: Hypothesis | None = None,
 ) -> tuple[Path, ...]:
     """Write the FMU with the effects found; declared and found values are its start values. All files.
 
     The first is a PythonFMU build. The second is of our models the native build, of a foreign FMU an SSP
-    package of it and the effects; `tell` hears why where there is none. instead: what is built in where no
-    hypothesis was chosen.
+    package of it and the effects; `tell` hears why where there is none.
     """
     from scenarios.exchange.augmented import export_augmented  # here because it imports from this file
 
-    best = found.chosen or instead or found.base
+    best = found.built_in or found.base
     effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
     starts, origin = {**problem.declared, **best.theta}, origin_of(e, best, found.judgement.verdict)
     files = [builder.final(effects, starts, folder, origin)]

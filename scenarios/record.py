@@ -10,13 +10,11 @@ from fmus.host.description import FmuDescription
 from fmus.units import conversion
 from scenarios.checks import check_cells, check_gaps, check_time, output_notes, time_notes
 from scenarios.experiment import Experiment, check_names
-from scenarios.readers import READERS, read_sheet
+from scenarios.readers import read_sheet
 from scenarios.readers.units import StatedUnits
 
 MIN_SAMPLES = 50  # in each part; fewer cannot show an error beyond its own scatter
 MIN_MEASURED = 2  # of an output in each file; fewer have no motion
-
-__all__ = ["READERS", "load_record"]
 
 
 def load_record(experiment: Experiment, description: FmuDescription, missing: bool = False) -> Record:

@@ -10,7 +10,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.freeform import curve_of
-from estimator.closeloop.honesty import Honesty
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import KINDS
 from fmus.host.archive import describe
@@ -34,15 +33,13 @@ ROWS = 15  # of the table of rejected hypotheses
 Values = dict[str, Any]
 
 
-def write_report(
-    folder: Path, problem: Problem, found: Outcome, result: Result, honesty: Honesty | None = None
-) -> None:
+def write_report(folder: Path, problem: Problem, found: Outcome, result: Result) -> None:
     """Write report.html and the figures into a folder.
 
     The page holds its figures and its style and asks for nothing else.
     """
-    free = (honesty.free_form,) if honesty and honesty.free_form else ()
-    case = Case(problem, found, result, glossary(problem, (*found.judgement.members, *free)), honesty)
+    free = (found.free_form,) if found.free_form else ()
+    case = Case(problem, found, result, glossary(problem, (*found.judgement.members, *free)))
     env = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -61,7 +58,7 @@ def write_report(
 
 def _figures(case: Case, folder: Path) -> Values:
     """Draw all figures, write them, and embed them."""
-    problem, found, words, free = case.problem, case.found, case.words, case.free_form
+    problem, found, words, free = case.problem, case.found, case.words, case.found.free_form
 
     errors = error_table.error_values(case)
 
@@ -97,8 +94,8 @@ def _law(case: Case) -> Values:
         "laws": list(sections.laws(case)),
         "calibrated": list(sections.calibrated(case)),
         "has_effect": case.found.chosen is not None,
-        "has_after": case.after is not None,
-        "curve": curve_of(case.free_form) if case.free_form else None,
+        "has_after": case.found.built_in is not None,
+        "curve": curve_of(case.found.free_form) if case.found.free_form else None,
     }
 
 
@@ -124,7 +121,7 @@ def _rejection(case: Case) -> Values:
 
 def _use(case: Case, folder: Path) -> Values:
     """How to run the augmented FMU and how to repeat the run."""
-    chosen, fmu = case.after, folder / case.result.augmented_fmu
+    chosen, fmu = case.found.built_in, folder / case.result.augmented_fmu
     effects = [c for c in (chosen.candidates if chosen else ()) if not c.is_fault]
     theta = chosen.fit.theta if chosen else {}
     known = describe(fmu).variables if fmu.is_file() else {}

@@ -1,6 +1,7 @@
 """What close-loop found, as it is written to result.json."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ class Result:
     detection: dict[str, Any]
     notes: list[str] = field(default_factory=list)
     augmented_fmu: str = ""
+    augmented_files: list[str] = field(default_factory=list)
     power: list[dict[str, Any]] = field(default_factory=list)
     nomination: dict[str, Any] = field(default_factory=dict)
     free_form: dict[str, Any] = field(default_factory=dict)
@@ -77,14 +79,12 @@ def result_of(
     problem: Problem,
     found: Outcome,
     seconds: float,
-    augmented: Path | None,
-    honesty: Honesty | None = None,
+    augmented: Sequence[Path],
 ) -> Result:
-    """Put an outcome into the contract's words."""
-    members = found.judgement.members
-    curve = honesty.free_form if honesty else None
-    best = found.chosen or curve or found.base
-    rms = errors(problem, found, best, honesty)
+    """Put an outcome into the contract's words; augmented: files of the augmented FMU, the FMU first."""
+    members, honesty, curve = found.judgement.members, found.honesty, found.free_form
+    best = found.built_in or found.base
+    rms = errors(problem, found, best)
     outputs = problem.record.outputs
     closed = gap_closed(rms["before"], rms["after"], found.noise)
     return Result(
@@ -104,22 +104,23 @@ def result_of(
             "figures": dict(found.detection.figures),
         },
         notes=[n.sentence for n in problem.record.notes],
-        augmented_fmu=augmented.name if augmented else "",
+        augmented_fmu=augmented[0].name if augmented else "",
+        augmented_files=[file.name for file in augmented],
         power=[_line(v) for v in honesty.power] if honesty else [],
         nomination=_nomination(honesty) if honesty else {},
         free_form=_curve(curve) if curve else {},
     )
 
 
-def errors(problem: Problem, found: Outcome, best: Hypothesis, honesty: Honesty | None) -> dict[str, Array]:
+def errors(problem: Problem, found: Outcome, best: Hypothesis) -> dict[str, Array]:
     """RMSE on the test part, free run, of everything that is compared, (n_y,) each, and the noise floor."""
     compared = {"declared": found.declared, "before": found.base, "after": best}
     wrong = best_wrong(found)
     if wrong:
         compared["placebo"] = wrong
     rms = {k: h.rms(problem) for k, h in compared.items()}
-    if honesty:
-        rms["black_box"] = honesty.black_box.rms
+    if found.honesty:
+        rms["black_box"] = found.honesty.black_box.rms
     return rms | {"noise": found.noise}
 
 

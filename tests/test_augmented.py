@@ -83,7 +83,7 @@ def found(effects, values, verdict="traced"):
     )
     candidates = tuple(Candidate(kind, at, ()) for kind, at in effects)
     best = Hypothesis(candidates, fit, ())
-    return SimpleNamespace(chosen=best, base=best, judgement=SimpleNamespace(verdict=verdict))
+    return SimpleNamespace(built_in=best, base=best, judgement=SimpleNamespace(verdict=verdict))
 
 
 def experiment(folder):

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -452,8 +453,9 @@ def test_the_page_and_the_result_hold_what_a_report_owes(
     chosen = [*faults, *forces]
     change = list(zip(chosen, changes(asked, outcome.base.fit, chosen, NOISE, outcome.forces), strict=True))
     owed = honesty(asked, outcome.base, change, NOISE, LEVEL, np.random.default_rng(1), curve)
-    result = result_of("<nameless>", asked, outcome, 1.0, None, owed)
-    write_report(tmp_path, asked, outcome, result, owed)
+    told = replace(outcome, honesty=owed)
+    result = result_of("<nameless>", asked, told, 1.0, ())
+    write_report(tmp_path, asked, told, result)
     result.write(tmp_path / "result.json")
     written = json.loads((tmp_path / "result.json").read_text())
     for name, e in written["error"].items():

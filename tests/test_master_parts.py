@@ -22,7 +22,8 @@ from fmus.host.master import Master
 from fmus.host.recording import Recording, read_recording
 from fmus.host.signals import signal
 from scenarios.experiment import load_experiment
-from scenarios.record import READERS, load_record
+from scenarios.readers import READERS
+from scenarios.record import load_record
 from tests.coupled_models import COUPLED, START, STATES, Mass, Sprung
 from tests.packed import with_description
 

@@ -112,7 +112,10 @@ def test_samples_that_make_no_track(distance, rails, words):
 # ---- journeys and inputs
 
 
-@given(arrays(np.float64, 5, elements=st.floats(0.0, 60.0)), st.floats(-5, 30), st.floats(-100, 100))
+TIMES = st.floats(-5, 30).map(lambda t: round(t, 6))  # quad does not take 1e-308 s
+
+
+@given(arrays(np.float64, 5, elements=st.floats(0.0, 60.0)), TIMES, st.floats(-100, 100))
 def test_distance_is_the_integral_of_speed(speeds, t, start):
     run = journey((np.array([0.0, 2.0, 3.0, 10.0, 20.0]) + 1.5, speeds), start)
     exact = quad(run.speed, 0, t, points=[x for x in (1.5, 3.5, 4.5, 11.5, 21.5) if 0 < x < t] or None)[0]

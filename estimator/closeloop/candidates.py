@@ -1,7 +1,7 @@
 """Candidates: what could explain a residual, each with its unknowns and a first size to try."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from fmus.effects.site import Site
 from fmus.variables import Parameter
 
 FINE = 0.1  # of a shape parameter's value: a change of it that matters
+LARGEST = 200.0  # realistic sizes of a parameter's change: ten times the parameter
 MOMENT = 0.01  # of the record's length, the same for a time
 
 
@@ -128,7 +129,9 @@ def _of_a_parameter(
             own = a if location == name else f"{a}_{name}"
             sizes[own] = effect.size(value, _length(record))
     for shape in effect.guesses(_times(record)):
-        yield _candidate(effect, location, sizes, shape, _length(record))
+        found = _candidate(effect, location, sizes, shape, _length(record))
+        limited = (replace(u, low=-LARGEST * u.scale, high=LARGEST * u.scale) for u in found.amplitudes)
+        yield replace(found, amplitudes=tuple(limited))
 
 
 def _candidate(

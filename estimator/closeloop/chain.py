@@ -1,19 +1,22 @@
 """The chain: calibrate, detect, nominate, fit jointly, compare on held-out data, judge."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, hypotheses, ranked
-from estimator.closeloop.detect import Detection, detect
+from estimator.closeloop.detect import LEVEL, Detection, detect
+from estimator.closeloop.freeform import free_form
+from estimator.closeloop.honesty import Honesty, honesty
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.moments import at_their_moments
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.restarts import from_the_beginning
 from estimator.closeloop.screen import Promise, Screening, screen
 from estimator.closeloop.twins import twins, with_twins
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
@@ -43,11 +46,22 @@ class Outcome:
     singles: tuple[Hypothesis, ...]
     pairs: tuple[Hypothesis, ...]
     judgement: Judgement
+    honesty: Honesty | None = None
 
     @property
     def chosen(self) -> Hypothesis | None:
-        """The best member of the verdict's class: what the augmented FMU holds."""
+        """The best member of the verdict's class."""
         return self.judgement.members[0] if self.judgement.members else None
+
+    @property
+    def free_form(self) -> Hypothesis | None:
+        """The force of free form, where nothing explains."""
+        return self.honesty.free_form if self.honesty else None
+
+    @property
+    def built_in(self) -> Hypothesis | None:
+        """What the augmented FMU has more than the calibrated one: an effect, or a force of free form."""
+        return self.chosen or self.free_form
 
 
 def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: int = 0) -> Outcome:
@@ -66,19 +80,29 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     promises = screen(base.fit, [((c,), g) for c, g in change])
     tell("testing for a discrepancy against simulated records without one")
     detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
+    level = LEVEL / len(detection.figures)
+    owed = honesty(problem, base, change, size, level, np.random.default_rng(seed))
     found = (declared, base, noise, size, detection, tuple(forces), tuple(promises))
     early = without_fits(problem, base, detection, noise)
     if early:
-        return Outcome(*found, (), (), early)
+        return Outcome(*found, (), (), early, owed)
     alike = twins(change)
     doubled = {label for others in alike.values() for label in others}
-    promises = [p for p in at_their_moments(screening, base.fit, promises, LEADING) if p.label not in doubled]
+    promises = at_their_moments(screening, base.fit, promises, LEADING)
+    promises = [p for p in promises if p.label not in doubled and p.gain > owed.decoy_gain]
     chosen = nominated(promises, NOMINEES if builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, chosen, size, jobs)
     pairs: list[Hypothesis] = []
     floor_known = not np.isnan(problem.record.noise_std).any()
-    if not (floor_known and any(explains(problem, h, base, noise, size) for h in singles)):
+
+    def explained() -> bool:
+        return floor_known and any(explains(problem, h, base, noise, size) for h in singles)
+
+    if floor_known and not explained():
+        tell("fitting the leading ones to a growing part of the record")
+        singles = from_the_beginning(problem, base, singles, promises, size, jobs)
+    if not explained():
         tell("trying pairs of effects")
         single = [(c, g) for c, g in change if c.label not in doubled]
         pairs, freed = try_pairs(problem, base, singles, single, size, jobs)
@@ -86,7 +110,10 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     singles = with_twins(singles, alike)
     singles, pairs = (ranked(problem, h, size) for h in (singles, pairs))
     judgement = judge(problem, base, singles, pairs, noise, size)
-    return Outcome(*found, tuple(singles), tuple(pairs), judgement)
+    if judgement.verdict == "unexplained":
+        tell("fitting a force of free form")
+        owed = replace(owed, free_form=free_form(problem, base, forces, size, jobs, singles))
+    return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
 
 
 def nominated(promises: Sequence[Promise], most: int = NOMINEES) -> list[Promise]:

@@ -16,6 +16,8 @@ from fmus.host.fmu import FmuError
 
 BRIEF, LONG = 4, 10  # evaluations of a fit to rank it, and to finish it
 FINALISTS = 5
+GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
+ROUNDS, LAST = 4, 2  # of further LONG fits of the leading finalists, where they have not converged
 ABOARD = 6  # effects in one FMU
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
@@ -113,7 +115,26 @@ def hypotheses(
     limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
     hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
     again = [Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta}) for h in hopeful]
-    return fitted(problem, unknowns, again, size, LONG, jobs) + [h for h in brief if h not in hopeful]
+    return finished(problem, unknowns, again, size, jobs) + [h for h in brief if h not in hopeful]
+
+
+def finished(
+    problem: Problem, unknowns: Sequence[Unknown], promises: Sequence[Promise], size: Array, jobs: int
+) -> list[Hypothesis]:
+    """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain."""
+    found = fitted(problem, unknowns, promises, size, LONG, jobs)
+    for _ in range(ROUNDS):
+        short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < HOPELESS * cost(found[0])]
+        if not short:
+            break
+        more = [Promise(h.candidates, 0.0, h.fit.theta) for h in short]
+        before = sum(cost(h) for h in short)
+        rest = [h for h in found if h not in short]
+        longer = fitted(problem, unknowns, more, size, LONG, jobs)
+        found = best_by_label([*rest, *short, *longer])
+        if sum(cost(h) for h in longer) > GAINS * before:
+            break
+    return found
 
 
 def fitted(

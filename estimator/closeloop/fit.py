@@ -21,7 +21,7 @@ class Fit:
     """Values found, their standard errors, and the local picture around them.
 
     residual: (m,) weighted, on the identify part; jacobian: (m, n) its derivatives by the unknowns;
-    covariance: (n, n), from blocks of the record where residuals are not white.
+    covariance: (n, n), from blocks of the record where residuals are not white; converged: not broken off.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -29,6 +29,7 @@ class Fit:
     covariance: Array
     residual: Array
     jacobian: Array
+    converged: bool = True
 
     @property
     def theta(self) -> dict[str, float]:
@@ -96,7 +97,7 @@ def fit(
     )
     slopes = np.asarray(found.jac)
     covariance = sandwich(found.fun, slopes, scale, high - low)
-    return Fit(tuple(unknowns), found.x, covariance, found.fun, slopes)
+    return Fit(tuple(unknowns), found.x, covariance, found.fun, slopes, found.status > 0)
 
 
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import Fit
@@ -24,7 +25,7 @@ from fmus.effects.site import SPEED
 from fmus.export.outside import Around, around
 
 NOTHING = 1e-9  # of a regressor left after projection: it says nothing new
-ALIKE = 1e-2  # of the singular values of a candidate's regressors: below it they are shared out evenly
+ALIKE = 1e-2  # of a regressor's length: of two that differ by less each gets half
 TRUSTED = 5.0  # scales from which a linear answer is not trusted further
 TOGETHER = 128  # changes whose responses are worked out at once
 
@@ -202,27 +203,39 @@ def _faults(
 
 def screen(base: Fit, sets: Sequence[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
     """Promise of each set of candidates with its changes (m, k), best first."""
-    n = base.jacobian.shape[1]
-    basis = np.linalg.qr(base.jacobian)[0] if n else np.zeros((len(base.residual), 0))
-    return sorted((_promise(base, basis, c, raw) for c, raw in sets), key=lambda p: -p.gain)
+    basis = np.linalg.qr(base.jacobian)
+    return sorted((_promise(base, *basis, c, raw) for c, raw in sets), key=lambda p: -p.gain)
 
 
-def _promise(base: Fit, basis: Array, candidates: tuple[Candidate, ...], raw: Array) -> Promise:
+def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:
+    """Amplitudes (k,) within bounds with which regressors g (m, k) come nearest to r; short where alike."""
+    if not g.shape[1]:
+        return np.zeros(0)
+    size = np.linalg.norm(g, axis=0)
+    q, triangle = np.linalg.qr(np.vstack([g / size, ALIKE * np.eye(len(size))]))
+    whole = np.concatenate([r, np.zeros(len(size))])
+    found = lsq_linear(triangle, q.T @ whole, (low * size, high * size), method="bvls")
+    return np.asarray(found.x / size)
+
+
+def _promise(
+    base: Fit, basis: Array, triangle: Array, candidates: tuple[Candidate, ...], raw: Array
+) -> Promise:
     g = raw - basis @ (basis.T @ raw)
     r = base.residual - basis @ (basis.T @ base.residual)
     amplitudes = [u for c in candidates for u in c.amplitudes]
     size, left = np.linalg.norm(raw, axis=0) + 1e-300, np.linalg.norm(g, axis=0)
     usable = left > NOTHING * size
-    beta = np.zeros(len(amplitudes))
-    beta[usable] = np.linalg.lstsq(g[:, usable] / size[usable], -r, rcond=ALIKE)[0] / size[usable]
     low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
-    beta = np.clip(beta, low, high)
+    beta = np.zeros(len(amplitudes))
+    beta[usable] = _bounded(g[:, usable], -r, low[usable], high[usable])
     gain = float(r @ r - np.sum((r + g @ beta) ** 2))
     beta = np.clip(beta, -TRUSTED, TRUSTED)
     start = {u.name: float(b * u.scale) for u, b in zip(amplitudes, beta, strict=True)}
     start |= {u.name: u.start for c in candidates for u in c.shape}
     if len(base.values):
-        shift = np.linalg.lstsq(base.jacobian, -(base.residual + raw @ beta), rcond=None)[0]
+        rest = basis.T @ (base.residual + raw @ beta)
+        shift = np.linalg.lstsq(triangle, -rest, rcond=None)[0]
         low, high = (np.array([getattr(u, side) for u in base.unknowns]) for side in ("low", "high"))
         trusted = TRUSTED * np.array([u.scale for u in base.unknowns])
         moved = np.clip(base.values + np.clip(shift, -trusted, trusted), low, high)

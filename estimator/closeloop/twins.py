@@ -12,7 +12,7 @@ Twins = Mapping[str, tuple[str, ...]]  # labels by the label that stands for the
 
 
 def twins(change: Sequence[tuple[Candidate, Array]]) -> dict[str, tuple[str, ...]]:
-    """Labels of effects of one kind whose candidates change the same, to the last bit, by the first of them."""
+    """Labels of effects of one kind that change the same to the last bit, by the first of them."""
     changes: dict[str, list[bytes]] = {}
     kinds: dict[str, str] = {}
     for c, g in change:

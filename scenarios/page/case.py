@@ -20,22 +20,16 @@ class Case:
     found: Outcome
     result: Result
     words: Glossary
-    honesty: Honesty | None = None
+
+    @property
+    def honesty(self) -> Honesty | None:
+        """What the report owes its reader beside the finding."""
+        return self.found.honesty
 
     @property
     def best(self) -> Hypothesis:
         """The first member of the verdict's class."""
         return self.found.judgement.members[0]
-
-    @property
-    def free_form(self) -> Hypothesis | None:
-        """The force of free form, where nothing explains."""
-        return self.honesty.free_form if self.honesty else None
-
-    @property
-    def after(self) -> Hypothesis | None:
-        """What the augmented FMU has more than the calibrated one: an effect, or a force of free form."""
-        return self.found.chosen or self.free_form
 
     @property
     def gaps(self) -> dict[str, float]:

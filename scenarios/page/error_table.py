@@ -10,7 +10,7 @@ Row = dict[str, str]
 def error_values(case: Case) -> dict[str, dict[str, float]]:
     """Errors on the held-out part by output; `after` only where something was added."""
     return {
-        output: {k: v for k, v in values.items() if k != "after" or case.after}
+        output: {k: v for k, v in values.items() if k != "after" or case.found.built_in}
         for output, values in case.result.error.items()
     }
 
@@ -31,11 +31,11 @@ def gap_cards(case: Case) -> list[Row]:
     cards = []
     for output, e in case.result.error.items():
         of = case.words.unit(output)
-        over = e["after"] if case.after else e["before"]
+        over = e["after"] if case.found.built_in else e["before"]
         figure, said = f"{number(over / e['noise'], 2)}{HELD}×", "the noise floor"
         if output in case.gaps:
             figure, said = percent(case.gaps[output]), "of the gap closed"
-        error = number(e["before"]) + (f" → {number(e['after'])}" if case.after else "")
+        error = number(e["before"]) + (f" → {number(e['after'])}" if case.found.built_in else "")
         row = {"output": output, "figure": figure, "said": said, "error": quantity(error, of)}
         cards.append(row | {"noise": quantity(short(e["noise"], 3), of)})
     return cards

@@ -125,14 +125,14 @@ def _unexplained(case: Case) -> Story:
     near = f" The nearest, {hypothesis_words(singles[0])}, does not suffice." if singles else ""
     headline = f"The model lacks something that the library does not hold.{near}"
     real = "The residual is real, but no effect that was tried brings it down to the noise. "
-    if case.free_form is None:
+    if case.found.free_form is None:
         return Story(
             headline,
             f"{real}Nothing is claimed and nothing was added to the model. The missing forces in section 2 "
             "show where to look.",
             "No law is claimed. What was tried, and what speaks against it, stands in section 6.",
         )
-    curve = curve_of(case.free_form)
+    curve = curve_of(case.found.free_form)
     return Story(
         f"{headline} {gap_words(case, 'A force of free form closes')}",
         f"{real}No cause is claimed. The augmented FMU holds a force of free form at {curve.location}, a "
