@@ -88,7 +88,7 @@ VEHICLE = (
     entry("quadratic_damping", SECONDARY, c=log(1e4, 4e5)),
     entry("quadratic_damping", PRIMARY, c=log(2e4, 6e5)),
     entry("cubic_stiffness", SECONDARY, k_3=log(3e8, 1.5e10)),
-    entry("cubic_stiffness", PRIMARY, k_3=log(1e10, 1e12)),
+    entry("cubic_stiffness", PRIMARY, k_3=log(3e10, 3e12)),
     entry("bump_stop", SECONDARY, k=log(5e5, 3e6), gap=flat(0.0025, 0.0045)),
     entry("free_play", SECONDARY, gap=log(3e-5, 8e-4)),
     entry("free_play", PRIMARY, gap=log(1e-5, 2e-4)),

@@ -30,7 +30,7 @@ def kinks(low: float, high: float, speed: float) -> Callable[[np.random.Generato
     """Six to twelve kinks of one depth [m] along 60 s at about `speed` [m/s]."""
 
     def of(rng: np.random.Generator) -> dict[str, Any]:
-        where = sorted(round(s, 2) for s in rng.uniform(60, 55 * speed, rng.integers(6, 13)))
+        where = sorted(round(float(s), 2) for s in rng.uniform(60, 55 * speed, rng.integers(6, 13)))
         return {"where": where, "depth": log(low, high)(rng), "reach": flat(0.3, 1.0)(rng)}
 
     return of
