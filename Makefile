@@ -6,7 +6,7 @@ OUT ?= out
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench scenarios clean
+.PHONY: demo test test-all lint bench challenge scenarios clean
 
 demo: .venv/ready  ## build the FMU, close the loop on the bundled record, name the report
 	$(BIN)/railfmi build testrig --out $(OUT)/demo
@@ -33,6 +33,11 @@ bench: .venv/ready-dev  ## side-by-side measurements
 	$(BIN)/python -m benchmarks.wheelset
 	$(BIN)/python -m benchmarks.native
 	$(BIN)/python -m benchmarks.estimate
+
+SEED ?=
+COUNT ?= 240
+challenge: .venv/ready-dev  ## a fresh blind set of records closed and scored; SEED=, COUNT=; goes on where it stopped
+	$(BIN)/python -m tests.challenge --out $(OUT)/challenge --count $(COUNT) $(if $(SEED),--seed $(SEED))
 
 .venv/ready: pyproject.toml requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit("railfmi needs Python 3.11 or newer; set PYTHON=..." if sys.version_info < (3, 11) else 0)'

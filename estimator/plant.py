@@ -6,9 +6,12 @@ from multiprocessing.util import Finalize
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from estimator.record import Array, Run
 from fmus.host.fmu import Fmu
+
+PIECE, MOST = 1e-3, 10  # s, of a step, and the most of them
 
 
 class Plant:
@@ -27,13 +30,23 @@ class Plant:
     ) -> Array:
         """Free run through a record from its first sample: outputs, then `more`, (N, n_y + n_more).
 
-        start: states and parameters by name. Inputs act as samples of continuous signals, see Fmu.simulate.
-        push: samples (N,) added to inputs.
+        start: states and parameters by name. Inputs act as samples of continuous signals, see Fmu.simulate;
+        one that comes with its rate goes between the samples as both say. push: samples (N,) added to inputs.
         """
         inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
         for name, samples in (push or {}).items():
             inputs[name] = inputs.get(name, 0.0) + samples
-        return self.fmu.simulate(run.t, inputs, (*self.outputs, *more), start)
+        pieces = self._pieces(run.t)
+        if pieces == 1:
+            return self.fmu.simulate(run.t, inputs, (*self.outputs, *more), start)
+        t, fine = between(run.t, inputs, pieces)
+        return self.fmu.simulate(t, fine, (*self.outputs, *more), start)[::pieces]
+
+    def _pieces(self, t: Array) -> int:
+        """Into how many a step is cut: what a mean over a step takes from a fast input is lost otherwise."""
+        if not any(f"{name}_dot" in self.inputs for name in self.inputs) or len(t) < 2:
+            return 1
+        return min(MOST, max(1, round(float(np.median(np.diff(t))) / PIECE)))
 
     def transition(
         self, x: Array, u: Mapping[str, float], theta: Mapping[str, float], dt: float
@@ -54,6 +67,21 @@ class Plant:
         y = np.array(self.fmu.read(self.outputs))
         self.fmu.step(dt)
         return np.array(self.fmu.read(self.states)), y
+
+
+def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, dict[str, Array]]:
+    """Times and inputs with each step cut into pieces ((N - 1) pieces + 1,).
+
+    A cubic where the rate of an input is given, as NAME_dot, a line elsewhere.
+    """
+    share = np.arange(pieces) / pieces
+    fine = np.append((t[:-1, None] + np.diff(t)[:, None] * share).ravel(), t[-1])
+    found = {name: np.interp(fine, t, samples) for name, samples in inputs.items()}
+    for name in inputs:
+        if f"{name}_dot" in inputs:
+            cubic = CubicHermiteSpline(t, inputs[name], inputs[f"{name}_dot"])
+            found[name], found[f"{name}_dot"] = cubic(fine), cubic(fine, 1)
+    return fine, found
 
 
 class Plants:

@@ -16,10 +16,11 @@ from fmus.effects.force_law import ForceLaw
 from fmus.effects.input_effect import HOLD, InputEffect
 from fmus.effects.parameter_effect import ParameterEffect
 from fmus.effects.site import Site
-from fmus.variables import Parameter
+from fmus.variables import Parameter, Variable
 
 FINE = 0.1  # of a shape parameter's value: a change of it that matters
 LARGEST = 200.0  # realistic sizes of a parameter's change: ten times the parameter
+NEAR = 0.2  # of its start: a calibrated parameter is within it
 MOMENT = 0.01  # of the record's length, the same for a time
 
 
@@ -130,8 +131,16 @@ def _of_a_parameter(
             sizes[own] = effect.size(value, _length(record))
     for shape in effect.guesses(_times(record)):
         found = _candidate(effect, location, sizes, shape, _length(record))
-        limited = (replace(u, low=-LARGEST * u.scale, high=LARGEST * u.scale) for u in found.amplitudes)
+        limited = (_limited(u, site.variables[n]) for u, n in zip(found.amplitudes, members, strict=True))
         yield replace(found, amplitudes=tuple(limited))
+
+
+def _limited(change: Unknown, of: Variable) -> Unknown:
+    """A change that leaves a parameter within its limits, wherever near its start it may be."""
+    value, most = of.start or 0.0, LARGEST * change.scale
+    low = -np.inf if of.min is None else of.min - value - NEAR * abs(value)
+    high = np.inf if of.max is None else of.max - value + NEAR * abs(value)
+    return replace(change, low=max(low, -most), high=min(high, most))
 
 
 def _candidate(

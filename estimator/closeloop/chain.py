@@ -14,6 +14,7 @@ from estimator.closeloop.honesty import Honesty, honesty
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.moments import at_their_moments
 from estimator.closeloop.noise import noise_floor
+from estimator.closeloop.onset import onset, since
 from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.restarts import from_the_beginning
@@ -90,6 +91,7 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     doubled = {label for others in alike.values() for label in others}
     promises = at_their_moments(screening, base.fit, promises, LEADING)
     promises = [p for p in promises if p.label not in doubled and p.gain > owed.decoy_gain]
+    single = [(c, g) for c, g in change if c.label not in doubled]
     chosen = nominated(promises, NOMINEES if builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, chosen, size, jobs)
@@ -101,10 +103,11 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
 
     if floor_known and not explained():
         tell("fitting the leading ones to a growing part of the record")
-        singles = from_the_beginning(problem, base, singles, promises, size, jobs)
+        came = onset(problem, base, size)
+        sudden = since(problem, came, [c for c, _ in single if not c.is_fault], size) if came else []
+        singles = from_the_beginning(problem, base, singles, [*sudden, *promises], size, jobs)
     if not explained():
         tell("trying pairs of effects")
-        single = [(c, g) for c, g in change if c.label not in doubled]
         pairs, freed = try_pairs(problem, base, singles, single, size, jobs)
         singles = best_by_label([*singles, *freed])
     singles = with_twins(singles, alike)

@@ -76,6 +76,6 @@ def lines(g: Array, outputs: int) -> float:
 def gain(residual: Array, g: Array) -> float:
     """Fall of the residual's (m,) sum of squares by regression on columns (m, k)."""
     gram, along = g.T @ g, g.T @ residual
-    size = np.diag(gram) + 1e-300
-    scaled = gram / np.sqrt(np.outer(size, size)) + RIDGE * np.eye(len(size))
-    return float(along / np.sqrt(size) @ np.linalg.solve(scaled, along / np.sqrt(size)))
+    size = np.sqrt(np.diag(gram) + 1e-300)
+    scaled = gram / size[:, None] / size + RIDGE * np.eye(len(size))
+    return float(along / size @ np.linalg.solve(scaled, along / size))

@@ -70,13 +70,15 @@ def detect(
 
 
 def matters(problem: Problem, base: Hypothesis, noise: Array) -> bool:
-    """Whether a held-out residual is too large to be left alone, in any output."""
-    signal = signal_size(problem)
-    left_open = problem.form_error * signal
-    limit = np.where(
-        left_open > 0, np.maximum(left_open, NOISES * noise), np.minimum(SHARE * signal, NOISES * noise)
-    )
-    return bool(np.any(base.rms(problem) >= limit))
+    """Whether a held-out residual is too large to be left alone, in any output.
+
+    Compared with the signal is what it has beyond the noise.
+    """
+    signal, rms = signal_size(problem), base.rms(problem)
+    beyond = np.sqrt(np.maximum(rms**2 - noise**2, 0.0))
+    if problem.form_error > 0:
+        return bool(np.any((beyond >= problem.form_error * signal) & (rms >= NOISES * noise)))
+    return bool(np.any((beyond >= SHARE * signal) | (rms >= NOISES * noise)))
 
 
 def signal_size(problem: Problem) -> Array:

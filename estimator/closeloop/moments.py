@@ -49,8 +49,9 @@ def _near(c: Candidate, spacing: float) -> list[Candidate]:
     """The candidate setting in a little earlier and later, within a spacing on either side."""
     here = moment(c) or 0.0
     times = here + spacing * np.arange(1 - STEPS, STEPS) / STEPS
-    return [
-        replace(c, shape=tuple(replace(u, start=float(t)) if u.name.endswith(BEGINS) else u for u in c.shape))
-        for t in times
-        if t > 0 and t != here
-    ]
+    return [set_in(c, float(t)) for t in times if t > 0 and t != here]
+
+
+def set_in(c: Candidate, t: float) -> Candidate:
+    """The candidate setting in at a time, s."""
+    return replace(c, shape=tuple(replace(u, start=t) if u.name.endswith(BEGINS) else u for u in c.shape))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -111,6 +111,12 @@ class Problem:
         """The same question to the FMU with these effects built in."""
         return replace(self, effects=tuple(effects))
 
+    def beginning(self, share: float) -> Problem:
+        """The same question to the first part of each run's samples that are fitted."""
+        if share >= 1.0:
+            return self
+        return replace(self, record=replace(self.record, runs=tuple(_cut(self.record.runs, share))))
+
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
         start = self.start(theta)
         if self.free_states and not run.fit.any():
@@ -122,3 +128,10 @@ class Problem:
         """Start values of the FMU: declared ones, and those of theta that are its own."""
         known = self.plant.fmu.description.variables
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
+
+
+def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:
+    for run in runs:
+        if run.fit.any():
+            n = int(np.flatnonzero(run.fit)[max(1, int(share * run.fit.sum()) - 1)]) + 1
+            yield Run(run.t[:n], run.u[:n], run.y[:n], run.fit[:n], run.test[:n])

@@ -2,23 +2,24 @@
 
 Where an effect is strong, the base's values have taken over what they could of it, and a small error of an
 unknown leads the FMU to quite another motion in the end: the sum of squares is rugged. Over the first
-seconds it is not, and what is found there leads the way on.
+seconds it is not, and what is found there leads the way on. Start states, which could take over much of
+so short a part, stay as measured until the whole is fitted.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 from joblib import Parallel, delayed
 
-from estimator.closeloop.compare import Hypothesis, best_by_label, finished, hypothesis, together
+from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished, hypothesis, together
 from estimator.closeloop.fit import fit
 from estimator.closeloop.moments import moment
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise
-from estimator.record import Array, Run
+from estimator.record import Array
 
 PARTS = ((0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))  # of the identify part, and evaluations of a fit to it
+PASSES = 2  # over these parts
 LEADING = 4  # labels, of those that fit best and of the most promising ones
 SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
 
@@ -35,19 +36,23 @@ def from_the_beginning(
     physical = [p for p in promises if not p.candidates[0].is_fault]
     fitted = [h.label for h in found if not h.candidates[0].is_fault]
     leading = dict.fromkeys([*fitted[:LEADING], *list(dict.fromkeys(p.label for p in physical))[:LEADING]])
-    declared = {u.name: u.start for u in base.fit.unknowns}
+    unknowns = base.fit.unknowns
+    declared = {u.name: u.start for u in unknowns}
+    states = {n: v for n, v in declared.items() if n in problem.free_states}
+    started = replace(problem, declared={**problem.declared, **states})
+    others = [u for u in unknowns if u.name not in states]
     starts = [
         replace(p, start={**p.start, **declared})
         for label in leading
         for p in _shapes([p for p in physical if p.label == label])
     ]
     tasks = (
-        delayed(_grown)(here, base.fit.unknowns, p, size)
-        for here, p in zip(together(problem, starts), starts, strict=True)
+        delayed(_grown)(here, others, p, size)
+        for here, p in zip(together(started, starts), starts, strict=True)
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
     again = [Promise(h.candidates, 0.0, h.fit.theta) for h in grown[:LEADING]]
-    return best_by_label([*found, *grown, *finished(problem, base.fit.unknowns, again, size, jobs)])
+    return best_by_label([*found, *grown, *finished(problem, unknowns, again, size, jobs)])
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
@@ -68,26 +73,16 @@ def _grown(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size
     before = 0.0 if begins is None else begins / float(run.t[run.fit][-1] - run.t[0])
     start = promise.start
     if 0.0 < before < 1.0:
-        start = start | fit(_beginning(problem, before), unknowns, size, start).theta
-    found = None
-    for part, evaluations in PARTS:
-        here = _beginning(problem, before + (1 - before) * part)
-        found = hypothesis(here, unknowns, replace(promise, start=start), size, evaluations)
+        start = start | fit(problem.beginning(before), unknowns, size, start).theta
+    best: Hypothesis | None = None
+    for part, evaluations in PASSES * PARTS:
+        share = before + (1 - before) * part
+        found = hypothesis(
+            problem.beginning(share), unknowns, replace(promise, start=start), size, evaluations
+        )
         if found is None:
-            return None
+            return best
         start = found.fit.theta
-    return found
-
-
-def _beginning(problem: Problem, part: float) -> Problem:
-    """The question to the first part of each run's samples that are fitted."""
-    if part >= 1.0:
-        return problem
-    return replace(problem, record=replace(problem.record, runs=tuple(_cut(problem.record.runs, part))))
-
-
-def _cut(runs: Sequence[Run], part: float) -> Iterator[Run]:
-    for run in runs:
-        if run.fit.any():
-            n = int(np.flatnonzero(run.fit)[max(1, int(part * run.fit.sum()) - 1)]) + 1
-            yield Run(run.t[:n], run.u[:n], run.y[:n], run.fit[:n], run.test[:n])
+        if part == 1.0 and (best is None or cost(found) < cost(best)):
+            best = found
+    return best

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.compare import Hypothesis, beats, lead
-from estimator.closeloop.detect import NOISES, Detection, signal_size
+from estimator.closeloop.detect import Detection, signal_size
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
 from estimator.record import Array
@@ -24,6 +24,9 @@ Verdict = Literal[
 ]
 MOVES = 3.0  # times the noise: an output that moves less shows nothing
 GAP = 0.95  # share of the gap to the noise that an effect must close where noise is declared
+WON = 10.0  # log score over the FMU without the effect, on held-out data
+CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residual that is noise
+FORM_EXPLAINED = 0.95  # share of the variance beyond the noise, where the FMU's form leaves something open
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
@@ -47,15 +50,20 @@ def gap_closed(before: Array, after: Array, noise: Array) -> Array:
 def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> bool:
     """Whether a hypothesis accounts for the discrepancy on the held-out part.
 
-    Outputs with declared noise must come down to it; the others must lose most of their variance.
-    Every amplitude must be clear of zero.
+    Outputs with declared noise must come down to it, or nearly so; the others must lose most of their
+    variance. Every amplitude must be clear of zero, and the whole better than without.
     """
-    if idle(h):
+    if idle(h) or lead(problem, h, base, size)[0] < WON:
         return False
     before, after = base.rms(problem), h.rms(problem)
     declared = ~np.isnan(problem.record.noise_std)
-    enough_for = np.maximum(NOISES * noise, problem.form_error * signal_size(problem))
-    reached = (after < enough_for) | (gap_closed(before, after, noise) >= GAP)
+    samples = len(h.held_out(problem))
+    reached = (after < (CLEAN + SCATTER / np.sqrt(2 * samples)) * noise) | (
+        gap_closed(before, after, noise) >= GAP
+    )
+    if problem.form_error > 0:
+        left = (after**2 - noise**2) / np.maximum(before**2 - noise**2, 1e-300)
+        reached |= (after < problem.form_error * signal_size(problem)) | (left <= 1 - FORM_EXPLAINED)
     squares = [
         np.mean((x.held_out(problem) / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
         for x in (h, base)

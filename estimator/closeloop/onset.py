@@ -1,0 +1,66 @@
+"""Did something set in during the record? The FMU fits until a moment, and what came is looked for there.
+
+An effect that sets in late and strong spoils a calibration of the whole; calibrated on what was before, the
+FMU says what set in, in the first moments after.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.fit import Fit, fit
+from estimator.closeloop.moments import moment, set_in
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.screen import Promise, Screening, screen
+from estimator.record import Array
+
+EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
+BLOCKS = 50  # of the identify part whose residuals are compared
+TIMES = 3.0  # as large as any before is a residual that something new has made
+AFTER = 0.05  # of the identify part: what is looked at after the moment
+GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
+
+
+def onset(problem: Problem, base: Hypothesis, size: Array) -> tuple[float, Fit] | None:
+    """Share of the identify part after which the residual is another, and the FMU's fit to what was before.
+
+    None where there is no such moment, or where nothing is to be calibrated.
+    """
+    unknowns = base.fit.unknowns
+    for early in EARLY if unknowns else ():
+        before = fit(problem.beginning(early), unknowns, size)
+        rms = _blocks(problem, before, size)
+        first = int(early * BLOCKS)
+        new = rms > TIMES * rms[:first].max()
+        stays = [k for k in range(first, BLOCKS) if new[k] and np.mean(new[k:]) > 0.5]
+        if stays:
+            share = stays[0] / BLOCKS
+            return share, fit(problem.beginning(share), unknowns, size, before.theta)
+    return None
+
+
+def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
+    """Root mean square of the weighted residual of each block of the identify part, (BLOCKS,)."""
+    residual = problem.identify_residual(before.theta) / size
+    return np.array([float(np.sqrt(np.mean(b**2))) for b in np.array_split(residual, BLOCKS)])
+
+
+def since(
+    problem: Problem, at: tuple[float, Fit], candidates: Sequence[Candidate], size: Array
+) -> list[Promise]:
+    """Promises of what can set in about the moment, best first: by the first moments after it."""
+    share, before = at
+    run = problem.record.runs[0]
+    length = float(run.t[run.fit][-1] - run.t[0])
+    here = problem.beginning(min(1.0, share + AFTER))
+    there = fit(here, before.unknowns, size, before.theta, evaluations=1)
+    labels = {c.label: c for c in reversed(candidates) if moment(c) is not None}
+    tried = [set_in(c, (share + g / BLOCKS) * length) for c in labels.values() for g in GRID]
+    change = Screening(here, there, size).changes(tried)
+    found = screen(there, [((c,), g) for c, g in zip(tried, change, strict=True)])
+    best: dict[str, Promise] = {}
+    for p in found:
+        best.setdefault(p.label, p)
+    return list(best.values())
