@@ -19,6 +19,7 @@ from estimator.record import Array
 EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
 BLOCKS = 50  # of the identify part whose residuals are compared
 TIMES = 3.0  # as large as any before is a residual that something new has made
+ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
 GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
 
@@ -28,7 +29,7 @@ def onset(problem: Problem, base: Hypothesis, size: Array) -> tuple[float, Fit] 
 
     None where there is no such moment, or where nothing is to be calibrated.
     """
-    unknowns = base.fit.unknowns
+    unknowns, found = base.fit.unknowns, []
     for early in EARLY if unknowns else ():
         before = fit(problem.beginning(early), unknowns, size)
         rms = _blocks(problem, before, size)
@@ -36,9 +37,12 @@ def onset(problem: Problem, base: Hypothesis, size: Array) -> tuple[float, Fit] 
         new = rms > TIMES * rms[:first].max()
         stays = [k for k in range(first, BLOCKS) if new[k] and np.mean(new[k:]) > 0.5]
         if stays:
-            share = stays[0] / BLOCKS
-            return share, fit(problem.beginning(share), unknowns, size, before.theta)
-    return None
+            found.append((float(rms[: stays[0]].mean()), stays[0] / BLOCKS, before))
+    if not found:
+        return None
+    least = min(level for level, _, _ in found)
+    _, share, before = next(f for f in found if f[0] <= ALIKE * least)
+    return share, fit(problem.beginning(share), unknowns, size, before.theta)
 
 
 def _blocks(problem: Problem, before: Fit, size: Array) -> Array:

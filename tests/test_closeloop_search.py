@@ -1,0 +1,198 @@
+"""How close-loop finds its way: smoothing, moments, twins, onsets, inputs between samples."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.fit import Fit
+from estimator.closeloop.linear import Linearised
+from estimator.closeloop.moments import at_their_moments, moment, set_in
+from estimator.closeloop.onset import BLOCKS, onset
+from estimator.closeloop.problem import Unknown
+from estimator.closeloop.screen import Promise, screen
+from estimator.closeloop.smoothing import WALKS, _first_guess, smooth
+from estimator.closeloop.twins import twins, with_twins
+from estimator.closeloop.verdict import becomes
+from estimator.plant import between
+
+FREE = (-np.inf, np.inf)
+
+
+def nothing_calibrated(residual):
+    return Fit((), np.zeros(0), np.zeros((0, 0)), residual, np.zeros((len(residual), 0)))
+
+
+def candidate(kind, location, shape=(), amplitude="F_0"):
+    prefix = f"{kind}_{location}_"
+    unknowns = (Unknown(prefix + amplitude, 0.0, *FREE, 1.0),)
+    return Candidate(
+        kind, location, unknowns, tuple(Unknown(prefix + n, v, 0.0, np.inf, 1.0) for n, v in shape)
+    )
+
+
+# ---- inputs between samples
+
+
+@given(st.floats(0.2, 12.0), st.floats(0.0, 6.0), st.integers(2, 8))
+def test_an_input_with_its_rate_is_a_cubic_between_the_samples(frequency, phase, pieces):
+    t, w = np.arange(0.0, 1.0, 0.01), 2 * np.pi * frequency
+    u, rate = np.sin(w * t + phase), w * np.cos(w * t + phase)
+    fine, found = between(t, {"u": u, "u_dot": rate, "v": u}, pieces)
+    assert_allclose(fine[::pieces], t, atol=1e-15)
+    assert_allclose(found["u"][::pieces], u, atol=1e-12)
+    assert_allclose(found["u_dot"][::pieces], rate, atol=1e-9 * w)
+    bound = (w * 0.01) ** 4 / 384  # of a cubic that has values and rates
+    assert np.abs(found["u"] - np.sin(w * fine + phase)).max() <= bound + 1e-12
+    assert_allclose(found["v"], np.interp(fine, t, u), atol=1e-12)
+
+
+# ---- the smoother
+
+
+def test_the_smoothed_force_is_that_of_least_squares():
+    rng = np.random.default_rng(5)
+    n, n_w, steps, dt = 3, 2, 80, 0.02
+    A = np.eye(n) + 0.05 * rng.standard_normal((n, n)) - 0.1 * np.eye(n)
+    B, C, D = rng.standard_normal((n, n_w)), rng.standard_normal((2, n)), 0.1 * rng.standard_normal((2, n_w))
+    local = Linearised(np.array([0]), A[None], B[None], C[None], D[None])
+    residual, noise = np.cumsum(rng.standard_normal((steps, 2)), axis=0), np.array([0.3, 0.5])
+    found = smooth(local, residual, noise, np.full(steps - 1, dt))
+    for i in range(n_w):
+        answers = np.zeros((steps, 2, steps))  # of the outputs to the force of each sample
+        for j in range(steps):
+            x = np.zeros(n)
+            for k in range(steps):
+                answers[k, :, j] = C @ x + D[:, i] * (k == j)
+                x = A @ x + B[:, i] * (k == j)
+        g = (answers / noise[None, :, None]).reshape(-1, steps)
+        r = (residual / noise).ravel()
+        changes = np.diff(np.eye(steps), axis=0)
+        first = np.eye(steps)[:1]
+        solved = [
+            least_squares_force(g, r, changes, first, w, dt)
+            for w in np.array(WALKS) * _first_guess(local, residual, np.full(steps - 1, dt))[i]
+        ]
+        force, std = min(solved, key=lambda s: np.abs(s[0] - found.force[i]).max())
+        assert_allclose(found.force[i], force, rtol=1e-6, atol=1e-8 * np.abs(force).max())
+        assert_allclose(found.std[i], std, rtol=1e-6)
+
+
+def least_squares_force(g, r, changes, first, walk, dt):
+    """A force whose changes have a variance walk² dt, that of the first sample walk²."""
+    normal = g.T @ g + changes.T @ changes / (walk**2 * dt) + first.T @ first / walk**2
+    covariance = np.linalg.inv(normal)
+    return covariance @ (g.T @ r), np.sqrt(np.diag(covariance))
+
+
+# ---- moments
+
+
+@dataclass
+class Steps:
+    """Answers a candidate with a step at its moment."""
+
+    t: np.ndarray
+
+    @property
+    def length(self):
+        return float(self.t[-1])
+
+    def changes(self, candidates):
+        return [(self.t >= moment(c)).astype(float)[:, None] for c in candidates]
+
+
+@settings(max_examples=25)
+@given(st.floats(0.05, 0.95), st.floats(-5.0, 5.0).filter(lambda a: abs(a) > 0.1))
+def test_the_moment_of_a_step_is_found(share, size):
+    t = np.linspace(0.0, 20.0, 2001)
+    true = 20.0 * share
+    base = nothing_calibrated(-size * (t >= true))
+    steps, c = Steps(t), candidate("step_force", "wheel", [("t0", 1.0)])
+    tried = [set_in(c, m) for m in np.linspace(0, 20, 12)[1:-1]]
+    promises = screen(base, [((x,), g) for x, g in zip(tried, steps.changes(tried), strict=True)])
+    found = at_their_moments(steps, base, promises, 1)
+    assert abs(moment(found[0].candidates[0]) - true) < 20.0 * 0.1 / 36 + 0.01
+    assert found[0].gain >= promises[0].gain
+    assert len(found) == len(promises)
+
+
+def test_what_is_always_there_has_no_moment():
+    c = candidate("coulomb_friction", "wheel", [("v_s", 0.1)])
+    assert moment(c) is None
+    promise = Promise((c,), 1.0, {})
+    assert at_their_moments(Steps(np.arange(3.0)), nothing_calibrated(np.ones(3)), [promise], 3) == [promise]
+
+
+# ---- twins
+
+
+def test_effects_that_act_alike_are_named_together():
+    g, h = np.arange(4.0)[:, None], np.ones((4, 1))
+    one, two, other = (candidate("coulomb_friction", at) for at in ("wheelset_yaw", "primary_yaw", "contact"))
+    viscous = candidate("viscous_damping", "primary_yaw")
+    known = twins([(one, g), (two, g.copy()), (other, h), (viscous, g)])
+    assert known == {"coulomb_friction@wheelset_yaw": ("coulomb_friction@primary_yaw",)}
+    fit = replace(nothing_calibrated(np.ones(4)), unknowns=one.unknowns, values=np.array([3.0]))
+    first, second = with_twins([Hypothesis((one,), fit, (np.ones((2, 2)),))], known)
+    assert (first.label, second.label) == ("coulomb_friction@wheelset_yaw", "coulomb_friction@primary_yaw")
+    assert second.theta == {"coulomb_friction_primary_yaw_F_0": 3.0}
+    assert second.residuals is first.residuals
+
+
+# ---- laws that fall together
+
+
+@pytest.mark.parametrize(
+    ("kind", "simpler", "expected"),
+    [
+        ("free_play", "stiffness_change", True),
+        ("stribeck_friction", "coulomb_friction", True),
+        ("coulomb_friction", "stribeck_friction", False),
+        ("cubic_stiffness", "viscous_damping", False),
+        ("sensor_gain", "sensor_bias", False),
+    ],
+)
+def test_a_law_becomes_a_simpler_one_at_its_own_place_alone(kind, simpler, expected):
+    fit = nothing_calibrated(np.ones(2))
+    h = Hypothesis((candidate(kind, "secondary"),), fit, ())
+    assert becomes(h, Hypothesis((candidate(simpler, "secondary"),), fit, ())) is expected
+    assert not becomes(h, Hypothesis((candidate(simpler, "primary"),), fit, ()))
+    assert not becomes(h, h)
+
+
+# ---- onsets
+
+
+@dataclass
+class Line:
+    """y = a t and, from a time on, another slope beside; asks for a."""
+
+    t: np.ndarray
+    y: np.ndarray
+    builder: None = None
+
+    def identify_residual(self, theta):
+        return (self.y - theta["a"] * self.t)[:, None]
+
+    def beginning(self, share):
+        n = int(share * len(self.t))
+        return Line(self.t[:n], self.y[:n])
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.15, 0.9), st.integers(0, 1000))
+def test_what_sets_in_is_noticed_and_what_was_before_is_found(share, seed):
+    t = np.linspace(0.0, 10.0, 5000)
+    y = 2.0 * t + 0.1 * np.random.default_rng(seed).standard_normal(len(t))
+    base = Hypothesis((), replace(nothing_calibrated(t), unknowns=(Unknown("a", 1.0, -9.0, 9.0, 1.0),)), ())
+    assert onset(Line(t, y), base, np.array([0.1])) is None
+    found = onset(Line(t, y + 3.0 * (t > 10.0 * share)), base, np.array([0.1]))
+    assert found is not None
+    assert abs(found[0] - share) <= 1.0 / BLOCKS
+    assert found[1].theta["a"] == pytest.approx(2.0, abs=0.1)
