@@ -1,0 +1,72 @@
+"""Coupled electric drives: two motors drive a pulley by a belt on springs; here without dry friction."""
+
+from math import pi
+from pathlib import Path
+
+import casadi as cs
+
+from benchmarks.measured.benchmark import Benchmark, as_they_are
+from fmus.model import Model
+from fmus.variables import Expr, Input, Output, Parameter, State
+
+STILL = 1e-3  # speed at which the magnitude is rounded, well below the counter's step
+
+
+class ElectricDrives(Model):
+    """Speeds omega_m of the motors and omega of the pulley, which a belt couples by its stretch.
+
+    omega_m' = (gain u - omega_m) / tau - share w² twist + T_m, omega' = w² twist - d omega + T,
+    twist' = omega_m - omega, w = 2 pi f: both sides over their inertia. The pulley's sensor counts
+    pulses: it sees the magnitude alone.
+    """
+
+    name = "ElectricDrives"
+    step_size = 1e-3
+
+    omega_m = State("rad/s", doc="speed of the motors, on the sensor's scale", nominal=1.0)
+    omega = State("rad/s", doc="speed of the pulley, on the sensor's scale", nominal=1.0)
+    twist = State("rad", doc="stretch of the belt", nominal=0.1)
+    phi_m = State("rad", doc="angle of the motors", nominal=1.0)
+    phi = State("rad", doc="angle of the pulley", nominal=1.0)
+    u = Input("V", doc="sum of the motors' voltages")
+    T_m_ext = Input("N.m", doc="port: torque on the motors, of 1 kg.m2", nominal=10.0)
+    T_ext = Input("N.m", doc="port: torque on the pulley, of 1 kg.m2", nominal=10.0)
+    gain = Parameter("rad/(V.s)", 4.0, doc="speed for each volt")
+    tau = Parameter("s", 0.1, min=1e-3, doc="time constant of the motors")
+    f = Parameter("Hz", 3.0, min=0.1, doc="frequency of the pulley on the held belt")
+    share = Parameter("1", 1.0, min=0.0, doc="inertia of the pulley over that of the motors")
+    d = Parameter("1/s", 1.0, min=0.0, doc="viscous friction of the pulley over its inertia")
+    speed = Output("rad/s", doc="speed as the pulse counter sees it, without its sign", nominal=1.0)
+
+    def derivatives(m) -> dict[str, Expr]:
+        """See Model.derivatives."""
+        belt = (2 * pi * m.f) ** 2 * m.twist
+        motors = (m.gain * m.u - m.omega_m) / m.tau - m.share * belt + m.T_m_ext
+        return {
+            "omega_m": motors,
+            "omega": belt - m.d * m.omega + m.T_ext,
+            "twist": m.omega_m - m.omega,
+            "phi_m": m.omega_m,
+            "phi": m.omega,
+        }
+
+    def outputs(m) -> dict[str, Expr]:
+        """See Model.outputs."""
+        return {"speed": cs.sqrt(m.omega**2 + STILL**2)}
+
+
+BENCHMARK = Benchmark(
+    name="electric_drives",
+    title="Coupled Electric Drives, PRBS",
+    model=ElectricDrives,
+    declaration=Path(__file__).with_suffix(".toml"),
+    files=dict.fromkeys(("ced_prbs2.csv", "ced_prbs1.csv"), as_they_are),
+    missing="dry friction of the drives",
+    known=frozenset(
+        (k, at) for k in ("coulomb_friction", "stribeck_friction") for at in ("motors", "pulley")
+    ),
+    source="T. Wigren, M. Schoukens, Coupled electric drives data set and reference models, Uppsala "
+    "University 2017",
+    target={},
+    rank=4,
+)

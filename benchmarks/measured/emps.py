@@ -1,0 +1,21 @@
+"""EMPS: a carriage on a line moved by a motor; here with viscous friction only (fmus.drive)."""
+
+from pathlib import Path
+
+import scenarios
+from benchmarks.measured.benchmark import Benchmark, as_they_are
+from fmus.drive.model import Drive
+
+BENCHMARK = Benchmark(
+    name="emps",
+    title="EMPS",
+    model=Drive,
+    declaration=Path(scenarios.__path__[0]) / "emps" / "experiment.toml",
+    files=dict.fromkeys(("emps_train.csv", "emps_test.csv"), as_they_are),
+    missing="Coulomb friction and a constant force",
+    known=frozenset({("coulomb_friction", "carriage"), ("constant_force", "carriage")}),
+    source="A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, Workshop on Nonlinear "
+    "System Identification Benchmarks, Eindhoven 2019",
+    target={"q_dot": 6.5e-3},
+    rank=2,
+)
