@@ -28,9 +28,8 @@ CONTRACT = """
     actuator_gain actuator_lag actuator_saturation input_delay
     flexible_mode
 """
-FALLBACK = (
-    "free_form_velocity free_form_displacement free_form_angle"  # curves without a cause, never offered
-)
+# curves without a cause, never offered
+FALLBACK = {"free_form_velocity", "free_form_displacement", "free_form_angle"}
 ALL = {**MODELS, "bench": Bench}
 FORCE_LAWS = [kind for kind in EVERY_EFFECT if issubclass(EFFECTS[kind], ForceLaw)]
 WITH_MEMORY = {kind for kind in EVERY_EFFECT if EFFECTS[kind].states("translation")}
@@ -177,7 +176,7 @@ def test_laws_at_ports_see_parameters_and_inputs_as_other_effects_left_them():
 
 
 def test_kinds_are_the_contracts():
-    assert set(EVERY_EFFECT) == {*CONTRACT.split(), *FALLBACK.split()}
+    assert set(EVERY_EFFECT) == {*CONTRACT.split(), *FALLBACK}
 
 
 def test_what_is_told_twice_is_offered_once():
@@ -241,7 +240,7 @@ def test_a_part_that_damps_nothing_has_no_damping_to_change():
 def test_effects_are_offered_only_where_they_make_sense():
     for name in EVERY_MODEL:
         for location, port in MODELS[name]().ports().items():
-            for kind in set(FORCE_LAWS) - {*FALLBACK.split()}:
+            for kind in set(FORCE_LAWS) - FALLBACK:
                 if (name, kind, location) not in EVERY_PLACE:
                     assert port.place not in EFFECTS[kind].places
                     with pytest.raises(BadInput, match=f"'{location}' of {MODELS[name].name}"):
@@ -297,7 +296,7 @@ def test_all_that_fits_is_offered():
 def test_the_documentation_names_every_kind_with_its_parameters_and_source():
     text = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
-    named = {*CONTRACT.split(), *FALLBACK.split()}
+    named = {*CONTRACT.split(), *FALLBACK}
     assert set(rows) == {*named, "sensor_bias", "sensor_gain", "sensor_delay", "sensor_drift"}
     for kind, effect in EFFECTS.items():
         law = effect.__doc__.strip().splitlines()[0].rstrip(".").replace("|", "\\|")

@@ -17,6 +17,7 @@ from fmus.host.check import grade
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 from tests.everything import EVERY_EFFECT
+from tests.test_effects import FALLBACK
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
 T = np.linspace(0, 3, 301)
@@ -99,7 +100,7 @@ def run(path, start):
 
 
 def test_every_kind_is_among_the_cases():
-    assert {text.partition("@")[0] for text in CASES} | COMPONENTS == set(EVERY_EFFECT)
+    assert {text.partition("@")[0] for text in CASES} | COMPONENTS | FALLBACK == set(EVERY_EFFECT)
 
 
 @pytest.mark.parametrize("text", CASES)
@@ -194,7 +195,7 @@ def test_several_effects_of_every_sort_at_once(drive, tmp_path):
 def test_everything_on_offer_can_be_built_around_a_foreign_fmu(drive, tmp_path):
     builder = ForeignBuilder(drive, (PORT,), tmp_path)
     kinds = {kind for kind, _ in builder.offers}
-    assert kinds == set(EVERY_EFFECT) - COMPONENTS
+    assert kinds == set(EVERY_EFFECT) - COMPONENTS - FALLBACK
     assert {at for _, at in builder.offers} == {"carriage", "F", "M", "F_v"}
     known = describe(builder(builder.offers)).variables
     for kind, location in builder.offers:
