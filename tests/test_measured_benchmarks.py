@@ -66,10 +66,12 @@ def test_the_force_that_is_given_moves_a_mass_as_the_measured_one(
     held = (force[1:] + force[:-1]) / 2
     v = np.concatenate([[0.0], np.cumsum(held * dt)])
     moved = np.concatenate([[0.0], np.cumsum(v[:-1] * dt + held * dt**2 / 2)])
-    inner = slice(n // 4, -n // 4)  # the ends do not know what came before and after
+    inner = slice(n // 2 - 250, n // 2 + 250)  # the ends do not know what came before and after
     wrong = (moved - q)[inner]
     free = np.polynomial.Polynomial.fit(t[inner], wrong, 1)  # the start state is not given
-    assert np.std(wrong - free(t[inner])) < 0.01 * np.std(q[inner])  # leaks in from the ends
+    assert np.std(wrong - free(t[inner])) < 2e-3 * np.std(
+        q[inner]
+    )  # the leak from the ends, integrated twice
 
 
 @given(signed, signed, signed)

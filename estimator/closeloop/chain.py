@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
-from estimator.closeloop.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, hypotheses, ranked
 from estimator.closeloop.detect import LEVEL, Detection, detect
 from estimator.closeloop.freeform import free_form
@@ -65,6 +65,19 @@ class Outcome:
         return self.chosen or self.free_form
 
 
+@dataclass(frozen=True)
+class Screened:
+    """A question with its calibrated FMU, and what could explain the residual; see Outcome."""
+
+    problem: Problem
+    base: Hypothesis
+    noise: Array
+    size: Array
+    screening: Screening
+    change: list[tuple[Candidate, Array]]
+    promises: list[Promise]
+
+
 def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: int = 0) -> Outcome:
     """Run the whole chain on a problem; `tell` hears what is being done."""
     noise = noise_floor(problem.record)
@@ -72,6 +85,27 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     declared, base, size = calibrate(problem)
     tell("inferring the missing force at each port")
     forces = missing_forces(problem, base.fit.theta, noise)
+    screened = _screened(problem, base, noise, size, forces, tell)
+    tell("testing for a discrepancy against simulated records without one")
+    change = screened.change
+    detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
+    level = LEVEL / len(detection.figures)
+    owed = honesty(problem, base, change, size, level, np.random.default_rng(seed))
+    found = (declared, base, noise, size, detection, tuple(forces), tuple(screened.promises))
+    early = without_fits(problem, base, detection, noise)
+    if early:
+        return Outcome(*found, (), (), early, owed)
+    singles, pairs = _fitted(screened, owed.decoy_gain, tell, jobs)
+    judgement = judge(problem, base, singles, pairs, noise, size)
+    if judgement.verdict == "unexplained":
+        tell("fitting a force of free form")
+        owed = replace(owed, free_form=free_form(problem, base, forces, size, jobs, singles))
+    return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
+
+
+def _screened(
+    problem: Problem, base: Hypothesis, noise: Array, size: Array, forces: Sequence[MissingForce], tell: Tell
+) -> Screened:
     builder = problem.builder
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     candidates += fault_candidates(problem.record, noise)
@@ -79,27 +113,25 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     screening = Screening(problem, base.fit, size, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     promises = screen(base.fit, [((c,), g) for c, g in change])
-    tell("testing for a discrepancy against simulated records without one")
-    detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
-    level = LEVEL / len(detection.figures)
-    owed = honesty(problem, base, change, size, level, np.random.default_rng(seed))
-    found = (declared, base, noise, size, detection, tuple(forces), tuple(promises))
-    early = without_fits(problem, base, detection, noise)
-    if early:
-        return Outcome(*found, (), (), early, owed)
-    alike = twins(change)
+    return Screened(problem, base, noise, size, screening, change, promises)
+
+
+def _fitted(s: Screened, chance: float, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Single hypotheses and pairs, best first; `chance` is the gain that decoys reach."""
+    problem, base, size = s.problem, s.base, s.size
+    alike = twins(s.change)
     doubled = {label for others in alike.values() for label in others}
-    promises = at_their_moments(screening, base.fit, promises, LEADING)
-    promises = [p for p in promises if p.label not in doubled and p.gain > owed.decoy_gain]
-    single = [(c, g) for c, g in change if c.label not in doubled]
-    chosen = nominated(promises, NOMINEES if builder.quick else NOMINEES // 2)
+    single = [(c, g) for c, g in s.change if c.label not in doubled]
+    promises = at_their_moments(s.screening, base.fit, s.promises, LEADING)
+    promises = [p for p in promises if p.label not in doubled and p.gain > chance]
+    chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, chosen, size, jobs)
     pairs: list[Hypothesis] = []
     floor_known = not np.isnan(problem.record.noise_std).any()
 
     def explained() -> bool:
-        return floor_known and any(explains(problem, h, base, noise, size) for h in singles)
+        return floor_known and any(explains(problem, h, base, s.noise, size) for h in singles)
 
     if floor_known and not explained():
         tell("fitting the leading ones to a growing part of the record")
@@ -111,12 +143,7 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
         pairs, freed = try_pairs(problem, base, singles, single, size, jobs)
         singles = best_by_label([*singles, *freed])
     singles = with_twins(singles, alike)
-    singles, pairs = (ranked(problem, h, size) for h in (singles, pairs))
-    judgement = judge(problem, base, singles, pairs, noise, size)
-    if judgement.verdict == "unexplained":
-        tell("fitting a force of free form")
-        owed = replace(owed, free_form=free_form(problem, base, forces, size, jobs, singles))
-    return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
+    return ranked(problem, singles, size), ranked(problem, pairs, size)
 
 
 def nominated(promises: Sequence[Promise], most: int = NOMINEES) -> list[Promise]:
