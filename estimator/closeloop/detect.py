@@ -20,7 +20,8 @@ LEVEL = 0.01  # probability of calling noise a discrepancy
 SLOW_BLOCKS = 40  # pieces of the held-out part whose means show slow residuals
 SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
-NOISES = 2.0  # times its noise: a smaller residual does not matter
+BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
+NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def matters(problem: Problem, base: Hypothesis, noise: Array) -> bool:
     beyond = np.sqrt(np.maximum(rms**2 - noise**2, 0.0))
     if problem.form_error > 0:
         return bool(np.any((beyond >= problem.form_error * signal) & (rms >= NOISES * noise)))
-    return bool(np.any((beyond >= SHARE * signal) | (rms >= NOISES * noise)))
+    return bool(np.any((beyond >= SHARE * signal) | (beyond >= BEYOND * noise)))
 
 
 def signal_size(problem: Problem) -> Array:

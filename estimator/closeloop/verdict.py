@@ -10,7 +10,7 @@ from estimator.closeloop.compare import Hypothesis, beats, lead
 from estimator.closeloop.detect import Detection, signal_size
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
-from estimator.record import Array
+from estimator.record import Array, BoolArray
 from fmus.effects import EFFECTS
 
 Verdict = Literal[
@@ -55,21 +55,24 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
     """
     if idle(h) or lead(problem, h, base, size)[0] < WON:
         return False
-    before, after = base.rms(problem), h.rms(problem)
     declared = ~np.isnan(problem.record.noise_std)
-    samples = len(h.held_out(problem))
-    reached = (after < (CLEAN + SCATTER / np.sqrt(2 * samples)) * noise) | (
-        gap_closed(before, after, noise) >= GAP
-    )
-    if problem.form_error > 0:
-        left = (after**2 - noise**2) / np.maximum(before**2 - noise**2, 1e-300)
-        reached |= (after < problem.form_error * signal_size(problem)) | (left <= 1 - FORM_EXPLAINED)
     squares = [
         np.mean((x.held_out(problem) / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
         for x in (h, base)
     ]
     enough = squares[0] <= (1 - EXPLAINED) * squares[1] if (~declared).any() else True
-    return bool(np.all(reached[declared]) and enough)
+    return bool(np.all(reached(problem, h, base, noise)[declared]) and enough)
+
+
+def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array) -> BoolArray:
+    """Whether a hypothesis brings each output (n_y,) down to its noise, or to what the FMU's form leaves."""
+    before, after = base.rms(problem), h.rms(problem)
+    scatter = SCATTER / np.sqrt(2 * len(h.held_out(problem)))
+    found: BoolArray = (after < (CLEAN + scatter) * noise) | (gap_closed(before, after, noise) >= GAP)
+    if problem.form_error > 0:
+        left = (after**2 - noise**2) / np.maximum(before**2 - noise**2, 1e-300)
+        found |= (after < problem.form_error * signal_size(problem)) | (left <= 1 - FORM_EXPLAINED)
+    return found
 
 
 def equivalent(

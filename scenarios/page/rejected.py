@@ -7,11 +7,11 @@ import numpy as np
 
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis, lead
-from estimator.closeloop.detect import LEVEL, NOISES, REPLICATES
+from estimator.closeloop.detect import LEVEL, REPLICATES
 from estimator.closeloop.honesty import Honesty
 from estimator.closeloop.pairs import SIGNIFICANT, idle
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.verdict import EXPLAINED, GAP, explains, gap_closed
+from estimator.closeloop.verdict import EXPLAINED, explains, reached
 from estimator.record import Array
 from scenarios.page.glossary import candidate_words, title
 from scenarios.page.typography import HELD, number, percent
@@ -69,10 +69,8 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 
 def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """What a hypothesis leaves of the residual, where that is too much."""
-    before, after = found.base.rms(problem), h.rms(problem)
-    over, declared = after / found.noise, ~np.isnan(problem.record.noise_std)
-    reached = (after < NOISES * found.noise) | (gap_closed(before, after, found.noise) >= GAP)
-    short = np.flatnonzero(declared & ~reached)
+    over, declared = h.rms(problem) / found.noise, ~np.isnan(problem.record.noise_std)
+    short = np.flatnonzero(declared & ~reached(problem, h, found.base, found.noise))
     if short.size:
         j = short[np.argmax(over[short])]
         yield f"leaves {number(over[j], 2)} times the noise in {problem.record.outputs[j]}"
