@@ -119,7 +119,8 @@ def test_each_declaration_speaks_of_its_base_model(benchmark: Benchmark) -> None
     e, model = load_experiment(benchmark.declaration), benchmark.model()
     assert e.fmu == f"{model.name}.fmu"
     assert e.split is not None
-    assert [e.split.identify_data, e.split.test_data] == list(benchmark.files)
+    named = [e.data] if e.data else [e.split.identify_data, e.split.test_data]
+    assert named == list(benchmark.files)
     kinds = {State: {*e.initial}, Input: {*e.inputs}, Parameter: {*e.parameters, *e.calibrate}}
     kinds[Input] |= {p.force for p in e.ports}
     for kind, names in kinds.items():

@@ -65,6 +65,20 @@ def columns(file: Path) -> Columns:
     return {str(name): table[name].to_numpy(float) for name in table}
 
 
+def of_held(name: str) -> Callable[[Columns], Columns]:
+    """Makes of a column that is held from sample to sample the samples of its staircase.
+
+    At a jump that is the mean of both sides. The means of neighbours, which act over a step, are then
+    centred on what was held; as they are they would come half a step early.
+    """
+
+    def convert(data: Columns) -> Columns:
+        u = data[name]
+        return {**data, name: (u + np.concatenate([u[:1], u[:-1]])) / 2}
+
+    return convert
+
+
 def as_they_are(data: Columns) -> Columns:
     """No conversion."""
     return data

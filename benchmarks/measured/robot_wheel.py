@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from benchmarks.measured.benchmark import Benchmark, as_they_are
+from benchmarks.measured.benchmark import Benchmark, of_held
 from fmus.model import Model
 from fmus.variables import Expr, Input, Parameter, State, rate
 
@@ -36,7 +36,7 @@ BENCHMARK = Benchmark(
             "robot_wheel_data_for_identification_without_integral.csv",
             "robot_wheel_validation_data.csv",
         ),
-        as_they_are,
+        of_held("m1_setvel_rad_s"),
     ),
     missing="dry friction",
     known=frozenset({("coulomb_friction", "motor"), ("stribeck_friction", "motor")}),
