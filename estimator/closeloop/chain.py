@@ -95,7 +95,7 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early, owed)
-    singles, pairs = _fitted(screened, owed.decoy_gain, tell, jobs)
+    singles, pairs = _fitted(screened, tell, jobs)
     judgement = judge(problem, base, singles, pairs, noise, size)
     if judgement.verdict == "unexplained":
         tell("fitting a force of free form")
@@ -116,14 +116,14 @@ def _screened(
     return Screened(problem, base, noise, size, screening, change, promises)
 
 
-def _fitted(s: Screened, chance: float, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Single hypotheses and pairs, best first; `chance` is the gain that decoys reach."""
+def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Single hypotheses and pairs, best first."""
     problem, base, size = s.problem, s.base, s.size
     alike = twins(s.change)
     doubled = {label for others in alike.values() for label in others}
     single = [(c, g) for c, g in s.change if c.label not in doubled]
     promises = at_their_moments(s.screening, base.fit, s.promises, LEADING)
-    promises = [p for p in promises if p.label not in doubled and p.gain > chance]
+    promises = [p for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
     singles = hypotheses(problem, base, chosen, size, jobs)
