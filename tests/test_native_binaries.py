@@ -221,6 +221,26 @@ def test_threads_do_not_disturb_each_other(fmi):
     assert_array_equal(together, alone)
 
 
+@every_version
+def test_threads_that_start_together_leave_the_working_folder(fmi, tmp_path, monkeypatch):
+    """Loading a library goes through its folder, which is one for the whole process."""
+    monkeypatch.chdir(tmp_path)
+    gate, file = threading.Barrier(8), native("testrig", fmi=fmi)
+
+    def start():
+        with Archive(file) as archive:
+            gate.wait()
+            for _ in range(20):
+                Fmu(archive).close()
+
+    threads = [threading.Thread(target=start) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert Path.cwd() == tmp_path
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from ctypes import c_double, c_uint
 from itertools import count
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 LONG = 500  # steps, from which a compiled loop is worth its start
 OK, WARNING, DISCARD, FATAL = 0, 1, 2, 4
 NUMBERS = count()
+STARTING = Lock()  # the folder and the path that a start changes belong to all threads
 MESSAGES: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=20))  # by instance name
 
 
@@ -34,20 +36,21 @@ class Instance(ABC):
         unique = f"{name}_{next(NUMBERS)}"
         self._name, self.messages = unique, MESSAGES[unique]
         self._fatal = ""  # why no call may be made any more, not even to free it
-        path, here = sys.path.copy(), Path.cwd()
-        try:
-            self._slave = self._started(
-                guid=archive.description.guid,
-                unzipDirectory=str(archive.folder),
-                modelIdentifier=archive.description.identifier,
-                instanceName=unique,
-            )
-        except Exception as error:  # FMPy has no class of its own for these
-            MESSAGES.pop(unique, None)
-            raise CallFailed(self._reason(" ".join(str(error).split()).rstrip("."))) from error
-        finally:
-            sys.path[:] = path  # an FMU in Python puts its own folder in front
-            os.chdir(here)  # FMPy stays in the library's folder where it cannot load it
+        with STARTING:
+            path, here = sys.path.copy(), Path.cwd()
+            try:
+                self._slave = self._started(
+                    guid=archive.description.guid,
+                    unzipDirectory=str(archive.folder),
+                    modelIdentifier=archive.description.identifier,
+                    instanceName=unique,
+                )
+            except Exception as error:  # FMPy has no class of its own for these
+                MESSAGES.pop(unique, None)
+                raise CallFailed(self._reason(" ".join(str(error).split()).rstrip("."))) from error
+            finally:
+                sys.path[:] = path  # an FMU in Python puts its own folder in front
+                os.chdir(here)  # FMPy stays in the library's folder where it cannot load it
 
     @abstractmethod
     def _started(self, **identity: str) -> Any:
