@@ -20,6 +20,7 @@ class Plant:
     def __init__(self, fmu: Fmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
         self.states = tuple(fmu.description.states)
+        self._fine: tuple[Run, Array, dict[str, Array]] | None = None  # of the run simulated last
 
     def simulate(
         self,
@@ -33,30 +34,27 @@ class Plant:
         start: states and parameters by name. Inputs act as samples of continuous signals, see Fmu.simulate;
         one that comes with its rate goes between the samples as both say. push: samples (N,) added to inputs.
         """
-        inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
-        for name, samples in (push or {}).items():
-            inputs[name] = inputs.get(name, 0.0) + samples
-        pieces = self._pieces(run.t)
-        if pieces == 1:
-            return self.fmu.simulate(run.t, inputs, (*self.outputs, *more), start)
-        t, fine = between(run.t, inputs, pieces)
-        return self.fmu.simulate(t, fine, (*self.outputs, *more), start)[::pieces]
+        t, inputs = self._given(run)
+        pieces = (len(t) - 1) // max(1, len(run.t) - 1) or 1
+        if push:
+            inputs = dict(inputs)
+            for name, samples in push.items():
+                inputs[name] = inputs.get(name, 0.0) + np.interp(t, run.t, samples)
+        return self.fmu.simulate(t, inputs, (*self.outputs, *more), start)[::pieces]
+
+    def _given(self, run: Run) -> tuple[Array, dict[str, Array]]:
+        """Times and inputs of a run as the FMU gets them; kept for the next simulation of the same."""
+        if self._fine is None or self._fine[0] is not run:
+            inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
+            pieces = self._pieces(run.t)
+            self._fine = run, *((run.t, inputs) if pieces == 1 else between(run.t, inputs, pieces))
+        return self._fine[1:]
 
     def _pieces(self, t: Array) -> int:
         """Into how many a step is cut: what a mean over a step takes from a fast input is lost otherwise."""
         if not any(f"{name}_dot" in self.inputs for name in self.inputs) or len(t) < 2:
             return 1
         return min(MOST, max(1, round(float(np.median(np.diff(t))) / PIECE)))
-
-    def transition(
-        self, x: Array, u: Mapping[str, float], theta: Mapping[str, float], dt: float
-    ) -> tuple[Array, Array]:
-        """One restart and step: the next state (n,) and the outputs (n_y,) there."""
-        states = dict(zip(self.states, x.tolist(), strict=True))
-        self.fmu.restart(0.0, **{**theta, **u, **states})
-        self.fmu.step(dt)
-        values = np.array(self.fmu.read((*self.states, *self.outputs)))
-        return values[: len(x)], values[len(x) :]
 
     def response(self, x: Array, given: Mapping[str, float], dt: float) -> tuple[Array, Array]:
         """Restart in a state: the state after a step (n,), and the outputs before it (n_y,).

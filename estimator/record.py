@@ -29,6 +29,11 @@ class Run:
     fit: BoolArray  # (N,) samples used to identify
     test: BoolArray  # (N,) samples held out
 
+    def part(self, first: int, end: int) -> "Run":
+        """The samples from `first` to before `end`."""
+        some = slice(first, end)
+        return Run(self.t[some], self.u[some], self.y[some], self.fit[some], self.test[some])
+
 
 @dataclass(frozen=True)
 class Record:

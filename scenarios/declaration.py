@@ -106,11 +106,12 @@ class EstimatedInput(Table):
 
 
 class Alarm(Table):
-    """Tell when a quantity is below or above a limit with at least that probability."""
+    """Tell when a quantity is below or above a limit with at least that probability, for `hold` s on end."""
 
     below: Number | None = None
     above: Number | None = None
     probability: Share = 0.95
+    hold: NotNegative = 1.0
 
     @model_validator(mode="after")
     def _has_a_limit(self) -> Self:

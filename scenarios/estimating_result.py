@@ -157,17 +157,17 @@ def probability(joint: Joint, h: History, i: int, limit: float, below: bool) -> 
 
 
 def stretches(name: str, limit: str, t: Array, p: Array, alarm: Alarm) -> list[Raised]:
-    """From where the probability reaches that of the alarm to where it is even again."""
+    """From where the probability reaches that of the alarm and stays there, to where it is even again."""
+    likely = p >= alarm.probability
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))
     found: list[Raised] = []
-    begin: int | None = None
-    for k, value in enumerate(p):
-        if begin is None and value >= alarm.probability:
-            begin = k
-        elif begin is not None and value < CLEAR:
-            found.append(Raised(name, limit, float(t[begin]), float(t[k]), float(p[begin:k].max())))
-            begin = None
-    if begin is not None:
-        found.append(Raised(name, limit, float(t[begin]), None, float(p[begin:].max())))
+    for begin, after in edges.reshape(-1, 2):
+        known = not found or (found[-1].end is not None and t[begin] >= found[-1].end)
+        if known and t[after - 1] - t[begin] >= alarm.hold:
+            even = after + np.flatnonzero(~(p[after:] >= CLEAR))
+            last = even[0] if len(even) else len(t)
+            end = float(t[last]) if last < len(t) else None
+            found.append(Raised(name, limit, float(t[begin]), end, float(p[begin:last].max())))
     return found
 
 

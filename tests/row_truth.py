@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -44,16 +45,19 @@ def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> 
 def of_wheelset(case: Case) -> Record:
     """A run over random alignment; where parameters jump, the state goes on with the new ones."""
     rng, t = np.random.default_rng(case.seed), case.times
-    run = wheelset.random_alignment(rng, t, case.speed)
-    at = min(round(case.when / case.dt), len(t) - 1) if case.later else len(t) - 1
-    before = replace(wheelset.Wheelset(), **dict(case.true))
-    parts = [wheelset.simulate(piece(run, 0, at), before)]
-    if at < len(t) - 1:
-        start = dict(zip(wheelset.COORDINATES, parts[0][-1], strict=True))
-        rest = piece(run, at, len(t) - 1)
-        parts.append(wheelset.simulate(rest, replace(before, **dict(case.later)), start=start)[1:])
-    states = dict(zip(wheelset.COORDINATES, np.vstack(parts).T, strict=True))
-    given = {"y_irr": run.y_irr[::2], "y_irr_dot": run.y_irr_dot[::2]}
+    lead = round(case.lead / case.dt)
+    whole = wheelset.random_alignment(rng, np.arange(-lead, len(t)) * case.dt, case.speed)
+    end = lead + len(t) - 1
+    jump = min(lead + round(case.when / case.dt), end) if case.later else end
+    parts, start = [], None
+    for first, last in pairwise(sorted({0, jump, end})):
+        new = case.later if first == jump else {}
+        now = replace(wheelset.Wheelset(), **{**case.true, **new})
+        parts.append(wheelset.simulate(piece(whole, first, last), now, start=start)[bool(parts) :])
+        start = dict(zip(wheelset.COORDINATES, parts[-1][-1], strict=True))
+    states = dict(zip(wheelset.COORDINATES, np.vstack(parts)[lead:].T, strict=True))
+    middle = slice(2 * lead, None, 2)
+    given = {"y_irr": whole.y_irr[middle], "y_irr_dot": whole.y_irr_dot[middle]}
     return Record({TIME: t, **given, **noisy(case, states, rng)})
 
 

@@ -11,15 +11,17 @@ from numpy.testing import assert_allclose
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit
-from estimator.closeloop.linear import Linearised
+from estimator.closeloop.linear import Linearised, shows_its_state
 from estimator.closeloop.moments import at_their_moments, moment, set_in
 from estimator.closeloop.onset import BLOCKS, onset
-from estimator.closeloop.problem import Unknown
+from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, screen
 from estimator.closeloop.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.twins import twins, with_twins
 from estimator.closeloop.verdict import becomes
 from estimator.plant import between
+from estimator.record import Record, Run
+from tests.native import native
 
 FREE = (-np.inf, np.inf)
 
@@ -50,6 +52,21 @@ def test_an_input_with_its_rate_is_a_cubic_between_the_samples(frequency, phase,
     bound = (w * 0.01) ** 4 / 384  # of a cubic that has values and rates
     assert np.abs(found["u"] - np.sin(w * fine + phase)).max() <= bound + 1e-12
     assert_allclose(found["v"], np.interp(fine, t, u), atol=1e-12)
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_an_fmu_between_coarse_samples_shows_its_state(hidden):
+    """10 Hz in samples of 5 ms: a restart has to see what the free run saw between them."""
+    t, w = np.arange(0.0, 2.0, 0.005), 20 * np.pi
+    u, rate = 1e-3 * np.sin(w * t), 1e-3 * w * np.cos(w * t)
+    every, inputs = np.ones(len(t), bool), ("u_fl", "u_fl_dot")
+    run = Run(t, np.column_stack([u, rate]), np.zeros((len(t), 1)), every, ~every)
+    record = Record((run,), inputs, ("z1_ddot",), np.array([np.nan]))
+    problem = Problem(lambda _: native("vehicle7dof"), record, {}, {})
+    x = problem.simulate({}, problem.plant.states)[0][:, 1:]
+    if hidden:
+        x[:, 3] *= 1.01
+    assert shows_its_state(problem, {}, x) is not hidden
 
 
 # ---- the smoother

@@ -200,8 +200,14 @@ def test_an_alarm_tells_when_and_how_surely(rig):
 
 def test_an_alarm_ends_where_it_is_even_again():
     p = np.array([0.1, 0.96, 0.7, 0.97, 0.4, 0.9, 0.99, 0.6])
-    found = stretches("mu0", "below 0.15", np.arange(8.0), p, Alarm(below=0.15))
+    found = stretches("mu0", "below 0.15", np.arange(8.0), p, Alarm(below=0.15, hold=0.0))
     assert [(a.begin, a.end, a.probability) for a in found] == [(1.0, 4.0, 0.97), (6.0, None, 0.99)]
+
+
+def test_an_alarm_waits_until_it_has_held():
+    p = np.array([0.97, 0.96, 0.1, 0.96, 0.97, 0.98, 0.6, 0.99, 0.99, 0.99, 0.4, 0.95])
+    found = stretches("mu0", "below 0.15", np.arange(12.0), p, Alarm(below=0.15, hold=2.0))
+    assert [(a.begin, a.end, a.probability) for a in found] == [(3.0, 10.0, 0.99)]
 
 
 def test_a_parameter_that_the_data_do_not_inform_is_reported_as_such(vdp, tmp_path):

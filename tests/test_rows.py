@@ -8,7 +8,6 @@ import pytest
 from estimator.estimate import Diverged
 from fmus.errors import BadInput
 from scenarios.rows import ROWS, run_row
-from scenarios.rows import friction_false_alarms as alarms
 from scenarios.rows import friction_ukf as friction
 from scenarios.rows import primary_stiffness as primary
 from scenarios.rows import profile_rls as profile
@@ -266,10 +265,15 @@ def test_the_friction_row_halves_the_source(tmp_path):
     assert not [f for f in outcome.findings if f.met is False and "(a" not in f.what]
 
 
-def test_alarms_are_counted_when_they_begin():
-    assert alarms._begun(np.array([False, True, True, False, True])) == 2
-    assert alarms._begun(np.array([True, True])) == 1
-    assert alarms._begun(np.zeros(3, bool)) == 0
+def test_a_record_may_begin_in_the_middle_of_a_run():
+    """Cut out of a longer run, it is that run's: nothing of the start from rest is left."""
+    rest = replace(case_of("friction_ukf", "wet"), duration=3.0, noise={"y": 0.0, "y_dot": 0.0})
+    later = truth(replace(rest, duration=2.0, lead=1.0))
+    whole = truth(rest)
+    for name in ("y_irr", "y_irr_dot", "y", "y_dot"):
+        np.testing.assert_allclose(later.columns[name], whole.columns[name][1000:], atol=1e-12)
+    assert later.t[0] == 0.0
+    assert abs(later.columns["y"][0]) > 1e-5
 
 
 @pytest.mark.slow

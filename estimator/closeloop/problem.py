@@ -134,4 +134,4 @@ def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:
     for run in runs:
         if run.fit.any():
             n = int(np.flatnonzero(run.fit)[max(1, int(share * run.fit.sum()) - 1)]) + 1
-            yield Run(run.t[:n], run.u[:n], run.y[:n], run.fit[:n], run.test[:n])
+            yield run.part(0, n)

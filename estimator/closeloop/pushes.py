@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from estimator.closeloop.problem import Problem
-from estimator.record import Array, Run
+from estimator.record import Array
 from fmus.host.description import PortNames
 
 POINTS = 24  # in time, over the identify part
@@ -20,9 +20,7 @@ def pushed(
     problem: Problem, theta: Mapping[str, float], port: PortNames, residual: Array, noise: Array
 ) -> tuple[Array, Array]:
     """Force and its standard deviation at the port, (n,) each, from the identify part's residual (n, n_y)."""
-    whole = problem.record.runs[0]
-    n = len(residual)
-    run = Run(whole.t[:n], whole.u[:n], whole.y[:n], whole.fit[:n], whole.test[:n])
+    run = problem.record.runs[0].part(0, len(residual))
     start = problem.start(theta)
     base = problem.plant.simulate(run, start)
     size = problem.plant.fmu.description.variables[port.force].nominal or 1.0

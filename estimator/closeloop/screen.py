@@ -130,7 +130,7 @@ class Screening:
         if not moved:
             return []
         if self._states is None:
-            return [_simulated(problem, self.theta, change, self.size) for change in moved]
+            return [self._simulated(change) for change in moved]
         levers, local = self._linearised(names_of(moved), self._states)
         fit = problem.record.runs[0].fit[:last]
         found: list[Array] = []
@@ -143,6 +143,23 @@ class Screening:
         if self._local is None or not set(levers) <= set(self._local[0]):
             self._local = levers, linearise(self.problem, self.theta, x, np.arange(len(x)), levers)
         return self._local
+
+    def _simulated(self, change: Mapping[str, Array]) -> Array:
+        """The same of one change by a simulation with it given to the FMU."""
+        problem, last = self.problem, _last(self.problem)
+        run, plant, start = problem.record.runs[0], problem.plant, problem.start(self.theta)
+        known = plant.fmu.description.variables
+        push = {}
+        for name, samples in change.items():
+            rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
+            push[name] = rest + np.concatenate([samples, np.full(len(run.t) - last, samples[-1])])
+        moved = plant.simulate(run, start, push=push) - self._unchanged
+        return np.asarray(-(moved[run.fit] / self.size).ravel())
+
+    @cached_property
+    def _unchanged(self) -> Array:
+        """Outputs of the first run without any change (N, n_y)."""
+        return self.problem.plant.simulate(self.problem.record.runs[0], self.problem.start(self.theta))
 
 
 def changes(
@@ -165,23 +182,6 @@ def _along(free: Course, missing: MissingForce) -> Course:
 
 def _last(problem: Problem) -> int:
     return int(np.flatnonzero(problem.record.runs[0].fit)[-1]) + 1
-
-
-def _simulated(
-    problem: Problem, theta: Mapping[str, float], change: Mapping[str, Array], size: Array
-) -> Array:
-    """The same by a simulation with the changes given to the FMU."""
-    run, last = problem.record.runs[0], _last(problem)
-    start = problem.start(theta)
-    known = problem.plant.fmu.description.variables
-    push = {}
-    for name, samples in change.items():
-        rest = 0.0 if name in problem.plant.inputs else start.get(name, known[name].start or 0.0)
-        push[name] = rest + np.concatenate([samples, np.full(len(run.t) - last, samples[-1])])
-    n_y = len(problem.plant.outputs)
-    moved = problem.plant.simulate(run, start, push=push)[:, :n_y]
-    base = problem.plant.simulate(run, start)[:, :n_y]
-    return np.asarray(-((moved - base)[run.fit] / size).ravel())
 
 
 def _faults(

@@ -23,6 +23,7 @@ class Case:
     inputs, noise: what a record holds besides the time; noise: standard deviation of each measured output.
     true: parameters that differ from the declared ones; later: those that jump at `when` [s], and to what;
     further: jumps after that one. judged: outputs whose true course is to be known too, in NAME_true.
+    lead: s that the model has been running when the record begins; 0 for a start from rest.
     speed: m/s, on the rig Hz of the supply. More than that, such as the track, is the truth's own.
     """
 
@@ -38,6 +39,7 @@ class Case:
     when: float = inf
     further: tuple[tuple[float, Mapping[str, float]], ...] = ()
     judged: tuple[str, ...] = ()
+    lead: float = 0.0  # s
     seed: int = 1
 
     @property
