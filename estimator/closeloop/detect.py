@@ -21,6 +21,7 @@ SLOW_BLOCKS = 40  # pieces of the held-out part whose means show slow residuals
 SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
 BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
+CHANCE = 3.0  # standard deviations of the mean square of white noise
 NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter
 
 
@@ -73,10 +74,12 @@ def detect(
 def matters(problem: Problem, base: Hypothesis, noise: Array) -> bool:
     """Whether a held-out residual is too large to be left alone, in any output.
 
-    Compared with the signal is what it has beyond the noise.
+    Compared with the signal is what it has beyond noise, beyond what chance makes of that too.
     """
     signal, rms = signal_size(problem), base.rms(problem)
-    beyond = np.sqrt(np.maximum(rms**2 - noise**2, 0.0))
+    samples = sum(int(run.test.sum()) for run in problem.record.runs)
+    chance = 1 + CHANCE * np.sqrt(2 / max(samples, 1))
+    beyond = np.sqrt(np.maximum(rms**2 - chance * noise**2, 0.0))
     if problem.form_error > 0:
         return bool(np.any((beyond >= problem.form_error * signal) & (rms >= NOISES * noise)))
     return bool(np.any((beyond >= SHARE * signal) | (beyond >= BEYOND * noise)))

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import LONG, Hypothesis, fitted, hypotheses
+from estimator.closeloop.compare import Hypothesis, finished, hypotheses
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, Screening, built, screen
 from estimator.record import Array
@@ -42,7 +42,7 @@ def try_pairs(
     freed = [
         Promise(tuple(c for c in h.candidates if c not in idle(h)), 0.0, h.fit.theta) for h in left.values()
     ]
-    return kept, fitted(problem, base.fit.unknowns, freed, size, LONG, jobs)
+    return kept, finished(problem, base.fit.unknowns, freed, size, jobs)
 
 
 def _from_base(base: Hypothesis, physical: Changes) -> list[Promise]:

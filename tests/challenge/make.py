@@ -20,14 +20,15 @@ LOWEST = 60.0  # s, over which a drift of mu0 goes on
 SHARE = {"limit_share": "limit", "slew_share": "slew"}
 WORSE = ("wet", "low", "very_low")  # than dry
 DIGITS = 8
-ATTEMPTS = 8
+ATTEMPTS = 20
+FAINT = 0.5  # times the noise: a sensor's fault below it is left alone by the chain's own rule
 
 
 def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
     """Write the record's folder, then the file of its truth; what is there already is kept.
 
     Sizes under which the system leaves what its model can say (a wheel locks, a flange climbs) are drawn
-    again. Raises ValueError where that does not help.
+    again, and faults of a sensor alone that drown in its noise. Raises ValueError where that does not help.
     """
     told = truths / f"{plan.name}.json"
     if told.exists():
@@ -51,6 +52,8 @@ def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
     here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
     items = tuple(Item(e.kind, p, settled(e.kind, p, sizes, here)) for e, p, sizes in raw)
     truth, seen = measure(plan, items, here, rng)
+    if plan.group == "sensor" and truth.largest_snr < FAINT:
+        raise ValueError(f"the fault is {truth.largest_snr:.2f} times the noise")
     return truth, here.toml(plan.name, effect_of(items, here)), {"time": here.t, **here.inputs, **seen}
 
 

@@ -169,7 +169,7 @@ OUTPUTS = {
 }
 FAULTS = (  # bias, and drift by the end of the record, in multiples of the noise
     entry("sensor_bias", "", bias=either(0.7, 50)),
-    entry("sensor_gain", "", gain=either(0.003, 0.12)),
+    entry("sensor_gain", "", gain=either(0.003, 0.25)),
     entry("sensor_delay", "", delay=log(0.008, 0.1)),
     entry("sensor_drift", "", drift=either(2, 120)),
 )
