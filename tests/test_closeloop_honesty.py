@@ -26,7 +26,7 @@ from estimator.closeloop.missing_force import missing_forces
 from estimator.closeloop.power import power, threshold
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.regressors import Calibration, alike, lengths
-from estimator.closeloop.screen import changes
+from estimator.closeloop.screen import Screening
 from estimator.closeloop.stability import stability
 from estimator.closeloop.verdict import Judgement
 from estimator.record import Array, Record, Run
@@ -451,8 +451,10 @@ def test_the_page_and_the_result_hold_what_a_report_owes(
         asked.builder.outside(), asked.record, outcome.forces,
     )  # fmt: skip
     chosen = [*faults, *forces]
-    change = list(zip(chosen, changes(asked, outcome.base.fit, chosen, NOISE, outcome.forces), strict=True))
-    owed = honesty(asked, outcome.base, change, NOISE, LEVEL, np.random.default_rng(1), curve)
+    screening = Screening(asked, outcome.base.fit, NOISE, outcome.forces)
+    change = list(zip(chosen, screening.changes(chosen), strict=True))
+    rng = np.random.default_rng(1)
+    owed = honesty(asked, outcome.base, screening.fit, change, NOISE, LEVEL, rng, curve)
     told = replace(outcome, honesty=owed)
     result = result_of("<nameless>", asked, told, 1.0, ())
     write_report(tmp_path, asked, told, result)

@@ -1,6 +1,7 @@
 """How close-loop finds its way: smoothing, moments, twins, onsets, inputs between samples."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit
+from estimator.closeloop.grouped import group_size, grouped
 from estimator.closeloop.linear import Linearised, shows_its_state
 from estimator.closeloop.moments import at_their_moments, moment, set_in
 from estimator.closeloop.onset import BLOCKS, onset
@@ -107,6 +109,33 @@ def least_squares_force(g, r, changes, first, walk, dt):
     return covariance @ (g.T @ r), np.sqrt(np.diag(covariance))
 
 
+# ---- samples in groups
+
+
+@given(st.sampled_from([1, 3, 5]), st.integers(1, 3), st.integers(0, 1000))
+def test_groups_keep_noise_white_and_slow_squares(n, n_y, seed):
+    rng = np.random.default_rng(seed)
+    samples = 6000 * n
+    slow = np.sin(np.linspace(0, 6, samples))[:, None] * rng.standard_normal(n_y)
+    squares = np.sum(grouped(slow.ravel(), n_y, n) ** 2)
+    assert_allclose(squares, np.sum(slow**2), rtol=1e-5)
+    noise = grouped(rng.standard_normal((samples, n_y)).ravel(), n_y, n)
+    assert np.mean(noise**2) == pytest.approx(1.0, abs=6 * np.sqrt(2 / len(noise)))
+    assert_allclose(grouped(np.repeat(slow.ravel()[:, None], 2, axis=1), n_y, n)[:, 1],
+                    grouped(slow.ravel(), n_y, n))  # fmt: skip
+
+
+@pytest.mark.parametrize(("frequency", "group"), [(2.0, 5), (14.0, 3), (60.0, 1)])
+def test_what_moves_fast_is_not_grouped(frequency, group):
+    t = np.arange(0.0, 40.0, 1e-3)
+    y, fit = np.sin(2 * np.pi * frequency * t)[:, None], t < 35.0
+    record = Record((Run(t, y[:, :0], y, fit, ~fit),), (), ("y",), np.ones(1))
+    problem = Problem(lambda _: Path(), record, {}, {})
+    assert group_size(problem, y) == group
+    late = Record((Run(t, y[:, :0], y, t > 5.0, t <= 5.0),), (), ("y",), np.ones(1))
+    assert group_size(replace(problem, record=late), y) == 1
+
+
 # ---- moments
 
 
@@ -115,6 +144,7 @@ class Steps:
     """Answers a candidate with a step at its moment."""
 
     t: np.ndarray
+    fit: Fit
 
     @property
     def length(self):
@@ -130,10 +160,10 @@ def test_the_moment_of_a_step_is_found(share, size):
     t = np.linspace(0.0, 20.0, 2001)
     true = 20.0 * share
     base = nothing_calibrated(-size * (t >= true))
-    steps, c = Steps(t), candidate("step_force", "wheel", [("t0", 1.0)])
+    steps, c = Steps(t, base), candidate("step_force", "wheel", [("t0", 1.0)])
     tried = [set_in(c, m) for m in np.linspace(0, 20, 12)[1:-1]]
     promises = screen(base, [((x,), g) for x, g in zip(tried, steps.changes(tried), strict=True)])
-    found = at_their_moments(steps, base, promises, 1)
+    found = at_their_moments(steps, promises, 1)
     assert abs(moment(found[0].candidates[0]) - true) < 20.0 * 0.1 / 36 + 0.01
     assert found[0].gain >= promises[0].gain
     assert len(found) == len(promises)
@@ -143,7 +173,8 @@ def test_what_is_always_there_has_no_moment():
     c = candidate("coulomb_friction", "wheel", [("v_s", 0.1)])
     assert moment(c) is None
     promise = Promise((c,), 1.0, {})
-    assert at_their_moments(Steps(np.arange(3.0)), nothing_calibrated(np.ones(3)), [promise], 3) == [promise]
+    steps = Steps(np.arange(3.0), nothing_calibrated(np.ones(3)))
+    assert at_their_moments(steps, [promise], 3) == [promise]
 
 
 # ---- twins

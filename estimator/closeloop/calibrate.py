@@ -8,6 +8,8 @@ from estimator.closeloop.noise import noise_floor, weights
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.record import Array
 
+ROUGH = 1e-3  # gain of a step that is enough where much is left unexplained
+NEAR = 2.0  # mean square, in units of a residual that counts as one, from which down it is not
 SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is left alone
 
 
@@ -19,7 +21,7 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
     record = problem.record
     states = _start_unknowns(problem)
     spread = np.std(np.vstack([run.y for run in record.runs]), axis=0) + noise_floor(record)
-    start = fit(problem, states, spread)
+    start = fit(problem, states, spread, gain=ROUGH)
     declared = Hypothesis((), start, tuple(problem.residuals(start.theta)))
     parameters = [
         Unknown(n, problem.declared[n], low, high, (high - low) / 10)
@@ -27,7 +29,10 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
     ]
     base, size = declared, weights(record, list(declared.residuals))
     for _ in range(2 if np.isnan(record.noise_std).any() else 1):
-        found = fit(problem, [*parameters, *states], size, base.fit.theta)
+        unknowns = [*parameters, *states]
+        found = fit(problem, unknowns, size, base.fit.theta, gain=ROUGH)
+        if np.mean(found.residual**2) < NEAR:
+            found = fit(problem, unknowns, size, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
         size = weights(record, list(base.residuals))
     return declared, base, size

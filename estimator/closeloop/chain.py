@@ -87,10 +87,12 @@ def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: in
     forces = missing_forces(problem, base.fit.theta, noise)
     screened = _screened(problem, base, noise, size, forces, tell)
     tell("testing for a discrepancy against simulated records without one")
-    change = screened.change
-    detection = detect(problem, base, noise, [g for _, g in change], np.random.default_rng(seed))
+    change, seen = screened.change, screened.screening.fit
+    over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
+    regressors = [g for _, g in change]
+    detection = detect(problem, base, noise, over_noise, regressors, np.random.default_rng(seed))
     level = LEVEL / len(detection.figures)
-    owed = honesty(problem, base, change, size, level, np.random.default_rng(seed))
+    owed = honesty(problem, base, seen, change, size, level, np.random.default_rng(seed))
     found = (declared, base, noise, size, detection, tuple(forces), tuple(screened.promises))
     early = without_fits(problem, base, detection, noise)
     if early:
@@ -112,7 +114,7 @@ def _screened(
     tell(f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     screening = Screening(problem, base.fit, size, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
-    promises = screen(base.fit, [((c,), g) for c, g in change])
+    promises = screen(screening.fit, [((c,), g) for c, g in change])
     return Screened(problem, base, noise, size, screening, change, promises)
 
 
@@ -122,7 +124,7 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
     alike = twins(s.change)
     doubled = {label for others in alike.values() for label in others}
     single = [(c, g) for c, g in s.change if c.label not in doubled]
-    promises = at_their_moments(s.screening, base.fit, s.promises, LEADING)
+    promises = at_their_moments(s.screening, s.promises, LEADING)
     promises = [p for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
@@ -140,7 +142,7 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
         singles = from_the_beginning(problem, base, singles, [*sudden, *promises], size, jobs)
     if not explained():
         tell("trying pairs of effects")
-        pairs, freed = try_pairs(problem, base, singles, single, size, jobs)
+        pairs, freed = try_pairs(problem, base, s.screening.fit, singles, single, size, jobs)
         singles = best_by_label([*singles, *freed])
     singles = with_twins(singles, alike)
     return ranked(problem, singles, size), ranked(problem, pairs, size)

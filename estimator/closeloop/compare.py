@@ -19,6 +19,8 @@ FINALISTS = 5
 GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
 ROUNDS, LAST = 4, 2  # of further LONG fits of the leading finalists, where they have not converged
 ABOARD = 6  # effects in one FMU
+LEADERS = 2  # of the finalists that are fitted to the end before the others, and
+RIVAL = 4.0  # times the best sum of squares then, up to which the others are
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
@@ -114,8 +116,16 @@ def hypotheses(
     brief = fitted(started, others, promises, size, BRIEF, jobs, known)
     limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
     hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
-    again = [Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta}) for h in hopeful]
-    return finished(problem, unknowns, again, size, jobs) + [h for h in brief if h not in hopeful]
+    done: list[Hypothesis] = []
+    for part in (hopeful[:LEADERS], hopeful[LEADERS:]):
+        again = [
+            Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta})
+            for h in part
+            if not done or cost(h) < RIVAL * cost(done[0])
+        ]
+        done = best_by_label([*done, *finished(problem, unknowns, again, size, jobs)])
+    labels = {h.label for h in done}
+    return best_by_label([*done, *(h for h in brief if h.label not in labels)])
 
 
 def finished(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.closeloop.compare import Hypothesis
-from estimator.closeloop.fit import STEP
+from estimator.closeloop.fit import STEP, Fit
 from estimator.closeloop.problem import Problem
 from estimator.record import Array
 
@@ -41,14 +41,18 @@ class Detection:
 
 
 def detect(
-    problem: Problem, base: Hypothesis, noise: Array, regressors: Sequence[Array], rng: np.random.Generator
-) -> Detection:
-    """Test the base hypothesis' residual; regressors: (m, k) changes of the fit-part residual."""
+    problem: Problem, base: Hypothesis, noise: Array, screened: Fit, regressors: Sequence[Array],
+    rng: np.random.Generator,
+) -> Detection:  # fmt: skip
+    """Test the base hypothesis' residual.
+
+    screened: its fit as it was screened, residual over `noise`; regressors: changes (m, k) of that residual.
+    """
     runs = problem.record.runs
     fit_mask, test_mask = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "test"))
     residual = np.concatenate(base.residuals) / noise
     slopes = _sensitivities(problem, base, noise)
-    g = _directions(base.fit.jacobian, regressors) if regressors else None
+    g = _directions(screened.jacobian, regressors) if regressors else None
     observed = _figures(residual, test_mask)
     n = slopes.shape[2]
     back = np.linalg.pinv(slopes[fit_mask].reshape(fit_mask.sum() * len(noise), n)) if n else np.zeros((0, 1))
@@ -60,8 +64,7 @@ def detect(
         copies.append(_figures(e, test_mask))
     references = {name: np.array([c[name] for c in copies]) for name in observed}
     if g is not None:
-        fitted = residual[fit_mask].ravel()
-        observed[LIKENESS] = float(np.max((g.T @ fitted) ** 2))
+        observed[LIKENESS] = float(np.max((g.T @ screened.residual) ** 2))
         references[LIKENESS] = _likeness_of_noise(g, rng)
     p_values, figures = [], {}
     for name, value in observed.items():

@@ -12,6 +12,7 @@ from estimator.record import Array
 from fmus.host.fmu import FmuError
 
 STEP = 1e-2  # of an unknown's scale, for differences
+GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
 REFUSED = 1e6  # size of a residual where the FMU could not be run
 BLOCKS = 30  # pieces of the record between which residuals count as independent
 
@@ -60,9 +61,11 @@ def fit(
     fixed: Mapping[str, float] | None = None,
     evaluations: int = 15,
     known: Mapping[str, Array] | None = None,
+    gain: float = GAIN,
 ) -> Fit:
     """Least squares of the simulation error over the unknowns, from `start` or their own start values.
 
+    gain: share of the sum of squares; a step that gains less is the last one.
     known: derivatives (m,) of the weighted residual by some of the unknowns, taken as they are.
     """
     held = dict(fixed or {})
@@ -93,7 +96,7 @@ def fit(
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     inside = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     found = least_squares(
-        residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-5, ftol=1e-6, max_nfev=evaluations
+        residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=evaluations
     )
     slopes = np.asarray(found.jac)
     covariance = sandwich(found.fun, slopes, scale, high - low)

@@ -18,7 +18,7 @@ from estimator.closeloop.fit import Fit
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.regressors import Calibration, Changes
-from estimator.closeloop.screen import changes, screen
+from estimator.closeloop.screen import Screening, screen
 from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.effects.free_form import FreeForm
@@ -76,10 +76,11 @@ def free_form(
     candidates = [c for d in dependences(problem, forces) for c in _candidates(problem, d, forces)]
     if not candidates:
         return None
-    change = list(zip(candidates, changes(problem, base.fit, candidates, size, forces), strict=True))
-    calibration = Calibration.of(base.fit)
-    chosen = [resolved(calibration, c, g) for c, g in promising(base.fit, change, near)]
-    promises = screen(base.fit, [((c,), g) for c, g in chosen if c.amplitudes])
+    screening = Screening(problem, base.fit, size, forces)
+    change = list(zip(candidates, screening.changes(candidates), strict=True))
+    calibration = Calibration.of(screening.fit)
+    chosen = [resolved(calibration, c, g) for c, g in promising(screening.fit, change, near)]
+    promises = screen(screening.fit, [((c,), g) for c, g in chosen if c.amplitudes])
     # a strong law differs from its linear picture, and then a start without it is the better one
     promises += [replace(p, start=base.fit.theta) for p in promises]
     found = ranked(problem, hypotheses(problem, base, promises, size, jobs), size)

@@ -8,6 +8,7 @@ import numpy as np
 from estimator.closeloop.blackbox import BlackBox, black_box
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.decoys import decoy_gain
+from estimator.closeloop.fit import Fit
 from estimator.closeloop.power import Visible, power
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.regressors import Changes
@@ -31,21 +32,22 @@ class Honesty:
 def honesty(
     problem: Problem,
     base: Hypothesis,
+    screened: Fit,
     change: Changes,
     size: Array,
     level: float,
     rng: np.random.Generator,
     free_form: Hypothesis | None = None,
 ) -> Honesty:
-    """All of it, from the calibrated FMU `base` and the screening's changes of its weighted residual.
+    """All of it, from the calibrated FMU `base`, its fit as it was screened, and the screening's changes.
 
     size: (n_y,) that the residual was weighted with; level: of the test for likeness to any effect.
     """
     return Honesty(
         black_box(problem.record, base.residuals, size),
-        tuple(power(base.fit, change, level, rng, room=room(problem, base.theta))),
-        decoy_gain(base.fit, change, len(size), rng),
-        stability(base.fit, change, rng),
+        tuple(power(screened, change, level, rng, room=room(problem, base.theta))),
+        decoy_gain(screened, change, len(size), rng),
+        stability(screened, change, rng),
         free_form,
     )
 

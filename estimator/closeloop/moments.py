@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.fit import Fit
 from estimator.closeloop.screen import Promise, Screening, screen
 
 BEGINS = "_t0"  # how the name of such an unknown ends
@@ -23,9 +22,7 @@ def moment(c: Candidate) -> float | None:
     return next((u.start for u in c.shape if u.name.endswith(BEGINS)), None)
 
 
-def at_their_moments(
-    screening: Screening, base: Fit, promises: Sequence[Promise], most: int
-) -> list[Promise]:
+def at_their_moments(screening: Screening, promises: Sequence[Promise], most: int) -> list[Promise]:
     """The promises, best first; the best one of each of `most` labels that set in has its best moment."""
     leading: dict[str, Promise] = {}
     for p in promises:
@@ -36,7 +33,7 @@ def at_their_moments(
     for _ in range(ROUNDS):
         tried = [c for p in best.values() for c in _near(p.candidates[0], spacing)]
         change = screening.changes(tried)
-        found = screen(base, [((c,), g) for c, g in zip(tried, change, strict=True)])
+        found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
         for p in reversed(found):
             if p.gain > best[p.label].gain:
                 best[p.label] = p

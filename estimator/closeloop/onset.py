@@ -62,8 +62,9 @@ def since(
     there = fit(here, before.unknowns, size, before.theta, evaluations=1)
     labels = {c.label: c for c in reversed(candidates) if moment(c) is not None}
     tried = [set_in(c, (share + g / BLOCKS) * length) for c in labels.values() for g in GRID]
-    change = Screening(here, there, size).changes(tried)
-    found = screen(there, [((c,), g) for c, g in zip(tried, change, strict=True)])
+    screening = Screening(here, there, size)
+    change = screening.changes(tried)
+    found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
     best: dict[str, Promise] = {}
     for p in found:
         best.setdefault(p.label, p)

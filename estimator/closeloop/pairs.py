@@ -7,6 +7,7 @@ import numpy as np
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, finished, hypotheses
+from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, Screening, built, screen
 from estimator.record import Array
@@ -24,15 +25,18 @@ def idle(h: Hypothesis) -> list[Candidate]:
 
 
 def try_pairs(
-    problem: Problem, base: Hypothesis, singles: Sequence[Hypothesis], change: Changes, size: Array, jobs: int
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    problem: Problem, base: Hypothesis, screened: Fit, singles: Sequence[Hypothesis], change: Changes,
+    size: Array, jobs: int,
+) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
     """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
+
+    screened: the base's fit as `change`, of single candidates, belongs to it.
 
     Pairs are nominated twice: by regression from the base, and as partners of the best single effect.
     """
     physical = [(c, g) for c, g in change if not c.is_fault]
     alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
-    promises = _from_base(base, physical)
+    promises = _from_base(screened, physical)
     if alone:
         best = next(iter(alone.values()))
         promises += _partners(problem, best, [c for c, _ in physical], size)
@@ -45,8 +49,8 @@ def try_pairs(
     return kept, finished(problem, base.fit.unknowns, freed, size, jobs)
 
 
-def _from_base(base: Hypothesis, physical: Changes) -> list[Promise]:
-    order = screen(base.fit, [((c,), g) for c, g in physical])
+def _from_base(base: Fit, physical: Changes) -> list[Promise]:
+    order = screen(base, [((c,), g) for c, g in physical])
     by_candidate = dict(physical)
     leading = [p.candidates[0] for p in order[:PARTNERS]]
     sets = [
@@ -54,7 +58,7 @@ def _from_base(base: Hypothesis, physical: Changes) -> list[Promise]:
         for a, b in combinations(leading, 2)
         if a.label != b.label
     ]
-    return screen(base.fit, sets)[:PROMISES]
+    return screen(base, sets)[:PROMISES]
 
 
 def _partners(
@@ -62,8 +66,9 @@ def _partners(
 ) -> list[Promise]:
     others = [c for c in candidates if c.label != best.label]
     here = built(problem, best.candidates)
-    change = Screening(here, best.fit, size).changes(others)
-    promises = screen(best.fit, [((c,), g) for c, g in zip(others, change, strict=True)])[:PROMISES]
+    screening = Screening(here, best.fit, size)
+    change = screening.changes(others)
+    promises = screen(screening.fit, [((c,), g) for c, g in zip(others, change, strict=True)])[:PROMISES]
     return [
         Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in promises
     ]

@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import Fit
+from estimator.closeloop.grouped import group_size, grouped, grouped_fit
 from estimator.closeloop.levers import Course, names_of, shifts
 from estimator.closeloop.linear import Linearised, linearise, responses, shows_its_state
 from estimator.closeloop.missing_force import MissingForce
@@ -65,20 +67,25 @@ class Screening:
 
     size: (n_y,) of a residual that counts as one. forces: at each port, with the motion there that it
     makes; a law is worked out along that motion, since the FMU without the law may move quite differently.
+    fit: the fit as changes are to be compared with it, so many samples (`grouped.py`) as one.
     """
 
     def __init__(self, problem: Problem, base: Fit, size: Array, forces: Sequence[MissingForce] = ()) -> None:
         self.problem, self.theta, self.size, self.forces = problem, base.theta, size, forces
+        [self._shown, *_] = problem.simulate(self.theta)
+        self.group = group_size(problem, self._shown)
+        self.fit = grouped_fit(base, len(size), self.group)
         self._made: dict[str, Around] = {}
         self._local: tuple[list[str], Linearised] | None = None
 
     def changes(self, candidates: Sequence[Candidate]) -> list[Array]:
-        """Change of the weighted residual by each candidate's amplitudes at their scales, (m, k) each."""
+        """Change of the residual of `fit` by each candidate's amplitudes at their scales, (m, k) each."""
         physical = [c for c in candidates if not c.is_fault]
         moved = {c: self._moved(c) for c in physical}
         columns = iter(self._answers([change for c in physical for change in moved[c]]))
         own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
-        own |= _faults(self.problem, self.theta, [c for c in candidates if c.is_fault], self.size)
+        faults = _faults(self.problem, self.theta, [c for c in candidates if c.is_fault], self.size)
+        own |= {c: grouped(g, len(self.size), self.group) for c, g in faults.items()}
         return [own[c] for c in candidates]
 
     @property
@@ -94,9 +101,14 @@ class Screening:
         return [shifts(self._made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
 
     @cached_property
+    def _at(self) -> NDArray[np.intp]:
+        """Samples that are looked at: the middle of each group, up to the last one that is fitted."""
+        return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
+
+    @cached_property
     def _free(self) -> Course:
-        """The free run of the first run of the record, up to its last sample that is fitted."""
-        problem, theta = self.problem, self.theta
+        """The free run of the first run of the record."""
+        problem, theta, at = self.problem, self.theta, self._at
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
         plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
@@ -109,7 +121,7 @@ class Screening:
         t = run.t[:last] - run.t[0]
         speed = columns.get(SPEED, np.zeros(last))
         way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
-        return Course(t, full[:last, len(plant.outputs) :], np.column_stack(given), way)
+        return Course(t[at], full[at, len(plant.outputs) :], np.column_stack(given)[at], way[at])
 
     @cached_property
     def _courses(self) -> dict[str, Course]:
@@ -126,51 +138,39 @@ class Screening:
 
     def _answers(self, moved: Sequence[Mapping[str, Array]]) -> list[Array]:
         """Change of the weighted residual on the identify part by each change of levers, (m,) each."""
-        problem, last = self.problem, _last(self.problem)
         if not moved:
             return []
         if self._states is None:
             return [self._simulated(change) for change in moved]
         levers, local = self._linearised(names_of(moved), self._states)
-        fit = problem.record.runs[0].fit[:last]
+        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size[:, None]
         found: list[Array] = []
         for i in range(0, len(moved), TOGETHER):
-            y = responses(local, levers, moved[i : i + TOGETHER], last)[fit]
-            found += list(-(y / self.size[:, None]).reshape(-1, y.shape[2]).T)
+            y = responses(local, levers, moved[i : i + TOGETHER], len(self._at))[fit]
+            found += list((y * scale).reshape(-1, y.shape[2]).T)
         return found
 
     def _linearised(self, levers: list[str], x: Array) -> tuple[list[str], Linearised]:
         if self._local is None or not set(levers) <= set(self._local[0]):
-            self._local = levers, linearise(self.problem, self.theta, x, np.arange(len(x)), levers)
+            self._local = levers, linearise(self.problem, self.theta, x, self._at, levers)
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:
         """The same of one change by a simulation with it given to the FMU."""
-        problem, last = self.problem, _last(self.problem)
+        problem = self.problem
         run, plant, start = problem.record.runs[0], problem.plant, problem.start(self.theta)
         known = plant.fmu.description.variables
         push = {}
         for name, samples in change.items():
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
-            push[name] = rest + np.concatenate([samples, np.full(len(run.t) - last, samples[-1])])
+            push[name] = rest + np.interp(np.arange(len(run.t)), self._at, samples)
         moved = plant.simulate(run, start, push=push) - self._unchanged
-        return np.asarray(-(moved[run.fit] / self.size).ravel())
+        return grouped(-(moved[run.fit] / self.size).ravel(), len(self.size), self.group)
 
     @cached_property
     def _unchanged(self) -> Array:
         """Outputs of the first run without any change (N, n_y)."""
         return self.problem.plant.simulate(self.problem.record.runs[0], self.problem.start(self.theta))
-
-
-def changes(
-    problem: Problem,
-    base: Fit,
-    candidates: Sequence[Candidate],
-    size: Array,
-    forces: Sequence[MissingForce] = (),
-) -> list[Array]:
-    """What `Screening.changes` gives, once."""
-    return Screening(problem, base, size, forces).changes(candidates)
 
 
 def _along(free: Course, missing: MissingForce) -> Course:

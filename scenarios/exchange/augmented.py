@@ -3,7 +3,7 @@
 import tempfile
 from collections.abc import Iterator, Mapping
 from itertools import chain
-from math import ceil
+from math import ceil, floor
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +86,7 @@ def _scenario(
     ]
     return {
         "question": f"What does {base.name} do with the effects that were found: {model.about}?",
-        "duration": step * max(1, round(min(t[-1] - t[0], longest) / step)),
+        "duration": step * max(1, floor(min(t[-1] - t[0], longest) / step)),  # never past the record
         "step": step,
         "fmus": {BASE: _member(fmu, base, {**starts, **plugs.constant})},
         "connections": [*_wires(plugs)],
