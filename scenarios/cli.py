@@ -120,7 +120,9 @@ def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
 
 @app.command("close-loop")
 def close_loop(
-    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
+    experiments: Annotated[
+        list[Path], typer.Argument(help="experiment.toml, or its folder; several get one table")
+    ],
     out: Out = Path("out"),
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
@@ -128,21 +130,43 @@ def close_loop(
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; one a core by default")] = None,
     seed: Annotated[int, typer.Option(help="of the simulated records without an effect")] = 0,
 ) -> None:
-    """Find the residual between an FMU and a record, trace it to an effect, add the effect, report."""
-    from scenarios.closing import close_loop as run
+    """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
 
-    with said.status("reading the experiment") as status:
-        result = run(experiment, out, data, tell=status.update, jobs=jobs, seed=seed)
-    typer.echo(f"{result.verdict}: {result.reason}")
-    for found in result.effects:
-        values = ", ".join(f"{n} = {v:.4g} ± {e:.2g}" for n, (v, e) in found.parameters.items())
-        typer.echo(f"  {found.kind} at {found.location}: {values}")
-    for name, error in result.error.items():
-        before, after, noise = (f"{error[k]:.3g}" for k in ("before", "after", "noise"))
-        typer.echo(f"  {name}: error {before} before, {after} after, noise {noise}")
-    if result.next_experiment:
-        typer.echo(f"  to tell them apart: {result.next_experiment}")
-    typer.echo(f"report: {out / 'report.html'}")
+    Several experiments are written to a folder each, with one table; where they use the same FMU, what one
+    shows is tested on the others and fitted to all. Ctrl-C keeps what is finished.
+    """
+    from scenarios.closing_lines import lines_of, table_of
+
+    if len(experiments) == 1:
+        from scenarios.closing import close_loop as run
+
+        with said.status("reading the experiment") as status:
+            result = run(experiments[0], out, data, tell=status.update, jobs=jobs, seed=seed)
+        for line in lines_of(result):
+            typer.echo(line)
+        typer.echo(f"report: {out / 'report.html'}")
+        return
+    from scenarios.closing_several import close_loops as run_all
+
+    with said.status("reading the experiments") as status:
+        found = run_all(
+            experiments,
+            out,
+            data,
+            status.update,
+            lambda r: typer.echo(f"{r.experiment}: {r.verdict} ({r.wall_seconds:.0f} s)"),
+            jobs,
+            seed,
+        )
+    if found.results:
+        for line in table_of(found):
+            typer.echo(line)
+        typer.echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
+    if found.interrupted:
+        said.print(
+            f"railfmi: interrupted; {len(found.results)} of {len(experiments)} experiments are finished"
+        )
+        raise typer.Exit(130)
 
 
 @app.command("run")

@@ -4,6 +4,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
@@ -44,26 +45,52 @@ def close_loop(
     Raises BadInput for a wrong experiment.
     """
     begun = time.monotonic()
-    path = Path(experiment)
-    declared = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
-    if declared.split is None:
-        raise BadInput(f"{declared.file}: key 'split' is missing; close-loop tests on data held out by it")
+    declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
         builder = builder_for(declared, Path(work))
-        problem = pose(declared, builder)
+        posed = Posed(declared, builder, pose(declared, builder))
         folder = None if out is None else writable(Path(out))
-        try:
-            found = trace(problem, tell, jobs or cpu_count(), seed)
-        finally:
-            PLANTS.close()
-        if folder is None:
-            return result_of(declared.id, problem, found, time.monotonic() - begun, ())
-        tell("building the augmented FMU and writing the report")
-        augmented = augment(builder, declared, problem, found, folder, tell)
-        result = result_of(declared.id, problem, found, time.monotonic() - begun, augmented)
-        write_report(folder, problem, found, result)
-        result.write(folder / "result.json")
-        return result
+        return closed(posed, folder, tell, jobs, seed, begun)[1]
+
+
+@dataclass(frozen=True)
+class Posed:
+    """An experiment whose files are read and found good, and the question that it asks."""
+
+    declared: Experiment
+    builder: Builder
+    problem: Problem
+
+
+def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
+    """The experiment in a file or folder; BadInput also where nothing is held out to test."""
+    where = Path(path)
+    declared = load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir)
+    if declared.split is None:
+        raise BadInput(f"{declared.file}: key 'split' is missing; close-loop tests on data held out by it")
+    return declared
+
+
+def closed(
+    posed: Posed, folder: Path | None, tell: Tell, jobs: int | None, seed: int, begun: float
+) -> tuple[Outcome, Result]:
+    """Trace an experiment and write all that belongs to it into a folder, if one is given; see close_loop.
+
+    begun: when it was, by time.monotonic().
+    """
+    e, problem = posed.declared, posed.problem
+    try:
+        found = trace(problem, tell, jobs or cpu_count(), seed)
+    finally:
+        PLANTS.close()
+    if folder is None:
+        return found, result_of(e.id, problem, found, time.monotonic() - begun, ())
+    tell("building the augmented FMU and writing the report")
+    augmented = augment(posed.builder, e, problem, found, folder, tell)
+    result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
+    write_report(folder, problem, found, result)
+    result.write(folder / "result.json")
+    return found, result
 
 
 def writable(folder: Path) -> Path:

@@ -29,6 +29,7 @@ class ComponentEffect(Effect):
     acts_on = "component"
     asks = ("clock",)
     amplitudes = ("change",)
+    of_run = ("t0",)
     change = Parameter("1", min=-1.0, doc="change over the sound value, -0.5 = half is left")
     t0 = start_time()
 

@@ -30,6 +30,7 @@ class FlexibleMode(ForceLaw):
     amplitudes = ("m",)
     places = ("rests", "turns")
     told = ("v_0",)
+    of_run = ("v_0",)
     m = Parameter("{F}.s2/{q}", min=0.0, doc="modal mass")
     f = Parameter("Hz", 10.0, min=0.01, max=HIGHEST, doc="natural frequency on a fixed base")
     D = Parameter("1", 0.05, min=0.0, max=2.0, doc="damping ratio on a fixed base")

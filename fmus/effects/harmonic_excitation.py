@@ -19,6 +19,7 @@ class HarmonicExcitation(ForceLaw):
     becomes = ("constant_force",)
     places = ("rests", "turns")
     asks = ("clock",)
+    of_run = ("phase",)
     of_way = ("n_x",)
     F_sin = Parameter("{F}", doc="part in phase with the sine")
     F_cos = Parameter("{F}", doc="part in phase with the cosine")

@@ -30,6 +30,7 @@ class InputDelay(InputEffect):
     amplitudes = ("share",)
     complete = WHOLE
     told = ("u_0",)
+    of_run = ("u_0",)
     share = Parameter("1", min=0.0, max=1.0, doc="how much of it acts, 1 = all")
     T = Parameter("s", 0.1, min=0.02, doc="delay")
     u_0 = Parameter("{u}", doc="input before the start")

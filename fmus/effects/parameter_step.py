@@ -16,6 +16,7 @@ class ParameterStep(ParameterEffect):
     amplitudes = ("delta",)
     becomes = ("parameter_offset",)
     asks = ("clock",)
+    of_run = ("t0",)
     begins = True
     delta = Parameter("{u}", doc="change")
     t0 = start_time()

@@ -17,6 +17,7 @@ class PeriodicForce(ForceLaw):
     source = "order analysis, Randall, Vibration-based Condition Monitoring (2011)"
     amplitudes = ("F_sin", "F_cos")
     becomes = ("constant_force",)
+    of_run = ("phase",)  # where an angle is counted from, each run decides anew
     places = ("turns",)
     F_sin = Parameter("{F}", doc="part in phase with sin(order q)")
     F_cos = Parameter("{F}", doc="part in phase with cos(order q)")

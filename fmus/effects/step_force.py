@@ -17,6 +17,7 @@ class StepForce(ForceLaw):
     amplitudes = ("F_0",)
     becomes = ("constant_force",)
     asks = ("clock",)
+    of_run = ("t0",)
     F_0 = Parameter("{F}", doc="constant resistance after the step")
     t0 = start_time()
 
