@@ -7,12 +7,12 @@ import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
-from estimator.closeloop.compare import Hypothesis, best_by_label, hypotheses, ranked
+from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, ranked, to_the_end
 from estimator.closeloop.detect import LEVEL, Detection, detect
 from estimator.closeloop.freeform import free_form
 from estimator.closeloop.honesty import Honesty, honesty
 from estimator.closeloop.missing_force import MissingForce, missing_forces
-from estimator.closeloop.moments import at_their_moments
+from estimator.closeloop.moments import at_their_moments, moment
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.onset import onset, since
 from estimator.closeloop.pairs import try_pairs
@@ -25,6 +25,7 @@ from estimator.record import Array
 
 NOMINEES = 16  # effects that are fitted, half as many where each is an FMU around a foreign one
 LEADING, SHAPES = 6, 2  # of them, in so many shapes; the others in the best one
+SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside them
 FAULTS = 4  # faults of sensors that are fitted
 
 Tell = Callable[[str], None]
@@ -128,7 +129,14 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
     promises = [p for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
-    singles = hypotheses(problem, base, chosen, size, jobs)
+    brief = briefly(problem, base, chosen, size, jobs)
+    came = onset(problem, base, size) if any(sets_in(h) for h in brief[:LEADING]) else None
+    sudden: list[Promise] = []
+    if came:
+        tell("looking for what set in during the record")
+        sudden = since(problem, came, [c for c, _ in single if not c.is_fault], size, jobs)
+        brief = best_by_label([*briefly(problem, base, sudden[:SUDDEN], size, jobs, known=False), *brief])
+    singles = to_the_end(problem, base, brief, size, jobs)
     pairs: list[Hypothesis] = []
     floor_known = not np.isnan(problem.record.noise_std).any()
 
@@ -137,8 +145,6 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
 
     if floor_known and not explained():
         tell("fitting the leading ones to a growing part of the record")
-        came = onset(problem, base, size)
-        sudden = since(problem, came, [c for c, _ in single if not c.is_fault], size) if came else []
         singles = from_the_beginning(problem, base, singles, [*sudden, *promises], size, jobs)
     if not explained():
         tell("trying pairs of effects")
@@ -146,6 +152,11 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
         singles = best_by_label([*singles, *freed])
     singles = with_twins(singles, alike)
     return ranked(problem, singles, size), ranked(problem, pairs, size)
+
+
+def sets_in(h: Hypothesis) -> bool:
+    """Whether a hypothesis has an effect that is not there from the start."""
+    return any(moment(c) is not None for c in h.candidates)
 
 
 def nominated(promises: Sequence[Promise], most: int = NOMINEES) -> list[Promise]:

@@ -102,18 +102,34 @@ def hypothesis(
 def hypotheses(
     problem: Problem, base: Hypothesis, promises: Sequence[Promise], size: Array, jobs: int
 ) -> list[Hypothesis]:
-    """Fit each promise briefly, and to the end the best of those that better the base.
+    """Fit each promise briefly, and to the end the best of those that better the base; best first."""
+    return to_the_end(problem, base, briefly(problem, base, promises, size, jobs), size, jobs)
 
-    Best first on the identify part; of several with the same label the one that fits better is kept.
+
+def briefly(
+    problem: Problem,
+    base: Hypothesis,
+    promises: Sequence[Promise],
+    size: Array,
+    jobs: int,
+    known: bool = True,
+) -> list[Hypothesis]:
+    """A fit of few evaluations to each promise, best first on the identify part; one a label.
+
+    Start states, which hardly matter for the ranking, stay where the base has them. known: what the
+    base's other unknowns do is taken from the base too.
     """
-    unknowns = base.fit.unknowns
-    # start states hardly matter for the ranking: the brief fits leave them where the base has them, and
-    # what the other unknowns do is taken from the base
     states = {n: v for n, v in base.fit.theta.items() if n in problem.free_states}
     started = replace(problem, declared={**problem.declared, **states})
-    known = {u.name: column for u, column in zip(unknowns, base.fit.jacobian.T, strict=True)}
-    others = [u for u in unknowns if u.name not in states]
-    brief = fitted(started, others, promises, size, BRIEF, jobs, known)
+    columns = {u.name: c for u, c in zip(base.fit.unknowns, base.fit.jacobian.T, strict=True)}
+    others = [u for u in base.fit.unknowns if u.name not in states]
+    return fitted(started, others, promises, size, BRIEF, jobs, columns if known else None)
+
+
+def to_the_end(
+    problem: Problem, base: Hypothesis, brief: Sequence[Hypothesis], size: Array, jobs: int
+) -> list[Hypothesis]:
+    """The finalists of brief fits fitted to the end, and all others as they are; best first."""
     limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
     hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
     done: list[Hypothesis] = []
@@ -123,7 +139,7 @@ def hypotheses(
             for h in part
             if not done or cost(h) < RIVAL * cost(done[0])
         ]
-        done = best_by_label([*done, *finished(problem, unknowns, again, size, jobs)])
+        done = best_by_label([*done, *finished(problem, base.fit.unknowns, again, size, jobs)])
     labels = {h.label for h in done}
     return best_by_label([*done, *(h for h in brief if h.label not in labels)])
 

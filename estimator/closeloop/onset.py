@@ -5,11 +5,12 @@ FMU says what set in, in the first moments after.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.compare import Hypothesis, fitted
 from estimator.closeloop.fit import Fit, fit
 from estimator.closeloop.moments import moment, set_in
 from estimator.closeloop.problem import Problem
@@ -21,6 +22,9 @@ BLOCKS = 50  # of the identify part whose residuals are compared
 TIMES = 3.0  # as large as any before is a residual that something new has made
 ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
+LONGER = 2.0  # times that in the short fits
+LEADING, TRIES = 12, 7  # kinds and places that get a short fit, and evaluations of it
+GENTLE = 0.3  # of the amplitudes that the linear picture asks for: the other start of these fits
 GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
 
 
@@ -52,9 +56,37 @@ def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
 
 
 def since(
+    problem: Problem,
+    at: tuple[float, Fit],
+    candidates: Sequence[Candidate],
+    size: Array,
+    jobs: int,
+) -> list[Promise]:
+    """Promises of what can set in about the moment, best first.
+
+    Ranked by the first moments after it; the leading ones again by short fits to some more of the record,
+    all else held at what the FMU was before, since a strong change differs from its linear picture.
+    """
+    share, before = at
+    promises = _by_response(problem, at, candidates, size)
+    leading, rest = promises[:LEADING], promises[LEADING:]
+    held = replace(problem, declared={**problem.declared, **before.theta})
+    part = held.beginning(min(1.0, share + LONGER * AFTER))
+    gentle = [replace(p, start=_scaled(p, GENTLE)) for p in leading]
+    tried = fitted(part, (), [*leading, *gentle], size, TRIES, jobs)
+    better = [Promise(h.candidates, 0.0, {**before.theta, **h.fit.theta}) for h in tried]
+    return [*better, *rest]
+
+
+def _scaled(promise: Promise, factor: float) -> dict[str, float]:
+    """A promise's start with smaller amplitudes."""
+    names = {u.name for c in promise.candidates for u in c.amplitudes}
+    return {n: v * factor if n in names else v for n, v in promise.start.items()}
+
+
+def _by_response(
     problem: Problem, at: tuple[float, Fit], candidates: Sequence[Candidate], size: Array
 ) -> list[Promise]:
-    """Promises of what can set in about the moment, best first: by the first moments after it."""
     share, before = at
     run = problem.record.runs[0]
     length = float(run.t[run.fit][-1] - run.t[0])
