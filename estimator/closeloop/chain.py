@@ -19,6 +19,7 @@ from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.restarts import from_the_beginning
 from estimator.closeloop.screen import Promise, Screening, screen
+from estimator.closeloop.stages import Stages
 from estimator.closeloop.twins import twins, with_twins
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
 from estimator.record import Array
@@ -79,30 +80,44 @@ class Screened:
     promises: list[Promise]
 
 
-def trace(problem: Problem, tell: Tell = lambda _: None, jobs: int = 2, seed: int = 0) -> Outcome:
-    """Run the whole chain on a problem; `tell` hears what is being done."""
+def trace(
+    problem: Problem,
+    tell: Tell = lambda _: None,
+    jobs: int = 2,
+    seed: int = 0,
+    stages: Stages = Stages(),  # noqa: B008 - immutable, keeps nothing
+) -> Outcome:
+    """Run the whole chain on a problem; `tell` hears what is being done, `stages` keeps what was found."""
     noise = noise_floor(problem.record)
     tell("calibrating the declared parameters")
-    declared, base, size = calibrate(problem)
+    declared, base, size = stages.done("calibrated", lambda: calibrate(problem))
     tell("inferring the missing force at each port")
-    forces = missing_forces(problem, base.fit.theta, noise)
+    forces = stages.done("forces", lambda: missing_forces(problem, base.fit.theta, noise))
     screened = _screened(problem, base, noise, size, forces, tell)
     tell("testing for a discrepancy against simulated records without one")
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
-    detection = detect(problem, base, noise, over_noise, regressors, np.random.default_rng(seed))
+    beyond_noise = float(seen.residual @ seen.residual) - len(seen.residual)
+    likeness = screened.promises[0].gain / max(beyond_noise, 1.0)
+    detection = stages.done(
+        "detection",
+        lambda: detect(problem, base, noise, over_noise, regressors, likeness, np.random.default_rng(seed)),
+    )
     level = LEVEL / len(detection.figures)
-    owed = honesty(problem, base, seen, change, size, level, np.random.default_rng(seed))
+    owed = stages.done(
+        "honesty", lambda: honesty(problem, base, seen, change, size, level, np.random.default_rng(seed))
+    )
     found = (declared, base, noise, size, detection, tuple(forces), tuple(screened.promises))
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early, owed)
-    singles, pairs = _fitted(screened, tell, jobs)
+    singles, pairs = _fitted(screened, tell, jobs, stages)
     judgement = judge(problem, base, singles, pairs, noise, size)
     if judgement.verdict == "unexplained":
         tell("fitting a force of free form")
-        owed = replace(owed, free_form=free_form(problem, base, forces, size, jobs, singles))
+        curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
+        owed = replace(owed, free_form=curve)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
 
 
@@ -119,7 +134,7 @@ def _screened(
     return Screened(problem, base, noise, size, screening, change, promises)
 
 
-def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[Hypothesis]]:
+def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Single hypotheses and pairs, best first."""
     problem, base, size = s.problem, s.base, s.size
     alike = twins(s.change)
@@ -129,14 +144,15 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
     promises = [p for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
     tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
-    brief = briefly(problem, base, chosen, size, jobs)
-    came = onset(problem, base, size) if any(sets_in(h) for h in brief[:LEADING]) else None
+    brief = stages.done("brief", lambda: briefly(problem, base, chosen, size, jobs))
     sudden: list[Promise] = []
-    if came:
+    if any(sets_in(h) for h in brief[:LEADING]):
         tell("looking for what set in during the record")
-        sudden = since(problem, came, [c for c, _ in single if not c.is_fault], size, jobs)
-        brief = best_by_label([*briefly(problem, base, sudden[:SUDDEN], size, jobs, known=False), *brief])
-    singles = to_the_end(problem, base, brief, size, jobs)
+        physical = [c for c, _ in single if not c.is_fault]
+        sudden, more = stages.done("sudden", lambda: _sudden(s, physical, jobs))
+        brief = best_by_label([*more, *brief])
+    tell("fitting the leading ones to the end")
+    singles = stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
     pairs: list[Hypothesis] = []
     floor_known = not np.isnan(problem.record.noise_std).any()
 
@@ -145,13 +161,28 @@ def _fitted(s: Screened, tell: Tell, jobs: int) -> tuple[list[Hypothesis], list[
 
     if floor_known and not explained():
         tell("fitting the leading ones to a growing part of the record")
-        singles = from_the_beginning(problem, base, singles, [*sudden, *promises], size, jobs)
+        found, hopes = singles, [*sudden, *promises]
+        singles = stages.done("growing", lambda: from_the_beginning(problem, base, found, hopes, size, jobs))
     if not explained():
         tell("trying pairs of effects")
-        pairs, freed = try_pairs(problem, base, s.screening.fit, singles, single, size, jobs)
+        alone = singles
+        pairs, freed = stages.done(
+            "pairs", lambda: try_pairs(problem, base, s.screening.fit, alone, single, size, jobs)
+        )
         singles = best_by_label([*singles, *freed])
     singles = with_twins(singles, alike)
     return ranked(problem, singles, size), ranked(problem, pairs, size)
+
+
+def _sudden(
+    s: Screened, candidates: Sequence[Candidate], jobs: int
+) -> tuple[list[Promise], list[Hypothesis]]:
+    """What may have set in at a moment that shows, and brief fits of the leading ones."""
+    came = onset(s.problem, s.base, s.size)
+    if not came:
+        return [], []
+    promises = since(s.problem, came, candidates, s.size, jobs)
+    return promises, briefly(s.problem, s.base, promises[:SUDDEN], s.size, jobs, known=False)
 
 
 def sets_in(h: Hypothesis) -> bool:

@@ -22,7 +22,8 @@ SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
 BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
 CHANCE = 3.0  # standard deviations of the mean square of white noise
-NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter
+NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter,
+ONE_EFFECT = 0.2  # unless one effect could explain this share of it; other forms are like no effect
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,12 @@ class Detection:
 
 def detect(
     problem: Problem, base: Hypothesis, noise: Array, screened: Fit, regressors: Sequence[Array],
-    rng: np.random.Generator,
+    likeness: float, rng: np.random.Generator,
 ) -> Detection:  # fmt: skip
     """Test the base hypothesis' residual.
 
-    screened: its fit as it was screened, residual over `noise`; regressors: changes (m, k) of that residual.
+    screened: its fit as it was screened, residual over `noise`; regressors: changes (m, k) of that residual;
+    likeness: share of what it has beyond noise that one effect could explain, by linear regression.
     """
     runs = problem.record.runs
     fit_mask, test_mask = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "test"))
@@ -71,21 +73,26 @@ def detect(
         reference = references[name]
         p_values.append((1 + np.sum(reference >= value)) / (REPLICATES + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
-    return Detection(min(1.0, len(p_values) * float(min(p_values))), figures, matters(problem, base, noise))
+    return Detection(
+        min(1.0, len(p_values) * float(min(p_values))), figures, matters(problem, base, noise, likeness)
+    )
 
 
-def matters(problem: Problem, base: Hypothesis, noise: Array) -> bool:
+def matters(problem: Problem, base: Hypothesis, noise: Array, likeness: float = 1.0) -> bool:
     """Whether a held-out residual is too large to be left alone, in any output.
 
-    Compared with the signal is what it has beyond noise, beyond what chance makes of that too.
+    Compared with the signal is what it has beyond noise, beyond what chance makes of that too. Where the
+    FMU's form leaves something open, less than that matters only if one effect could explain much of it.
     """
     signal, rms = signal_size(problem), base.rms(problem)
     samples = sum(int(run.test.sum()) for run in problem.record.runs)
     chance = 1 + CHANCE * np.sqrt(2 / max(samples, 1))
     beyond = np.sqrt(np.maximum(rms**2 - chance * noise**2, 0.0))
+    large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
+    telling = (beyond >= SHARE * signal) | (beyond >= BEYOND * noise)
     if problem.form_error > 0:
-        return bool(np.any((beyond >= problem.form_error * signal) & (rms >= NOISES * noise)))
-    return bool(np.any((beyond >= SHARE * signal) | (beyond >= BEYOND * noise)))
+        return bool(np.any(large) or (np.any(telling) and likeness >= ONE_EFFECT))
+    return bool(np.any(telling))
 
 
 def signal_size(problem: Problem) -> Array:

@@ -70,9 +70,23 @@ def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array) -> 
     scatter = SCATTER / np.sqrt(2 * len(h.held_out(problem)))
     found: BoolArray = (after < (CLEAN + scatter) * noise) | (gap_closed(before, after, noise) >= GAP)
     if problem.form_error > 0:
-        left = (after**2 - noise**2) / np.maximum(before**2 - noise**2, 1e-300)
-        found |= (after < problem.form_error * signal_size(problem)) | (left <= 1 - FORM_EXPLAINED)
+        found |= _reached_in_form(problem, before, after, noise)
     return found
+
+
+def _reached_in_form(problem: Problem, before: Array, after: Array, noise: Array) -> BoolArray:
+    """The same (n_y,) where the FMU's form leaves a share of each output open.
+
+    What was large comes within that share, what was small does not grow. Where all was small, most of what
+    was beyond the noise in all outputs together is explained.
+    """
+    left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
+    open_share = problem.form_error * signal_size(problem)
+    large = before >= open_share
+    most = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
+    if large.any():
+        return most | np.where(large, after < open_share, after <= CLEAN * before)
+    return most | (np.sum(left) <= (1 - FORM_EXPLAINED) * np.sum(was))
 
 
 def equivalent(
