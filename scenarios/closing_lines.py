@@ -7,6 +7,8 @@ from scenarios.result import Result
 
 SHOWN = ("experiment", "verdict", "gap closed", "output", "before", "after", "noise", "seconds", "effects")
 
+TOLD = ("confirmed", "agrees", "differs", "surpassed")  # transfers; the others stand on the page
+
 
 def lines_of(result: Result) -> Iterator[str]:
     """The verdict of one experiment, its effects and errors."""
@@ -35,7 +37,8 @@ def table_of(found: Results) -> Iterator[str]:
     for name, sentence in found.together.items():
         yield f"{name}: {sentence}"
     for c in found.transfers:
-        yield f"  {_carried(c)}"
+        if c.status in TOLD:
+            yield f"  {_carried(c)}"
     for j in found.joint:
         yield from _joint(j)
 

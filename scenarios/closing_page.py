@@ -77,13 +77,9 @@ def label_words(label: str) -> str:
 
 def _transfer(c: Carried, found: Results) -> Iterator[Values]:
     """One line an output; one without figures where the effect could not be carried over."""
-    shared: Values = {
-        "effect": label_words(c.effect),
-        "source": c.source,
-        "target": c.target,
-        "status": c.status,
-    }
-    shared |= {"reason": c.reason, "lines": max(1, len(c.error)), "free": ", ".join(c.free)}
+    free = [n.removeprefix(f"{_prefix(c.effect)}_") for n in c.free]
+    shared: Values = {k: getattr(c, k) for k in ("source", "target", "status", "reason")}
+    shared |= {"effect": label_words(c.effect), "lines": max(1, len(c.error)), "free": ", ".join(free)}
     apart = NOTHING if c.distance is None else number(c.distance, 2)
     if not c.error:
         yield {**shared, "first": True, "figures": None, "apart": apart}
@@ -95,15 +91,14 @@ def _transfer(c: Carried, found: Results) -> Iterator[Values]:
         yield {**shared, "first": i == 0, "apart": apart, "figures": figures, "gap": gap}
 
 
+def _prefix(label: str) -> str:
+    """How the names of an effect's parameters begin in the FMU; of several effects a name for all."""
+    return label.replace("@", "_").replace(" + ", "_")
+
+
 def _joint(j: Joint, folder: Path) -> Values:
-    prefix = "_".join(j.effect.split("@")) if "+" not in j.effect else ""
-    plot = common_plot(
-        prefix or j.effect.replace("@", "_").replace(" + ", "_"),
-        label_words(j.effect),
-        j.parameters,
-        j.alone,
-        j.units,
-    )
+    prefix = _prefix(j.effect)
+    plot = common_plot(prefix, label_words(j.effect), j.parameters, j.alone, j.units)
     return {
         "words": label_words(j.effect),
         "reason": j.reason,

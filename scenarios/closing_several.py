@@ -68,7 +68,7 @@ def _check_ids(declared: Sequence[Experiment]) -> None:
             raise BadInput(
                 f"{e.file}: id '{e.id}' is also that of {files[e.id]}; give each experiment an id of its own"
             )
-        if Path(e.id).name != e.id or e.id in OURS:
+        if Path(e.id).name != e.id or e.id in (*OURS, ".."):
             raise BadInput(
                 f"{e.file}: id '{e.id}' cannot name a folder beside {', '.join(OURS)}; choose another id"
             )

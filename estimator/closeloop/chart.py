@@ -58,7 +58,8 @@ class Chart:
 
     def slopes(self, values: Mapping[str, float], native: Sequence[str], names: Sequence[str]) -> Array:
         """Derivatives of the FMU's values by those of the chart, (len(native), len(names))."""
-        found = np.array([[float(n == name) for name in names] for n in native]).reshape(-1, len(names))
+        found = np.array([float(n == name) for n in native for name in names])
+        found = found.reshape(len(native), len(names))
         for w in self.waves:
             size, phase = values[w.amplitude], values[w.phase]
             turn = {

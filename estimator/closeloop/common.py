@@ -1,7 +1,7 @@
 """An effect with one value for several records: its estimate, and whether one value serves them all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from joblib import Parallel, delayed
 
@@ -20,8 +20,8 @@ SHOWS: tuple[Status, ...] = ("confirmed", "agrees", "differs")  # where a record
 class Common:
     """An effect (label) in several records, fitted to all of them and to each.
 
-    alone: each record's own fit, and said: what it says of the machine's unknowns; samples: residuals that
-    were fitted, of each record; accounted: whether the common value accounts for each record.
+    alone: each record's own fit, said: what it says of the machine's unknowns, and costs: its sum of squares;
+    samples: residuals that were fitted, of each record; accounted: whether the common value accounts for it.
     """
 
     label: str
@@ -29,6 +29,7 @@ class Common:
     together: Together
     alone: tuple[Hypothesis, ...]
     said: tuple[Estimates, ...]
+    costs: tuple[float, ...]
     likeness: Likeness
     samples: tuple[int, ...]
     accounted: tuple[bool, ...]
@@ -46,7 +47,7 @@ class Common:
     @property
     def chi2_alone(self) -> tuple[float, ...]:
         """The same with each record's own value."""
-        return tuple(cost(h) / n for h, n in zip(self.alone, self.samples, strict=True))
+        return tuple(c / n for c, n in zip(self.costs, self.samples, strict=True))
 
     @property
     def sentence(self) -> str:
@@ -74,10 +75,13 @@ def commons(
         for labels in dict.fromkeys(labels_of(h) for h in wanted)
     }
     several = {labels: owns for labels, owns in alone.items() if len(owns) > 1}
-    tasks = [[_part(by_name[n], h, labels) for n, h in owns.items()] for labels, owns in several.items()]
-    fits = Parallel(n_jobs=jobs)(delayed(_fitted)(parts) for parts in tasks)
+    tasks = [
+        ([_part(by_name[n], h, labels) for n, h in owns.items()], list(owns.values()))
+        for labels, owns in several.items()
+    ]
+    fits = Parallel(n_jobs=jobs)(delayed(_fitted)(*task) for task in tasks)
     return [
-        _compared([by_name[n] for n in owns], labels, list(owns.values()), fit)
+        _compared([by_name[n] for n in owns], labels, list(owns.values()), *fit)
         for (labels, owns), fit in zip(several.items(), fits, strict=True)
         if fit is not None
     ]
@@ -103,16 +107,25 @@ def _part(r: Traced, own: Hypothesis, labels: Sequence[str]) -> Part:
     return Part(r.problem, effects, beside, r.found.base.fit.unknowns, r.found.size, own.fit.theta)
 
 
-def _fitted(parts: Sequence[Part]) -> Together | None:
-    """None where the FMU does not run with what was found."""
+def _fitted(parts: Sequence[Part], alone: Sequence[Hypothesis]) -> tuple[Together, tuple[float, ...]] | None:
+    """The joint fit, and the least sum of squares of each record by itself, also from the joint values on.
+
+    None where the FMU does not run with what was found.
+    """
     try:
-        return fit_together(parts)
+        found = fit_together(parts)
+        again = [fit_together([replace(p, start=h.theta)]) for p, h in zip(parts, found.parts, strict=True)]
     except FmuError:
         return None
+    return found, tuple(min(a.costs[0], cost(h)) for a, h in zip(again, alone, strict=True))
 
 
 def _compared(
-    records: Sequence[Traced], labels: Sequence[str], alone: Sequence[Hypothesis], together: Together
+    records: Sequence[Traced],
+    labels: Sequence[str],
+    alone: Sequence[Hypothesis],
+    together: Together,
+    costs: tuple[float, ...],
 ) -> Common:
     said = tuple(said_of(h, labels) for h in alone)
     return Common(
@@ -121,7 +134,8 @@ def _compared(
         together,
         tuple(alone),
         said,
-        likeness(together, [cost(h) for h in alone], said),
+        costs,
+        likeness(together, costs, said),
         tuple(len(h.fit.residual) for h in alone),
         tuple(_accounts(r, h) for r, h in zip(records, together.parts, strict=True)),
     )

@@ -97,7 +97,8 @@ def fit_together(parts: Sequence[Part], held: Mapping[str, float] | None = None)
     width = widths(stack.unknowns, [u for p in parts for u in (*p.chart.machine, *p.chart.run)])
     order = stack.order()
     covariance, white = (
-        sandwich(r[order], slopes[order], scale, width) for r in (residual, np.zeros_like(residual))
+        sandwich(r[order], slopes[order], scale, width) if stack.unknowns else np.empty((0, 0))
+        for r in (residual, np.zeros_like(residual))
     )
     found = []
     for i, (p, rows) in enumerate(zip(parts, stack.rows(), strict=True)):

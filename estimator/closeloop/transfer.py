@@ -13,13 +13,13 @@ from joblib import Parallel, delayed
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.chart import chart
-from estimator.closeloop.compare import Hypothesis, beats, finished
+from estimator.closeloop.compare import Hypothesis, beats, finished, lead
 from estimator.closeloop.estimates import Difference, Estimates, difference, estimates
 from estimator.closeloop.joint import fit_together
 from estimator.closeloop.part import Part
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise
-from estimator.closeloop.verdict import explains
+from estimator.closeloop.verdict import SAME, explains
 from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
@@ -27,7 +27,7 @@ from fmus.host.fmu import FmuError
 LEVEL = 0.01  # chance of a difference between estimates, below which they differ
 SHAPES = 2  # of an effect, the most promising ones of the other record, from which it is fitted there
 
-Status = Literal["confirmed", "agrees", "differs", "absent", "silent", "open", "impossible"]
+Status = Literal["confirmed", "agrees", "differs", "surpassed", "absent", "silent", "open", "impossible"]
 CARRIES: tuple[Status, ...] = ("confirmed", "agrees")
 
 
@@ -205,11 +205,12 @@ def _judged(
 ) -> tuple[Status, str]:
     """Whether the effect carries over, and why it is said."""
     a, b, label = t.source, t.target, t.member.label
-    measured = t.problem, t.base, t.noise, t.size
     far = f"{apart.distance:.3g} standard errors apart"
-    if _explains(held, *measured):
-        return "confirmed", f"{label} with the values of {a} accounts for {b} too"
-    if _explains(own, *measured):
+    if any(explains(t.problem, h, t.base, t.noise, t.size) for h in (held, own)):
+        if t.explanation and not t.known and _outdone(t, own, t.explanation):
+            return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} does so better"
+        if explains(t.problem, held, t.base, t.noise, t.size):
+            return "confirmed", f"{label} with the values of {a} accounts for {b} too"
         if apart.p_value >= LEVEL:
             return "agrees", f"{label} accounts for {b} with values that agree with those of {a}, {far}"
         return "differs", f"{label} accounts for {b} with other values only, {far}"
@@ -225,5 +226,8 @@ def _judged(
     return "silent", f"{b} {by}, and would not show {label} of {a} beside that"
 
 
-def _explains(h: Hypothesis, problem: Problem, base: Hypothesis, noise: Array, size: Array) -> bool:
-    return explains(problem, h, base, noise, size)
+def _outdone(t: _Task, own: Hypothesis, explanation: Hypothesis) -> bool:
+    """Whether what the other record found is better there, and by more than a small difference of form."""
+    mean, _ = lead(t.problem, explanation, own, t.size)
+    matters = mean >= SAME * -float(explanation.scores(t.problem, t.size).sum())
+    return matters and beats(t.problem, explanation, own, t.size)
