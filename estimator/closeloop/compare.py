@@ -100,10 +100,11 @@ def hypothesis(
 
 
 def hypotheses(
-    problem: Problem, base: Hypothesis, promises: Sequence[Promise], size: Array, jobs: int
+    problem: Problem, base: Hypothesis, promises: Sequence[Promise], size: Array, jobs: int, finalists: int
 ) -> list[Hypothesis]:
     """Fit each promise briefly, and to the end the best of those that better the base; best first."""
-    return to_the_end(problem, base, briefly(problem, base, promises, size, jobs), size, jobs)
+    brief = briefly(problem, base, promises, size, jobs)
+    return to_the_end(problem, base, brief, size, jobs, finalists)
 
 
 def briefly(
@@ -127,11 +128,12 @@ def briefly(
 
 
 def to_the_end(
-    problem: Problem, base: Hypothesis, brief: Sequence[Hypothesis], size: Array, jobs: int
-) -> list[Hypothesis]:
+    problem: Problem, base: Hypothesis, brief: Sequence[Hypothesis], size: Array, jobs: int,
+    finalists: int = FINALISTS,
+) -> list[Hypothesis]:  # fmt: skip
     """The finalists of brief fits fitted to the end, and all others as they are; best first."""
     limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
-    hopeful = [h for h in brief if cost(h) < limit][:FINALISTS]
+    hopeful = [h for h in brief if cost(h) < limit][:finalists]
     done: list[Hypothesis] = []
     for part in (hopeful[:LEADERS], hopeful[LEADERS:]):
         again = [

@@ -26,6 +26,7 @@ from fmus.effects.free_form import FreeForm
 PIECES = 10  # of the identify part, each left out in turn
 RIDGE = 1e-3  # of the splines' mean square: controls that nothing visits stay at zero
 RESOLVED = 3.0  # standard errors that a control of realistic size must be worth
+FINALISTS = 2  # of them, fitted to the end
 TRIED = 3  # places and quantities that are fitted by simulation
 LEAST = 1e-3  # of the median standard deviation of a missing force: it is nowhere known better
 PLACES = 2  # ports of the effects that came nearest
@@ -83,7 +84,7 @@ def free_form(
     promises = screen(screening.fit, [((c,), g) for c, g in chosen if c.amplitudes])
     # a strong law differs from its linear picture, and then a start without it is the better one
     promises += [replace(p, start=base.fit.theta) for p in promises]
-    found = ranked(problem, hypotheses(problem, base, promises, size, jobs), size)
+    found = ranked(problem, hypotheses(problem, base, promises, size, jobs, FINALISTS), size)
     better = [h for h in found if cost(h) < cost(base) and beats(problem, h, base, size)]
     return better[0] if better else None
 

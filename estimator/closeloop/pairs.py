@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, finished, hypotheses
+from estimator.closeloop.compare import Hypothesis, cost, finished, hypotheses
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, Screening, built, screen
@@ -14,6 +14,7 @@ from estimator.record import Array
 
 PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
+FINALISTS = 2  # of them, fitted to the end
 SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
 
 Changes = Sequence[tuple[Candidate, Array]]
@@ -40,9 +41,10 @@ def try_pairs(
     if alone:
         best = next(iter(alone.values()))
         promises += _partners(problem, best, [c for c, _ in physical], size)
-    found = hypotheses(problem, base, promises, size, jobs)
+    found = hypotheses(problem, base, promises, size, jobs, FINALISTS)
     kept = [h for h in found if not idle(h)]
-    left = {h.label: h for h in found if len(idle(h)) == 1}
+    reached = min((cost(h) for h in singles), default=cost(base))
+    left = {h.label: h for h in found if len(idle(h)) == 1 and cost(h) < reached}
     freed = [
         Promise(tuple(c for c in h.candidates if c not in idle(h)), 0.0, h.fit.theta) for h in left.values()
     ]

@@ -2,8 +2,8 @@
 
 Where an effect is strong, the base's values have taken over what they could of it, and a small error of an
 unknown leads the FMU to quite another motion in the end: the sum of squares is rugged. Over the first
-seconds it is not, and what is found there leads the way on. Start states, which could take over much of
-so short a part, stay as measured until the whole is fitted.
+seconds it is not, and what is found there leads the way on, for those that fit them best. Start states,
+which could take over much of so short a part, stay as measured until the whole is fitted.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,10 @@ from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise
 from estimator.record import Array
 
-PARTS = ((0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))  # of the identify part, and evaluations of a fit to it
-PASSES = 2  # over these parts
+Parts = tuple[tuple[float, int], ...]  # shares of the identify part, and evaluations of a fit to it
+FIRST: Parts = ((0.125, 8), (0.25, 6))
+THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
+SURVIVORS, RIVAL = 4, 4.0  # of the first parts: so many go on, up to so many times the best mean square
 LEADING = 4  # labels, of those that fit best and of the most promising ones
 SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
 
@@ -46,9 +48,14 @@ def from_the_beginning(
         for label in leading
         for p in _shapes([p for p in physical if p.label == label])
     ]
+    tried = list(zip(together(started, starts), starts, strict=True))
+    first = Parallel(n_jobs=jobs)(delayed(_grown)(here, others, p, size, FIRST) for here, p in tried)
+    alive = sorted((mean_square(h), i) for i, h in enumerate(first) if h is not None)
+    limit = [RIVAL * alive[0][0]] if alive else []
     tasks = (
-        delayed(_grown)(here, others, p, size)
-        for here, p in zip(together(started, starts), starts, strict=True)
+        delayed(_grown)(tried[i][0], others, replace(tried[i][1], start=_reached(first[i])), size, THEN)
+        for level, i in alive[:SURVIVORS]
+        if level < limit[0]
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
     again = [Promise(h.candidates, 0.0, h.fit.theta) for h in grown[:LEADING]]
@@ -64,18 +71,29 @@ def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
     return [replace(best, start={**best.start, **off})]
 
 
-def _grown(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array) -> Hypothesis | None:
+def mean_square(h: Hypothesis) -> float:
+    """Of the residual on the part that was fitted."""
+    return cost(h) / len(h.fit.residual)
+
+
+def _reached(h: Hypothesis | None) -> dict[str, float]:
+    return h.fit.theta if h else {}
+
+
+def _grown(
+    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, parts: Parts
+) -> Hypothesis | None:
     """A fit to a growing part of the record; of what sets in later first without it to all before.
 
-    None where the FMU does not run.
+    The best fit to the last part, or None where the FMU does not run.
     """
     begins, run = moment(promise.candidates[0]), problem.record.runs[0]
     before = 0.0 if begins is None else begins / float(run.t[run.fit][-1] - run.t[0])
     start = promise.start
-    if 0.0 < before < 1.0:
+    if parts is FIRST and 0.0 < before < 1.0:
         start = start | fit(problem.beginning(before), unknowns, size, start).theta
     best: Hypothesis | None = None
-    for part, evaluations in PASSES * PARTS:
+    for part, evaluations in parts:
         share = before + (1 - before) * part
         found = hypothesis(
             problem.beginning(share), unknowns, replace(promise, start=start), size, evaluations
@@ -83,6 +101,6 @@ def _grown(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size
         if found is None:
             return best
         start = found.fit.theta
-        if part == 1.0 and (best is None or cost(found) < cost(best)):
+        if part == parts[-1][0] and (best is None or cost(found) < cost(best)):
             best = found
     return best
