@@ -129,6 +129,7 @@ def close_loop(
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; one a core by default")] = None,
     seed: Annotated[int, typer.Option(help="of the simulated records without an effect")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="go on with an interrupted run")] = False,
 ) -> None:
     """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
 
@@ -140,8 +141,12 @@ def close_loop(
     if len(experiments) == 1:
         from scenarios.closing import close_loop as run
 
-        with said.status("reading the experiment") as status:
-            result = run(experiments[0], out, data, tell=status.update, jobs=jobs, seed=seed)
+        try:
+            with said.status("reading the experiment") as status:
+                result = run(experiments[0], out, data, status.update, jobs, seed, resume)
+        except KeyboardInterrupt:
+            said.print("railfmi: interrupted; the same command with --resume goes on from here")
+            raise typer.Exit(130) from None
         for line in lines_of(result):
             typer.echo(line)
         typer.echo(f"report: {out / 'report.html'}")
@@ -157,6 +162,7 @@ def close_loop(
             lambda r: typer.echo(f"{r.experiment}: {r.verdict} ({r.wall_seconds:.0f} s)"),
             jobs,
             seed,
+            resume,
         )
     if found.results:
         for line in table_of(found):
@@ -164,7 +170,8 @@ def close_loop(
         typer.echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
     if found.interrupted:
         said.print(
-            f"railfmi: interrupted; {len(found.results)} of {len(experiments)} experiments are finished"
+            f"railfmi: interrupted; {len(found.results)} of {len(experiments)} experiments are finished; "
+            "the same command with --resume goes on from here"
         )
         raise typer.Exit(130)
 

@@ -5,6 +5,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from joblib import cpu_count
 from estimator.closeloop.chain import Outcome, trace
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.stages import Stages
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.hypotheses import ForeignBuilder, ModelBuilder
@@ -27,6 +29,7 @@ from scenarios.result import Result, result_of
 
 Tell = Callable[[str], None]
 Builder = ModelBuilder | ForeignBuilder
+STAGES = ".stages"  # folder of what an interrupted run leaves
 
 
 def close_loop(
@@ -36,12 +39,14 @@ def close_loop(
     tell: Tell = lambda _: None,
     jobs: int | None = None,
     seed: int = 0,
+    resume: bool = False,
 ) -> Result:
     """What `railfmi close-loop` does; returns the result that is written as result.json.
 
     experiment: path of an experiment.toml, or its folder; out: folder for result.json, report.html, the
     figures and the augmented FMU (nothing is written without); data_dir: where the data files lie, by
-    default beside the experiment; jobs: processes, by default one a core; seed: of the bootstrap.
+    default beside the experiment; jobs: processes, by default one a core; seed: of the bootstrap; resume: go
+    on with what an interrupted run left in `out`.
     Raises BadInput for a wrong experiment.
     """
     begun = time.monotonic()
@@ -50,7 +55,10 @@ def close_loop(
         builder = builder_for(declared, Path(work))
         posed = Posed(declared, builder, pose(declared, builder))
         folder = None if out is None else writable(Path(out))
-        return closed(posed, folder, tell, jobs, seed, begun)[1]
+        stages = stages_of(declared, folder, seed, resume)
+        result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]
+        stages.forget()
+        return result
 
 
 @dataclass(frozen=True)
@@ -71,8 +79,25 @@ def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Exper
     return declared
 
 
+def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> Stages:
+    """Where a run keeps its stages until its results are written; without `resume` what is there goes."""
+    if folder is None:
+        return Stages()
+    files = [e.file, *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
+    stages = Stages(folder / STAGES, " ".join([version("railfmi"), str(seed), *map(checksum, files)]))
+    if not resume:
+        stages.forget()
+    return stages
+
+
 def closed(
-    posed: Posed, folder: Path | None, tell: Tell, jobs: int | None, seed: int, begun: float
+    posed: Posed,
+    folder: Path | None,
+    tell: Tell,
+    jobs: int | None,
+    seed: int,
+    begun: float,
+    stages: Stages,
 ) -> tuple[Outcome, Result]:
     """Trace an experiment and write all that belongs to it into a folder, if one is given; see close_loop.
 
@@ -80,7 +105,7 @@ def closed(
     """
     e, problem = posed.declared, posed.problem
     try:
-        found = trace(problem, tell, jobs or cpu_count(), seed)
+        found = trace(problem, tell, jobs or cpu_count(), seed, stages)
     finally:
         PLANTS.close()
     if folder is None:

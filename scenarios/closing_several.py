@@ -9,12 +9,13 @@ from pathlib import Path
 from joblib import cpu_count
 
 from estimator.closeloop.common import commons
+from estimator.closeloop.stages import Stages
 from estimator.closeloop.standing import standing
 from estimator.closeloop.transfer import Traced, transfers
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.provenance import checksum
-from scenarios.closing import Posed, Tell, builder_for, closed, experiment_of, pose, writable
+from scenarios.closing import Posed, Tell, builder_for, closed, experiment_of, pose, stages_of, writable
 from scenarios.closing_page import write_page
 from scenarios.closing_results import Carried, Joint, Results, carried, joint, together
 from scenarios.experiment import Experiment
@@ -33,6 +34,7 @@ def close_loops(
     done: Done = lambda _: None,
     jobs: int | None = None,
     seed: int = 0,
+    resume: bool = False,
 ) -> Results:
     """What `railfmi close-loop` does with several experiments; see close_loop for what it does with one.
 
@@ -47,7 +49,7 @@ def close_loops(
         posed = [_posed(e, Path(work) / f"{i}") for i, e in enumerate(declared)]
         campaign = _Campaign(posed, None if out is None else writable(Path(out)), jobs or cpu_count())
         try:
-            campaign.run(tell, done, seed)
+            campaign.run(tell, done, seed, resume)
         except KeyboardInterrupt:
             campaign.interrupted = True
         finally:
@@ -102,13 +104,15 @@ class _Campaign:
     units: dict[str, dict[str, str]] = field(default_factory=dict)
     interrupted: bool = False
 
-    def run(self, tell: Tell, done: Done, seed: int) -> None:
+    def run(self, tell: Tell, done: Done, seed: int, resume: bool) -> None:
         """Each experiment, then each group of the same FMU."""
         groups: dict[str, list[Traced]] = {}
+        kept: list[Stages] = []
         for p in self.posed:
             e, folder, begun = p.declared, self.folder, time.monotonic()
             here = None if folder is None else writable(folder / e.id)
-            outcome, result = closed(p, here, _prefixed(tell, e.id), self.jobs, seed, begun)
+            kept.append(stages_of(e, here, seed, resume))
+            outcome, result = closed(p, here, _prefixed(tell, e.id), self.jobs, seed, begun, kept[-1])
             groups.setdefault(fmu_of(e), []).append(Traced(e.id, p.problem, outcome))
             self.finished.append(result)
             words = glossary(p.problem, ())
@@ -117,6 +121,8 @@ class _Campaign:
         for records in groups.values():
             if len(records) > 1:
                 self._compare(records, tell)
+        for stages in kept:
+            stages.forget()
 
     def _compare(self, records: Sequence[Traced], tell: Tell) -> None:
         """Carry each effect to the other records, and fit those that stand to all that show them."""
