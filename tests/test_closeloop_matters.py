@@ -1,0 +1,79 @@
+"""Which residual matters, and when an effect accounts for it: with and without an open form of the FMU."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.detect import ONE_EFFECT, matters
+from estimator.closeloop.fit import Fit
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.verdict import reached
+from estimator.record import Record, Run
+
+SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
+T = np.arange(2.0 * SAMPLES)
+FORM = 0.2  # of an output, so 6 times the noise
+
+
+def asked(form_error: float = 0.0) -> Problem:
+    y = SIGNAL * np.sqrt(2) * np.sin(T)[:, None] * np.ones(2)
+    run = Run(T, y[:, :0], y, T < SAMPLES, T >= SAMPLES)
+    return Problem(lambda _: Path(), Record((run,), (), ("a", "b"), NOISE), {}, {}, form_error=form_error)
+
+
+def left(*rms: float) -> Hypothesis:
+    """What leaves residuals of exactly these rms values."""
+    one = np.where(np.arange(len(T)) % 2, 1.0, -1.0)
+    nothing = Fit((), np.zeros(0), np.zeros((0, 0)), one, np.zeros((len(T), 0)))
+    return Hypothesis((), nothing, (one[:, None] * np.array(rms),))
+
+
+@pytest.mark.parametrize(
+    ("rms", "matter"),
+    [((1.0, 1.0), False), ((1.02, 0.98), False), ((1.0, 1.2), True), ((3.0, 1.0), True)],
+)
+def test_what_chance_makes_of_noise_does_not_matter(rms, matter):
+    assert matters(asked(), left(*rms), NOISE) is matter
+
+
+@pytest.mark.parametrize(
+    ("rms", "likeness", "matter"),
+    [
+        ((1.3, 1.0), 0.05, False),  # what another form of contact leaves
+        ((5.0, 1.0), 0.05, False),
+        ((1.3, 1.0), 0.3, True),  # what one effect could explain
+        ((1.02, 1.0), 0.9, False),
+        ((8.0, 1.0), 0.05, True),
+    ],
+)
+def test_an_open_form_leaves_what_is_like_no_effect_alone(rms, likeness, matter):
+    assert matters(asked(FORM), left(*rms), NOISE, likeness) is matter
+
+
+@given(st.floats(1.0, 20.0), st.floats(1.0, 20.0), st.floats(0.0, 1.0))
+def test_less_matters_where_the_form_is_open(a, b, likeness):
+    if matters(asked(FORM), left(a, b), NOISE, likeness):
+        assert matters(asked(), left(a, b), NOISE)
+    assert likeness >= ONE_EFFECT or not matters(asked(FORM), left(min(a, 5.9), min(b, 5.9)), NOISE, likeness)
+
+
+@pytest.mark.parametrize(
+    ("form", "before", "after", "found"),
+    [
+        (0.0, (5.0, 1.0), (1.01, 1.0), (True, True)),
+        (0.0, (5.0, 1.0), (1.19, 1.0), (True, True)),  # 95 % of the way to the noise
+        (0.0, (5.0, 1.0), (2.0, 1.0), (False, True)),
+        (FORM, (20.0, 1.5), (5.0, 1.5), (True, True)),  # within what the form leaves, and no worse
+        (FORM, (20.0, 1.5), (5.0, 1.7), (True, False)),
+        (FORM, (20.0, 1.5), (7.0, 1.5), (False, True)),
+        (FORM, (3.0, 1.3), (2.0, 1.2), (False, False)),  # all was small: most of it has to go
+        (FORM, (3.0, 1.3), (1.05, 1.1), (True, True)),
+    ],
+)
+def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
+    problem = asked(form)
+    assert tuple(reached(problem, left(*after), left(*before), NOISE).tolist()) == found
