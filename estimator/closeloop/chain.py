@@ -99,7 +99,7 @@ def trace(
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
     beyond_noise = float(seen.residual @ seen.residual) - len(seen.residual)
-    likeness = screened.promises[0].gain / max(beyond_noise, 1.0)
+    likeness = max((p.gain for p in screened.promises), default=0.0) / max(beyond_noise, 1.0)
     detection = stages.done(
         "detection",
         lambda: detect(problem, base, noise, over_noise, regressors, likeness, np.random.default_rng(seed)),
