@@ -7,7 +7,7 @@ import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
-from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, ranked, to_the_end
+from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, hypotheses, ranked, to_the_end
 from estimator.closeloop.detect import LEVEL, Detection, detect
 from estimator.closeloop.freeform import free_form
 from estimator.closeloop.honesty import Honesty, honesty
@@ -28,6 +28,9 @@ NOMINEES = 16  # effects that are fitted, half as many where each is an FMU arou
 LEADING, SHAPES = 6, 2  # of them, in so many shapes; the others in the best one
 SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside them
 FAULTS = 4  # faults of sensors that are fitted
+LIKELY = 0.5  # of what is beyond noise: faults that could explain so much are fitted before all else
+RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain less are no rivals, but
+PLACEBOS = 3  # of them, so that there is a best wrong one
 
 Tell = Callable[[str], None]
 
@@ -78,6 +81,17 @@ class Screened:
     screening: Screening
     change: list[tuple[Candidate, Array]]
     promises: list[Promise]
+
+    @property
+    def floor_known(self) -> bool:
+        """Whether the noise of all outputs is declared, so that a residual can be seen to be noise."""
+        return not np.isnan(self.problem.record.noise_std).any()
+
+    def explained(self, found: Sequence[Hypothesis]) -> bool:
+        """Whether one of them accounts for the residual."""
+        return self.floor_known and any(
+            explains(self.problem, h, self.base, self.noise, self.size) for h in found
+        )
 
 
 def trace(
@@ -143,10 +157,15 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
     promises = at_their_moments(s.screening, s.promises, LEADING)
     promises = [p for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
-    tell(f"fitting the {len(chosen)} most promising inside the FMU, jointly with the declared parameters")
-    brief = stages.done("brief", lambda: briefly(problem, base, chosen, size, jobs))
+    tell("fitting faults of sensors")
+    faults, rest = stages.done("faults", lambda: _faults_first(s, chosen, jobs))
+    tell(
+        f"fitting the {len(rest)} most promising effects inside the FMU, jointly with the declared parameters"
+    )
+    brief = stages.done("brief", lambda: briefly(problem, base, rest, size, jobs))
+    brief = best_by_label([*faults, *brief])
     sudden: list[Promise] = []
-    if any(sets_in(h) for h in brief[:LEADING]):
+    if not faults and any(sets_in(h) for h in brief[:LEADING]):
         tell("looking for what set in during the record")
         physical = [c for c, _ in single if not c.is_fault]
         sudden, more = stages.done("sudden", lambda: _sudden(s, physical, jobs))
@@ -154,16 +173,11 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
     tell("fitting the leading ones to the end")
     singles = stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
     pairs: list[Hypothesis] = []
-    floor_known = not np.isnan(problem.record.noise_std).any()
-
-    def explained() -> bool:
-        return floor_known and any(explains(problem, h, base, s.noise, size) for h in singles)
-
-    if floor_known and not explained():
+    if s.floor_known and not s.explained(singles):
         tell("fitting the leading ones to a growing part of the record")
         found, hopes = singles, [*sudden, *promises]
         singles = stages.done("growing", lambda: from_the_beginning(problem, base, found, hopes, size, jobs))
-    if not explained():
+    if not s.explained(singles):
         tell("trying pairs of effects")
         alone = singles
         pairs, freed = stages.done(
@@ -172,6 +186,26 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
         singles = best_by_label([*singles, *freed])
     singles = with_twins(singles, alike)
     return ranked(problem, singles, size), ranked(problem, pairs, size)
+
+
+def _faults_first(
+    s: Screened, chosen: Sequence[Promise], jobs: int
+) -> tuple[list[Hypothesis], list[Promise]]:
+    """Faults that account for the residual, fitted to the end, and what is still to be tried.
+
+    A fault is as linear as the screening: where one explains, effects that could gain clearly less are no
+    rivals. Where none does, all are tried together.
+    """
+    residual = s.screening.fit.residual
+    beyond = float(residual @ residual) - len(residual)
+    likely = [p for p in chosen if p.candidates[0].is_fault and p.gain > LIKELY * beyond]
+    if not likely or not s.floor_known:
+        return [], list(chosen)
+    faults = hypotheses(s.problem, s.base, likely, s.size, jobs, FAULTS)
+    if not s.explained(faults):
+        return [], list(chosen)
+    others = [p for p in chosen if p not in likely]
+    return faults, [p for i, p in enumerate(others) if i < PLACEBOS or p.gain > RIVAL * likely[0].gain]
 
 
 def _sudden(
