@@ -129,6 +129,17 @@ def test_correlation_time_of_an_autoregression(phi: float, seed: int) -> None:
     assert_allclose(correlation_time(x), theory, rtol=0.35)
 
 
+@pytest.mark.parametrize("width", [np.inf, 40.0])
+def test_what_has_no_influence_is_not_certain(width: float) -> None:
+    """Of two unknowns one does nothing: its error is that of its bounds, the other's that of the data."""
+    rng = np.random.default_rng(3)
+    j = np.column_stack([rng.standard_normal(3000), np.zeros(3000)])
+    scale, wide = np.array([0.5, 2.0]), np.array([np.inf, width])
+    errors = np.sqrt(np.diag(sandwich(rng.standard_normal(3000), j, scale, wide)))
+    assert errors[0] == pytest.approx(1 / np.linalg.norm(j[:, 0]), rel=0.6)
+    assert errors[1] == pytest.approx(min(width, 1e3 * scale[1]) / np.sqrt(12), rel=1e-6)
+
+
 def test_noise_floor_is_what_was_declared_or_what_the_data_show() -> None:
     rng = np.random.default_rng(4)
     t = np.arange(5000) * 0.01

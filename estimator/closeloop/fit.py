@@ -14,6 +14,7 @@ from fmus.host.fmu import FmuError
 STEP = 1e-2  # of an unknown's scale, for differences
 GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
 REFUSED = 1e6  # size of a residual where the FMU could not be run
+WIDE = 1e3  # scales within which an unknown without bounds lies
 BLOCKS = 30  # pieces of the record between which residuals count as independent
 
 
@@ -107,10 +108,11 @@ def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Ar
     """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
 
     Never below the covariance for white residuals of variance 1. width: (n,) between the bounds, which say
-    as much as a uniform distribution between them.
+    as much as a uniform distribution between them; without bounds that is WIDE scales, so that what has no
+    influence is not taken for certain.
     """
     j = jacobian * scale
-    inverse = pinvh(j.T @ j + np.diag(12 * (scale / width) ** 2))
+    inverse = pinvh(j.T @ j + np.diag(12 * (scale / np.minimum(width, WIDE * scale)) ** 2))
     scores = np.array(
         [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
     )
