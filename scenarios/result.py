@@ -158,9 +158,12 @@ def _parameters(h: Hypothesis, c: Candidate) -> dict[str, Figure]:
         return {c.kind.removeprefix("sensor_"): _figure(h, c.amplitudes[0].name)}
     found = {u.name.removeprefix(prefix): _figure(h, u.name) for u in c.unknowns}
     if is_wave(c):  # the size of sine and cosine together is what an engineer asks for
-        values, errors = np.array([found[u.name.removeprefix(prefix)] for u in c.amplitudes]).T
+        names = [u.name for u in h.fit.unknowns]
+        i = [names.index(u.name) for u in c.amplitudes]
+        values, covariance = h.fit.values[i], h.fit.covariance[np.ix_(i, i)]
         size = float(np.hypot(*values))
-        found["amplitude"] = [size, float(np.hypot(*(values * errors)) / size) if size else 0.0]
+        along = values / size if size else np.full(2, np.sqrt(0.5))
+        found["amplitude"] = [size, float(np.sqrt(along @ covariance @ along))]
     return found
 
 

@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
-from estimator.closeloop.problem import Problem
+from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.verdict import reached
 from estimator.record import Record, Run
+from scenarios.result import effects_of
 
 SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
 T = np.arange(2.0 * SAMPLES)
@@ -77,3 +79,20 @@ def test_less_matters_where_the_form_is_open(a, b, likeness):
 def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
     problem = asked(form)
     assert tuple(reached(problem, left(*after), left(*before), NOISE).tolist()) == found
+
+
+# ---- figures of a result
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.2, 1.0), st.floats(-0.9, 0.9))
+def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
+    """As many draws of sine and cosine scatter in size."""
+    unknowns = tuple(Unknown(f"periodic_force_wheel_F_{s}", 0.0, -9e9, 9e9, 1.0) for s in ("sin", "cos"))
+    values, std = 50.0 * np.array([np.sin(phase), np.cos(phase)]), 0.1 * np.array([1.0, ratio])
+    covariance = np.outer(std, std) * np.array([[1.0, correlation], [correlation, 1.0]])
+    wave = Candidate("periodic_force", "wheel", unknowns)
+    fit = Fit(unknowns, values, covariance, np.zeros(1), np.zeros((1, 2)))
+    size, error = effects_of(Hypothesis((wave,), fit, ()))[0].parameters["amplitude"]
+    drawn = np.random.default_rng(0).multivariate_normal(values, covariance, 20_000)
+    assert size == pytest.approx(50.0)
+    assert error == pytest.approx(np.hypot(*drawn.T).std(), rel=0.05)
