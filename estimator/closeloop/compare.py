@@ -20,7 +20,7 @@ GAINS = 0.98  # of the sum of squares that a further round must come below to be
 ROUNDS, LAST = 4, 2  # of further LONG fits of the leading finalists, where they have not converged
 ABOARD = 6  # effects in one FMU
 LEADERS = 2  # of the finalists that are fitted to the end before the others, and
-RIVAL = 4.0  # times the best sum of squares then, up to which the others are
+RIVAL = 4.0  # times the best sum of squares, up to which others are fitted to the end
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
@@ -152,7 +152,7 @@ def finished(
     """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain."""
     found = fitted(problem, unknowns, promises, size, LONG, jobs)
     for _ in range(ROUNDS):
-        short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < HOPELESS * cost(found[0])]
+        short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < RIVAL * cost(found[0])]
         if not short:
             break
         more = [Promise(h.candidates, 0.0, h.fit.theta) for h in short]
