@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from tests.challenge import run as running
 from tests.challenge.bench import NO_MORE, bench
 from tests.challenge.draw import Plan, counts, plans
-from tests.challenge.make import effect_of, fault_of, make, settled
+from tests.challenge.make import ATTEMPTS, effect_of, fault_of, make, settled
 from tests.challenge.match import Answer, judged, named, other_names
 from tests.challenge.menu import FAULTS, MENU, OUTPUTS, entry
 from tests.challenge.run import Challenge, closed
@@ -191,7 +191,8 @@ def test_sizes_that_lock_the_wheel_are_drawn_again(tmp_path):
 
 def test_a_plan_that_never_works_is_refused(tmp_path):
     with pytest.raises(
-        ValueError, match=r"8 draws of constant_force@wheel failed, the last: .*(steady state|locks)"
+        ValueError,
+        match=rf"{ATTEMPTS} draws of constant_force@wheel failed, the last: .*(steady state|locks)",
     ):
         make(plan("single", "constant_force", "wheel", F_0=2000.0), 3, tmp_path / "r", tmp_path / "t")
     assert not list(tmp_path.rglob("*"))

@@ -133,7 +133,6 @@ def test_an_unknown_without_any_influence_is_not_told() -> None:
     residual = rng.standard_normal(600)
     scale = np.array([u.scale for u in c.unknowns])
     covariance = sandwich(residual, jacobian, scale, np.full(2, np.inf))
-    assert covariance[1, 1] == 0.0  # which a fit by itself takes for certain
     found = estimates(chart([c]), Fit(c.unknowns, np.array([20.0, 0.01]), covariance, residual, jacobian))
     assert found.told == (f"{prefix}F_c",)
     assert found.figures[f"{prefix}v_s"][1] == pytest.approx(LOOSE * 0.001)
