@@ -12,8 +12,10 @@ from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem, Unknown
-from estimator.closeloop.verdict import reached
+from estimator.closeloop.simpler import limits
+from estimator.closeloop.verdict import equivalent, reached
 from estimator.record import Record, Run
+from fmus.effects import EFFECTS
 from scenarios.result import effects_of
 
 SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
@@ -79,6 +81,34 @@ def test_less_matters_where_the_form_is_open(a, b, likeness):
 def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
     problem = asked(form)
     assert tuple(reached(problem, left(*after), left(*before), NOISE).tolist()) == found
+
+
+# ---- simpler laws
+
+
+def law(kind: str, extra: int, gain: float) -> Hypothesis:
+    """A law with one unknown and some more that leaves so much less log score than nothing would."""
+    unknowns = tuple(Unknown(f"{kind}_wheel_{i}", 1.0, 0.0, 9.0, 1.0) for i in range(1 + extra))
+    n, one = len(unknowns), np.where(np.arange(len(T)) % 2, 1.0, -1.0)
+    fit = Fit(unknowns, np.ones(n), np.eye(n), one, np.zeros((len(T), n)))
+    left = one * np.sqrt(0.01 - 2 * gain / SAMPLES)
+    return Hypothesis((Candidate(kind, "wheel", unknowns),), fit, (np.column_stack([left, 0 * left]),))
+
+
+@pytest.mark.parametrize(
+    ("gain", "stays"), [(0.5, "coulomb_friction"), (3.5, "coulomb_friction"), (4.5, "stribeck_friction")]
+)
+def test_further_unknowns_have_to_be_worth_their_price(gain, stays):
+    complex_one, simple = law("stribeck_friction", 2, gain), law("coulomb_friction", 0, 0.0)
+    [only] = equivalent(asked(), complex_one, [complex_one, simple], NOISE)
+    assert only.candidates[0].kind == stays
+
+
+@pytest.mark.parametrize("kind", sorted(EFFECTS))
+def test_laws_do_not_become_one_another(kind):
+    for other in limits(kind):
+        assert other in EFFECTS
+        assert kind not in limits(other)
 
 
 # ---- figures of a result

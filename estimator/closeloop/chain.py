@@ -19,6 +19,7 @@ from estimator.closeloop.pairs import try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.restarts import from_the_beginning
 from estimator.closeloop.screen import Promise, Screening, screen
+from estimator.closeloop.simpler import simpler
 from estimator.closeloop.stages import Stages
 from estimator.closeloop.twins import twins, with_twins
 from estimator.closeloop.verdict import Judgement, explains, judge, without_fits
@@ -184,8 +185,19 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
             "pairs", lambda: try_pairs(problem, base, s.screening.fit, alone, single, size, jobs)
         )
         singles = best_by_label([*singles, *freed])
-    singles = with_twins(singles, alike)
-    return ranked(problem, singles, size), ranked(problem, pairs, size)
+    tell("asking whether a simpler law would do")
+    ones, twos = ranked(problem, singles, size), ranked(problem, pairs, size)
+    ones, twos = stages.done("simpler", lambda: (_simplified(s, ones, jobs), _simplified(s, twos, jobs)))
+    return ranked(problem, with_twins(ones, alike), size), twos
+
+
+def _simplified(s: Screened, found: list[Hypothesis], jobs: int) -> list[Hypothesis]:
+    """Ranked hypotheses with simpler laws in place of those of the best one, where it may be the answer."""
+    if not found or (s.floor_known and not s.explained(found[:1])):
+        return found
+    candidates = [c for c, _ in s.change]
+    more = simpler(s.problem, s.base, found, candidates, s.size, jobs)
+    return ranked(s.problem, best_by_label([*found, *more]), s.size)
 
 
 def _faults_first(

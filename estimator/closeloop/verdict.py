@@ -10,8 +10,8 @@ from estimator.closeloop.compare import Hypothesis, beats, lead
 from estimator.closeloop.detect import Detection, signal_size
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.simpler import limits
 from estimator.record import Array, BoolArray
-from fmus.effects import EFFECTS
 
 Verdict = Literal[
     "no_discrepancy",
@@ -28,6 +28,7 @@ WON = 10.0  # log score over the FMU without the effect, on held-out data
 CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residual that is noise
 FORM_EXPLAINED = 0.95  # share of the variance beyond the noise, where the FMU's form leaves something open
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
+UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
 
@@ -94,14 +95,17 @@ def equivalent(
 ) -> list[Hypothesis]:
     """The class of the best hypothesis: those that the held-out data do not tell from it.
 
-    Of a law and a simpler one that it becomes at a limit of its shape the simpler one stays.
+    A simpler law that it becomes at a limit of its shape is told from it only where every further unknown is
+    worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
+    simpler one stays.
     """
     members = [best]
     for h in others:
         if h is best:
             continue
         mean, _ = lead(problem, best, h, size)
-        close = mean < SAME * -float(best.scores(problem, size).sum())
+        price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
+        close = mean < max(price, SAME * -float(best.scores(problem, size).sum()))
         if close or not beats(problem, best, h, size):
             members.append(h)
     return [h for h in members if not any(becomes(h, other) for other in members)]
@@ -115,11 +119,6 @@ def becomes(h: Hypothesis, other: Hypothesis) -> bool:
     same = [a.label == b.label for a, b in pairs]
     simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
     return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))
-
-
-def limits(kind: str) -> tuple[str, ...]:
-    """Kinds of effects that one becomes at a limit; none of a sensor's fault."""
-    return EFFECTS[kind].becomes if kind in EFFECTS else ()
 
 
 def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:

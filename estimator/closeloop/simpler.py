@@ -1,0 +1,54 @@
+"""Would a simpler law do? The one that a leading effect becomes at a limit, fitted in its place."""
+
+from collections.abc import Sequence
+
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import Hypothesis, finished
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.screen import Promise, label
+from estimator.record import Array
+from fmus.effects import EFFECTS
+
+
+def limits(kind: str) -> tuple[str, ...]:
+    """Kinds of effects that one becomes at a limit; none of a sensor's fault."""
+    return EFFECTS[kind].becomes if kind in EFFECTS else ()
+
+
+def simpler(
+    problem: Problem,
+    base: Hypothesis,
+    found: Sequence[Hypothesis],
+    candidates: Sequence[Candidate],
+    size: Array,
+    jobs: int,
+) -> list[Hypothesis]:
+    """Fits of the best of `found`, best first, with each of its laws replaced by one that it becomes.
+
+    candidates: that can be built in, in all shapes. What was fitted to the end already is left out.
+    """
+    known = {h.label for h in found if h.fit.converged}
+    promises = [
+        Promise(others, 0.0, _start(found[0], others))
+        for h in found[:1]
+        for i, c in enumerate(h.candidates)
+        for new in _in_place_of(c, candidates)
+        if label(others := (*h.candidates[:i], new, *h.candidates[i + 1 :])) not in known
+    ]
+    return finished(problem, base.fit.unknowns, promises, size, jobs) if promises else []
+
+
+def _in_place_of(c: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The first shape of each law that one becomes, at its own place."""
+    first: dict[str, Candidate] = {}
+    for other in candidates:
+        if other.location == c.location and other.kind in limits(c.kind):
+            first.setdefault(other.kind, other)
+    return list(first.values())
+
+
+def _start(h: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, float]:
+    """Where the hypothesis is; a new law at its realistic size."""
+    size = {u.name: u.scale for c in candidates for u in c.amplitudes}
+    shape = {u.name: u.start for c in candidates for u in c.shape}
+    return {**size, **shape, **h.fit.theta}
