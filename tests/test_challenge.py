@@ -422,6 +422,12 @@ def writing(path, content):
     return [sys.executable, "-c", f"import pathlib; pathlib.Path({str(path)!r}).write_text({content!r})"]
 
 
+def test_a_record_that_is_ended_from_outside_is_no_answer(tmp_path):
+    ended = "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"
+    with pytest.raises(InterruptedError, match="from outside"):
+        closed([sys.executable, "-c", ended], tmp_path / "answer.json", 20.0)
+
+
 def test_a_record_that_crashes_or_hangs_loses_itself_alone(tmp_path):
     answer_file = tmp_path / "a.json"
     good = closed(writing(answer_file, '{"cpu_seconds": 1.5}'), answer_file, 60.0)

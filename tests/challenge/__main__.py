@@ -26,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--limit", type=float, default=1800.0, help="s a record")
     parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="leave out the others")
     parser.add_argument("--only-make", action="store_true", help="make the records, answer none")
+    parser.add_argument("--so-far", action="store_true", help="the scoreboard of what is answered already")
     a = parser.parse_args(arguments)
     for stopping in (signal.SIGINT, signal.SIGTERM):  # both end the record's process too
         signal.signal(stopping, signal.default_int_handler)
@@ -37,6 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for plan in chosen:
             challenge.truth(plan)
         return
+    if a.so_far:
+        chosen = [p for p in chosen if challenge.answered(p)]
     found = run(challenge, chosen, a.jobs, lambda line: print(line, flush=True))
     marked = [(truth, Answer.of(kept)) for truth, kept in found]
     every = markdown(marked, seed, a.count, every=True)

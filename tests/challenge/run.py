@@ -57,6 +57,10 @@ class Challenge:
         answer: Kept = json.loads(kept.read_text(encoding="utf-8"))
         return answer
 
+    def answered(self, plan: Plan) -> bool:
+        """Whether there is an answer."""
+        return (self.folder / "answers" / f"{plan.name}.json").exists()
+
     def command(self, record: Path, answer: Path) -> list[str]:
         """What closes one record."""
         own = [sys.executable, "-m", "tests.challenge.answer"]
@@ -94,6 +98,8 @@ def _waited(process: subprocess.Popen[str], until: float, stop: Event) -> str | 
             _, said = process.communicate(timeout=GLANCE)
         except subprocess.TimeoutExpired:
             continue
+        if -process.returncode in (signal.SIGTERM, signal.SIGINT):
+            raise InterruptedError("stopped from outside")
         return f"exit {process.returncode}: {said[-LAST:]}" if process.returncode else ""
     return None
 
