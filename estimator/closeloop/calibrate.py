@@ -27,9 +27,9 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
         Unknown(n, problem.declared[n], low, high, (high - low) / 10)
         for n, (low, high) in problem.calibrate.items()
     ]
+    unknowns = [*parameters, *states]
     base, size = declared, weights(record, list(declared.residuals))
     for _ in range(2 if np.isnan(record.noise_std).any() else 1):
-        unknowns = [*parameters, *states]
         found = fit(problem, unknowns, size, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < NEAR:
             found = fit(problem, unknowns, size, found.theta)

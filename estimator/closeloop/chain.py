@@ -88,6 +88,12 @@ class Screened:
         """Whether the noise of all outputs is declared, so that a residual can be seen to be noise."""
         return not np.isnan(self.problem.record.noise_std).any()
 
+    @property
+    def beyond_noise(self) -> float:
+        """What the sum of squares of the screened residual has more than noise would."""
+        residual = self.screening.fit.residual
+        return float(residual @ residual) - len(residual)
+
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual."""
         return self.floor_known and any(
@@ -113,8 +119,7 @@ def trace(
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
-    beyond_noise = float(seen.residual @ seen.residual) - len(seen.residual)
-    likeness = max((p.gain for p in screened.promises), default=0.0) / max(beyond_noise, 1.0)
+    likeness = max((p.gain for p in screened.promises), default=0.0) / max(screened.beyond_noise, 1.0)
     detection = stages.done(
         "detection",
         lambda: detect(problem, base, noise, over_noise, regressors, likeness, np.random.default_rng(seed)),
@@ -208,9 +213,7 @@ def _faults_first(
     A fault is as linear as the screening: where one explains, effects that could gain clearly less are no
     rivals. Where none does, all are tried together.
     """
-    residual = s.screening.fit.residual
-    beyond = float(residual @ residual) - len(residual)
-    likely = [p for p in chosen if p.candidates[0].is_fault and p.gain > LIKELY * beyond]
+    likely = [p for p in chosen if p.candidates[0].is_fault and p.gain > LIKELY * s.beyond_noise]
     if not likely or not s.floor_known:
         return [], list(chosen)
     faults = hypotheses(s.problem, s.base, likely, s.size, jobs, FAULTS)

@@ -10,12 +10,11 @@ from scipy.stats import chi2
 
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.estimates import Estimates, widths
-from estimator.closeloop.fit import BLOCKS, sandwich
+from estimator.closeloop.fit import BLOCKS, GAIN, sandwich
 from estimator.closeloop.part import Part
 from estimator.record import Array
 
 EVALUATIONS = 25
-GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
 NEAR = 1e-9  # of a scale: so far values stay away from their bounds
 
 

@@ -49,13 +49,13 @@ def from_the_beginning(
         for p in _shapes([p for p in physical if p.label == label])
     ]
     tried = list(zip(together(started, starts), starts, strict=True))
-    first = Parallel(n_jobs=jobs)(delayed(_grown)(here, others, p, size, FIRST) for here, p in tried)
-    alive = sorted((mean_square(h), i) for i, h in enumerate(first) if h is not None)
-    limit = [RIVAL * alive[0][0]] if alive else []
+    begun = Parallel(n_jobs=jobs)(delayed(_begun)(here, others, p, size) for here, p in tried)
+    alive = [(h, here) for h, (here, _) in zip(begun, tried, strict=True) if h is not None]
+    alive.sort(key=lambda pair: mean_square(pair[0]))
     tasks = (
-        delayed(_grown)(tried[i][0], others, replace(tried[i][1], start=_reached(first[i])), size, THEN)
-        for level, i in alive[:SURVIVORS]
-        if level < limit[0]
+        delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), size, THEN)
+        for h, here in alive[:SURVIVORS]
+        if mean_square(h) < RIVAL * mean_square(alive[0][0])
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
     again = [Promise(h.candidates, 0.0, h.fit.theta) for h in grown[:LEADING]]
@@ -76,22 +76,19 @@ def mean_square(h: Hypothesis) -> float:
     return cost(h) / len(h.fit.residual)
 
 
-def _reached(h: Hypothesis | None) -> dict[str, float]:
-    return h.fit.theta if h else {}
+def _begun(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array) -> Hypothesis | None:
+    """A fit to the first parts of the record; of what sets in later first without it to all before."""
+    before, start = _before(problem, promise), promise.start
+    if 0.0 < before < 1.0:
+        start = start | fit(problem.beginning(before), unknowns, size, start).theta
+    return _grown(problem, unknowns, replace(promise, start=start), size, FIRST)
 
 
 def _grown(
     problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, parts: Parts
 ) -> Hypothesis | None:
-    """A fit to a growing part of the record; of what sets in later first without it to all before.
-
-    The best fit to the last part, or None where the FMU does not run.
-    """
-    begins, run = moment(promise.candidates[0]), problem.record.runs[0]
-    before = 0.0 if begins is None else begins / float(run.t[run.fit][-1] - run.t[0])
-    start = promise.start
-    if parts is FIRST and 0.0 < before < 1.0:
-        start = start | fit(problem.beginning(before), unknowns, size, start).theta
+    """The best fit to the last of growing parts of the record, or None where the FMU does not run."""
+    before, start = _before(problem, promise), promise.start
     best: Hypothesis | None = None
     for part, evaluations in parts:
         share = before + (1 - before) * part
@@ -104,3 +101,9 @@ def _grown(
         if part == parts[-1][0] and (best is None or cost(found) < cost(best)):
             best = found
     return best
+
+
+def _before(problem: Problem, promise: Promise) -> float:
+    """Share of the identify part that lies before what a promise lets set in."""
+    begins, run = moment(promise.candidates[0]), problem.record.runs[0]
+    return 0.0 if begins is None else begins / float(run.t[run.fit][-1] - run.t[0])

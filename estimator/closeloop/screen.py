@@ -72,8 +72,8 @@ class Screening:
 
     def __init__(self, problem: Problem, base: Fit, size: Array, forces: Sequence[MissingForce] = ()) -> None:
         self.problem, self.theta, self.size, self.forces = problem, base.theta, size, forces
-        [self._shown, *_] = problem.simulate(self.theta)
-        self.group = group_size(problem, self._shown)
+        self._shown = problem.simulate(self.theta)
+        self.group = group_size(problem, self._shown[0])
         self.fit = grouped_fit(base, len(size), self.group)
         self._made: dict[str, Around] = {}
         self._local: tuple[list[str], Linearised] | None = None
@@ -84,8 +84,7 @@ class Screening:
         moved = {c: self._moved(c) for c in physical}
         columns = iter(self._answers([change for c in physical for change in moved[c]]))
         own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
-        faults = _faults(self.problem, self.theta, [c for c in candidates if c.is_fault], self.size)
-        own |= {c: grouped(g, len(self.size), self.group) for c, g in faults.items()}
+        own |= {c: self._fault(c) for c in candidates if c.is_fault}
         return [own[c] for c in candidates]
 
     @property
@@ -165,12 +164,26 @@ class Screening:
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
             push[name] = rest + np.interp(np.arange(len(run.t)), self._at, samples)
         moved = plant.simulate(run, start, push=push) - self._unchanged
-        return grouped(-(moved[run.fit] / self.size).ravel(), len(self.size), self.group)
+        return self._weighted(moved[run.fit])
 
     @cached_property
     def _unchanged(self) -> Array:
         """Outputs of the first run without any change (N, n_y)."""
         return self.problem.plant.simulate(self.problem.record.runs[0], self.problem.start(self.theta))
+
+    def _fault(self, c: Candidate) -> Array:
+        """Change of the residual by a fault of a sensor, (m, 1)."""
+        record, fault = self.problem.record, {u.name: u.scale for u in c.amplitudes}
+        parts = [
+            (faulty(y, run.t, record.outputs, fault) - y)[run.fit]
+            for y, run in zip(self._shown, record.runs, strict=True)
+            if run.fit.any()
+        ]
+        return self._weighted(np.concatenate(parts))[:, None]
+
+    def _weighted(self, change: Array) -> Array:
+        """A change of the outputs on the identify part (m, n_y) as one of the residual of `fit`."""
+        return grouped(-(change / self.size).ravel(), len(self.size), self.group)
 
 
 def _along(free: Course, missing: MissingForce) -> Course:
@@ -182,23 +195,6 @@ def _along(free: Course, missing: MissingForce) -> Course:
 
 def _last(problem: Problem) -> int:
     return int(np.flatnonzero(problem.record.runs[0].fit)[-1]) + 1
-
-
-def _faults(
-    problem: Problem, theta: Mapping[str, float], candidates: Sequence[Candidate], size: Array
-) -> dict[Candidate, Array]:
-    """Changes of the weighted residual by faults of sensors."""
-    runs = [run for run in problem.record.runs if run.fit.any()]
-    shown = [y for y, run in zip(problem.simulate(theta), problem.record.runs, strict=True) if run.fit.any()]
-    found = {}
-    for c in candidates:
-        fault = {u.name: u.scale for u in c.amplitudes}
-        parts = [
-            (faulty(y, run.t, problem.record.outputs, fault) - y)[run.fit]
-            for y, run in zip(shown, runs, strict=True)
-        ]
-        found[c] = -(np.concatenate(parts) / size).ravel()[:, None]
-    return found
 
 
 def screen(base: Fit, sets: Sequence[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
