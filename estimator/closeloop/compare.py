@@ -14,7 +14,7 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-BRIEF, LONG = 4, 10  # evaluations of a fit to rank it, and to finish it
+BRIEF, LONG = 6, 20  # steps of a fit to rank it, and to finish it
 FINALISTS = 5
 GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
 ROUNDS, LAST = 4, 2  # of further LONG fits of the leading finalists, where they have not converged
@@ -84,14 +84,17 @@ def hypothesis(
     size: Array,
     evaluations: int,
     known: Mapping[str, Array] | None = None,
+    guess: Mapping[str, Array] | None = None,
 ) -> Hypothesis | None:
     """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
 
-    known: see `fit`. None where the FMU does not run with them.
+    known, guess: see `fit`. None where the FMU does not run with them.
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
-    found = fit(here, [*unknowns, *own], size, promise.start, evaluations=evaluations, known=known)
+    found = fit(
+        here, [*unknowns, *own], size, promise.start, evaluations=evaluations, known=known, guess=guess
+    )
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
@@ -122,9 +125,8 @@ def briefly(
     """
     states = {n: v for n, v in base.fit.theta.items() if n in problem.free_states}
     started = replace(problem, declared={**problem.declared, **states})
-    columns = {u.name: c for u, c in zip(base.fit.unknowns, base.fit.jacobian.T, strict=True)}
     others = [u for u in base.fit.unknowns if u.name not in states]
-    return fitted(started, others, promises, size, BRIEF, jobs, columns if known else None)
+    return fitted(started, others, promises, size, BRIEF, jobs, base.fit.columns if known else None)
 
 
 def to_the_end(
@@ -141,16 +143,22 @@ def to_the_end(
             for h in part
             if not done or cost(h) < RIVAL * cost(done[0])
         ]
-        done = best_by_label([*done, *finished(problem, base.fit.unknowns, again, size, jobs)])
+        done = best_by_label(
+            [*done, *finished(problem, base.fit.unknowns, again, size, jobs, base.fit.columns)]
+        )
     labels = {h.label for h in done}
     return best_by_label([*done, *(h for h in brief if h.label not in labels)])
 
 
 def finished(
-    problem: Problem, unknowns: Sequence[Unknown], promises: Sequence[Promise], size: Array, jobs: int
-) -> list[Hypothesis]:
-    """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain."""
-    found = fitted(problem, unknowns, promises, size, LONG, jobs)
+    problem: Problem, unknowns: Sequence[Unknown], promises: Sequence[Promise], size: Array, jobs: int,
+    guess: Mapping[str, Array] | None = None,
+) -> list[Hypothesis]:  # fmt: skip
+    """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain.
+
+    guess: see `fit`.
+    """
+    found = fitted(problem, unknowns, promises, size, LONG, jobs, guess=guess)
     for _ in range(ROUNDS):
         short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < RIVAL * cost(found[0])]
         if not short:
@@ -173,11 +181,12 @@ def fitted(
     evaluations: int,
     jobs: int,
     known: Mapping[str, Array] | None = None,
+    guess: Mapping[str, Array] | None = None,
 ) -> list[Hypothesis]:
     """Fit each promise with so many evaluations; one hypothesis a label, best first on the identify part."""
     where = together(problem, promises)
     tasks = (
-        delayed(hypothesis)(here, unknowns, p, size, evaluations, known)
+        delayed(hypothesis)(here, unknowns, p, size, evaluations, known, guess)
         for here, p in zip(where, promises, strict=True)
     )
     return best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.closeloop.compare import Hypothesis
-from estimator.closeloop.fit import STEP, Fit
+from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.slopes import STEP
 from estimator.record import Array
 
 REPLICATES = 499

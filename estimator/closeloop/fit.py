@@ -1,18 +1,20 @@
 """Fit unknowns by simulation error on the identify part, with bounds and standard errors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import pinvh
 from scipy.optimize import least_squares
 
 from estimator.closeloop.problem import Problem, Unknown
+from estimator.closeloop.slopes import Slopes
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-STEP = 1e-2  # of an unknown's scale, for differences
 GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
+LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
 REFUSED = 1e6  # size of a residual where the FMU could not be run
 WIDE = 1e3  # scales within which an unknown without bounds lies
 BLOCKS = 30  # pieces of the record between which residuals count as independent
@@ -39,6 +41,11 @@ class Fit:
         return {u.name: float(v) for u, v in zip(self.unknowns, self.values, strict=True)}
 
     @property
+    def columns(self) -> dict[str, Array]:
+        """Derivatives (m,) of the residual by each unknown."""
+        return {u.name: column for u, column in zip(self.unknowns, self.jacobian.T, strict=True)}
+
+    @property
     def std(self) -> dict[str, float]:
         """Standard errors by name."""
         deviation = np.sqrt(np.maximum(np.diag(self.covariance), 0))
@@ -60,48 +67,64 @@ def fit(
     size: Array,
     start: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
-    evaluations: int = 15,
+    evaluations: int = 30,
     known: Mapping[str, Array] | None = None,
+    guess: Mapping[str, Array] | None = None,
     gain: float = GAIN,
 ) -> Fit:
     """Least squares of the simulation error over the unknowns, from `start` or their own start values.
 
-    gain: share of the sum of squares; a step that gains less is the last one.
-    known: derivatives (m,) of the weighted residual by some of the unknowns, taken as they are.
+    evaluations: steps at most, one simulation each, beside those for differences; gain: share of the sum of
+    squares; a step that gains less is the last one. known: derivatives (m,) of the weighted residual by some
+    of the unknowns, taken as they are, which makes it a rough fit; guess: such as are good enough to begin.
     """
     held = dict(fixed or {})
     low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
     scale = np.array([u.scale for u in unknowns])
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
 
-    last: dict[bytes, Array] = {}
+    @lru_cache(len(unknowns) + 2)
+    def simulated(x: tuple[float, ...]) -> Array:
+        return weighted(problem, {**held, **dict(zip((u.name for u in unknowns), x, strict=True))}, size)
 
     def residual(x: Array) -> Array:
-        named = {u.name: float(v) for u, v in zip(unknowns, x, strict=True)}
-        last.clear()
-        last[x.tobytes()] = weighted(problem, {**held, **named}, size)
-        return last[x.tobytes()]
-
-    def jacobian(x: Array) -> Array:
-        r, columns = last[x.tobytes()] if x.tobytes() in last else residual(x), []
-        for i, u in enumerate(unknowns):
-            if known and u.name in known:
-                columns.append(known[u.name])
-                continue
-            h = STEP * scale[i] * (1 if x[i] + STEP * scale[i] <= high[i] else -1)
-            columns.append((residual(x + h * np.eye(len(x))[i]) - r) / h)
-        return np.column_stack(columns)
+        return simulated(tuple(x.tolist()))
 
     if not unknowns:
         alone = residual(x0)
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
-    inside = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
-    found = least_squares(
-        residual, inside, jacobian, (low, high), x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=evaluations
-    )
-    slopes = np.asarray(found.jac)
-    covariance = sandwich(found.fun, slopes, scale, high - low)
-    return Fit(tuple(unknowns), found.x, covariance, found.fun, slopes, found.status > 0)
+    slopes = Slopes(residual, scale, high, [(known or {}).get(u.name) for u in unknowns])
+    x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
+    slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
+    x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, bool(known))
+    jacobian = slopes.at(x)
+    covariance = sandwich(residual(x), jacobian, scale, high - low)
+    return Fit(tuple(unknowns), x, covariance, residual(x), jacobian, converged)
+
+
+def _descended(
+    residual: Callable[[Array], Array], slopes: Slopes, x: Array, bounds: tuple[Array, Array], scale: Array,
+    evaluations: int, gain: float, rough: bool,
+) -> tuple[Array, bool]:  # fmt: skip
+    """Where steps from x end, and whether not broken off.
+
+    Along secants; there, but not of a rough fit, with derivatives by differences again, until they gain
+    little from the start.
+    """
+    left = evaluations
+    while True:
+        exact, before = slopes.exact, float(np.sum(residual(x) ** 2))
+        found = least_squares(
+            residual, x, slopes.at, bounds, x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left
+        )
+        x, left = found.x, left - found.nfev
+        little = 2 * found.cost > (1 - LITTLE) * before
+        if rough or (exact and little) or left <= 0:
+            break
+        slopes.by_differences(x)
+    if not (rough or slopes.exact or (exact and little)):
+        slopes.by_differences(x)
+    return x, found.status > 0
 
 
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:

@@ -87,8 +87,12 @@ class Problem:
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the identify part, (m, n_y)."""
-        runs = [run for run in self.record.runs if run.fit.any()]
-        return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in runs])
+        return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in self._identified])
+
+    @cached_property
+    def _identified(self) -> tuple[Run, ...]:
+        """Each run that is fitted, to its last sample that is: what comes after needs no simulation."""
+        return tuple(_cut(self.record.runs, 1.0))
 
     def start_states(self, run: Run) -> dict[str, tuple[float, float]]:
         """First guess of the free states and how far it can be wrong.

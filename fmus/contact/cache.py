@@ -32,6 +32,8 @@ def remembered(made_from: object, make: Callable[[], Arrays]) -> Arrays:
     if found is None:
         found = make()
         _save(key, found)
+    for values in found.values():
+        values.flags.writeable = False  # they are shared: who changed them would change later builds
     if len(_kept) >= KEPT and key not in _kept:
         _kept.pop(next(iter(_kept)))
     _kept[key] = found
