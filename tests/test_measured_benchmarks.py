@@ -85,33 +85,68 @@ def test_the_oscillator_is_linear(q: float, q_dot: float, u: float) -> None:
 def test_a_flow_over_the_rim_takes_nothing_from_both_tanks_together(
     x_1: float, x_2: float, u: float, flow: float
 ) -> None:
-    bare, _ = values(Tanks, x_1=x_1, x_2=x_2, u=u)
-    over, _ = values(Tanks, x_1=x_1, x_2=x_2, u=u, F_12_ext=flow)
+    bare, _ = values(Tanks, x_1_start=x_1, x_2=x_2, u=u)
+    over, _ = values(Tanks, x_1_start=x_1, x_2=x_2, u=u, F_12_ext=flow)
     assert sum(over.values()) == pytest.approx(sum(bare.values()), abs=1e-9)
-    assert over["x_1"] - bare["x_1"] == pytest.approx(flow, abs=1e-9)
+    assert over["rise"] - bare["rise"] == pytest.approx(flow, abs=1e-9)
 
 
-@given(positive, st.floats(20.0, 80.0), st.floats(20.0, 80.0), st.floats(20.0, 80.0))
-def test_the_tanks_rest_where_torricelli_says(u: float, c: float, k_1: float, k_2: float) -> None:
-    given_ = {"u": u, "c": c, "k_1": k_1, "k_2": k_2}
-    rates, _ = values(Tanks, x_1=(c * u / k_1) ** 2, x_2=(c * u / k_2) ** 2, **given_)
-    assert rates == pytest.approx({"x_1": 0.0, "x_2": 0.0}, abs=1e-9 * c * u)
+@given(positive, st.floats(20.0, 80.0), st.floats(20.0, 80.0), st.floats(0.1, 9.0))
+def test_the_tanks_rest_where_torricelli_says(u: float, c: float, k: float, start: float) -> None:
+    level = (c * u / k) ** 2
+    given_ = {"u": u, "c": c, "k": k, "x_1_start": start, "rise": level - start, "x_2": level}
+    rates, seen = values(Tanks, **given_)
+    assert rates == pytest.approx({"rise": 0.0, "x_2": 0.0}, abs=1e-9 * c * u)
+    assert seen["x_1"] == pytest.approx(level)
 
 
-@given(signed, signed, signed, signed)
-def test_the_drives_do_the_same_in_both_directions(a: float, b: float, twist: float, u: float) -> None:
-    x = {"omega_m": a, "omega": b, "twist": twist, "u": u}
-    rates, seen = values(ElectricDrives, **x)
-    mirrored, seen_mirrored = values(ElectricDrives, **{n: -v for n, v in x.items()})
-    assert {n: -v for n, v in mirrored.items()} == pytest.approx(rates, abs=1e-9)
-    assert seen_mirrored["speed"] == pytest.approx(seen["speed"])
-    assert seen["speed"] >= abs(b)
+@given(st.floats(0.0, 9.0), st.floats(-9.0, 0.0), positive, positive)
+def test_the_pump_does_not_suck(u: float, u_0: float, start: float, x_2: float) -> None:
+    rates, seen = values(Tanks, u=u, u_0=u_0, x_1_start=start, x_2=x_2)
+    off, _ = values(Tanks, u=0.0, x_1_start=start, x_2=x_2)
+    assert rates["rise"] >= off["rise"]
+    assert rates["rise"] == pytest.approx(off["rise"] + 50.0 * max(u + u_0, 0.0))
+    assert seen["x_1_dot"] == rates["rise"]
+    assert seen["x_2_dot"] == rates["x_2"]
+
+
+@given(signed, signed, signed, signed, positive)
+def test_the_drives_do_the_same_in_both_directions(
+    a: float, b: float, twist: float, u: float, speed: float
+) -> None:
+    x = {"omega_m": a, "omega": b, "twist": twist, "v": u / 2, "u": u}
+    rates, _ = values(ElectricDrives, **x, speed=speed)
+    mirrored, _ = values(ElectricDrives, **{n: -v for n, v in x.items()}, speed=speed)
+    assert mirrored["speed"] == pytest.approx(rates["speed"])
+    turned = {n: -v for n, v in mirrored.items() if n != "speed"}
+    assert turned == pytest.approx({n: v for n, v in rates.items() if n != "speed"}, abs=1e-9)
+
+
+@given(signed)
+def test_the_counter_of_the_drives_comes_to_rest_at_the_magnitude(omega: float) -> None:
+    rates, _ = values(ElectricDrives, omega=omega, speed=abs(omega))
+    assert rates["speed"] == pytest.approx(0.0, abs=0.11)  # the magnitude is rounded by 1e-3 over 0.01 s
 
 
 @given(st.floats(-200.0, 200.0))
 def test_without_friction_the_wheel_lags_its_set_speed_in_proportion(speed: float) -> None:
-    rates, _ = values(WheelDrive, omega_set=speed, omega=speed * 20 / 20.5)
-    assert rates["omega"] == pytest.approx(0.0, abs=1e-9 * 200 * 20)
+    rates, _ = values(WheelDrive, omega_set=speed, s_1=speed, omega=speed * 20 / 20.5)
+    still = dict.fromkeys(("omega", "s_1", "s_2", "s_3", "s_4"), 0.0)
+    assert {n: rates[n] for n in still} == pytest.approx(still, abs=1e-9 * 200 * 840)
+
+
+@pytest.mark.parametrize("T", [0.05, 0.15])
+def test_the_set_speed_of_the_wheel_arrives_after_the_dead_time(T: float) -> None:
+    model, made = compiled(WheelDrive)
+    x = np.array([s.start for s in model.of(State)])
+    p = [{"T": T, "K": 500.0, "b": 0.0}.get(q.name, q.start) for q in model.of(Parameter)]
+    names, dt, way = [s.name for s in model.of(State)], 1e-4, []
+    for _ in range(8000):
+        x = np.asarray(made.step(x, [100.0, 0.0], p, dt)[0]).ravel()
+        way.append(x[names.index("omega")])
+    late = np.sum(1 - np.array(way) / 100.0) * dt  # mean delay of a step: the area above its response
+    assert late == pytest.approx(T + 1 / 500, rel=0.01)
+    assert np.argmax(np.array(way) > 50.0) * dt == pytest.approx(T, rel=0.1)  # half way up, as it arrives
 
 
 @every

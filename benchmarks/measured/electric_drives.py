@@ -7,7 +7,7 @@ import casadi as cs
 
 from benchmarks.measured.benchmark import Benchmark, of_held
 from fmus.model import Model
-from fmus.variables import Expr, Input, Output, Parameter, State
+from fmus.variables import Expr, Input, Parameter, State
 
 STILL = 1e-3  # speed at which the magnitude is rounded, well below the counter's step
 
@@ -15,9 +15,9 @@ STILL = 1e-3  # speed at which the magnitude is rounded, well below the counter'
 class ElectricDrives(Model):
     """Speeds omega_m of the motors and omega of the pulley, which a belt couples by its stretch.
 
-    omega_m' = (gain u - omega_m) / tau - share w² twist + T_m, omega' = w² twist - d omega + T,
-    twist' = omega_m - omega, w = 2 pi f: both sides over their inertia. The pulley's sensor counts
-    pulses: it sees the magnitude alone.
+    omega_m' = (gain v - omega_m) / tau - share w² twist + T_m, omega' = w² twist - d omega + T,
+    twist' = omega_m - omega, w = 2 pi f: both sides over their inertia. tau_e v' = u - v is the motors'
+    current. The pulley's sensor counts pulses, for a while of tau_s: it sees the magnitude alone.
     """
 
     name = "ElectricDrives"
@@ -26,6 +26,8 @@ class ElectricDrives(Model):
     omega_m = State("rad/s", doc="speed of the motors, on the sensor's scale", nominal=1.0)
     omega = State("rad/s", doc="speed of the pulley, on the sensor's scale", nominal=1.0)
     twist = State("rad", doc="stretch of the belt", nominal=0.1)
+    v = State("V", doc="voltage that the motors' current has followed", nominal=1.0)
+    speed = State("rad/s", doc="speed as the pulse counter shows it, without its sign", nominal=1.0)
     phi_m = State("rad", doc="angle of the motors", nominal=1.0)
     phi = State("rad", doc="angle of the pulley", nominal=1.0)
     u = Input("V", doc="sum of the motors' voltages")
@@ -33,26 +35,25 @@ class ElectricDrives(Model):
     T_ext = Input("N.m", doc="port: torque on the pulley, of 1 kg.m2", nominal=10.0)
     gain = Parameter("rad/(V.s)", 3.0, doc="speed for each volt")
     tau = Parameter("s", 0.15, min=1e-3, doc="time constant of the motors")
+    tau_e = Parameter("s", 0.01, min=2e-3, doc="electrical time constant of the motors")
+    tau_s = Parameter("s", 0.01, min=2e-3, doc="time constant of the pulse counter")
     f = Parameter("Hz", 2.5, min=0.1, doc="frequency of the pulley on the held belt")
     share = Parameter("1", 1.0, min=0.0, doc="inertia of the pulley over that of the motors")
     d = Parameter("1/s", 3.0, min=0.0, doc="viscous friction of the pulley over its inertia")
-    speed = Output("rad/s", doc="speed as the pulse counter sees it, without its sign", nominal=1.0)
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
         belt = (2 * pi * m.f) ** 2 * m.twist
-        motors = (m.gain * m.u - m.omega_m) / m.tau - m.share * belt + m.T_m_ext
+        motors = (m.gain * m.v - m.omega_m) / m.tau - m.share * belt + m.T_m_ext
         return {
             "omega_m": motors,
             "omega": belt - m.d * m.omega + m.T_ext,
             "twist": m.omega_m - m.omega,
+            "v": (m.u - m.v) / m.tau_e,
+            "speed": (cs.sqrt(m.omega**2 + STILL**2) - m.speed) / m.tau_s,
             "phi_m": m.omega_m,
             "phi": m.omega,
         }
-
-    def outputs(m) -> dict[str, Expr]:
-        """See Model.outputs."""
-        return {"speed": cs.sqrt(m.omega**2 + STILL**2)}
 
 
 BENCHMARK = Benchmark(

@@ -3,27 +3,41 @@
 from pathlib import Path
 
 from benchmarks.measured.benchmark import Benchmark, of_held
+from fmus.effects.input_delay import BACK, OUT
 from fmus.model import Model
 from fmus.variables import Expr, Input, Parameter, State, rate
 
 
 class WheelDrive(Model):
-    """omega_dot = K (omega_set - omega) - b omega + F_ext: all over the inertia, which nothing here tells."""
+    """omega_dot = K (omega_set(t - T) - omega) - b omega + F_ext, over an inertia that nothing here tells.
+
+    T is the dead time of bus and controller, by Padé's approximation [3/4] as in `fmus.effects.input_delay`;
+    s_1 is the set speed through its denominator, s_2 to s_4 the derivatives of s_1 by t/T.
+    """
 
     name = "WheelDrive"
     step_size = 1e-3
 
     omega = State("rad/s", doc="speed of the motor", nominal=100.0)
     phi = State("rad", doc="angle of the motor", nominal=100.0)
+    s_1 = State("rad/s", doc="set speed on its way", nominal=100.0)
+    s_2 = State("rad/s", doc="its derivative by t/T", nominal=200.0)
+    s_3 = State("rad/s", doc="its second derivative by t/T", nominal=1e3)
+    s_4 = State("rad/s", doc="its third derivative by t/T", nominal=1e4)
     omega_set = Input("rad/s", doc="set speed")
     F_ext = Input("N.m", doc="port: torque on the motor, of 1 kg.m2", nominal=100.0)
     K = Parameter("1/s", 20.0, min=0.0, doc="gain of the controller over inertia")
     b = Parameter("1/s", 0.5, min=0.0, doc="viscous friction over inertia")
+    T = Parameter("s", 0.1, min=0.02, doc="dead time from the set speed to the controller")
     omega_dot = rate(omega, "rad/s2", "acceleration of the motor")
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
-        return {"omega": m.K * (m.omega_set - m.omega) - m.b * m.omega + m.F_ext, "phi": m.omega}
+        way = [m.s_1, m.s_2, m.s_3, m.s_4]
+        asked = sum(c * s for c, s in zip(OUT, way, strict=True))
+        last = BACK[0] * m.omega_set - sum(c * s for c, s in zip(BACK, way, strict=True))
+        late = {f"s_{i}": s / m.T for i, s in enumerate([*way[1:], last], 1)}
+        return {"omega": m.K * (asked - m.omega) - m.b * m.omega + m.F_ext, "phi": m.omega, **late}
 
 
 BENCHMARK = Benchmark(
