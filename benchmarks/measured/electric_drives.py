@@ -61,7 +61,7 @@ BENCHMARK = Benchmark(
     title="Coupled Electric Drives, PRBS",
     model=ElectricDrives,
     declaration=Path(__file__).with_suffix(".toml"),
-    files={"ced_prbs1.csv": of_held("motor_voltage_sum_V")},
+    files=dict.fromkeys(("ced_prbs1.csv", "ced_prbs3.csv"), of_held("motor_voltage_sum_V")),
     missing="dry friction of the drives",
     # hysteresis that slips within a small part of the motion is dry friction (Dahl's)
     known=frozenset(
