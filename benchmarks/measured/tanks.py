@@ -18,7 +18,7 @@ class Tanks(Model):
     Two tanks and outlets alike. Levels in volts of the sensor, both on one scale, and time in ks. A port is a
     flow: into either tank from outside, or into the upper out of the lower one beside the pipe. The pump does
     not suck. Of the upper tank, which nothing measures, the state is the rise since the start; the level
-    there is a parameter, since all records of the benchmark begin with the same one.
+    there is a parameter, since both records are taken to begin with the same one.
     """
 
     name = "Tanks"
