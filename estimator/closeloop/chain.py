@@ -2,20 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, hypotheses, ranked, to_the_end
-from estimator.closeloop.detect import LEVEL, Detection, detect
+from estimator.closeloop.detect import LEVEL, ONE_EFFECT, Detection, detect
+from estimator.closeloop.fit import Fit, loose
 from estimator.closeloop.freeform import free_form
 from estimator.closeloop.honesty import Honesty, honesty
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.moments import at_their_moments, moment
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.onset import onset, since
-from estimator.closeloop.pairs import try_pairs
+from estimator.closeloop.pairs import beside, try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.restarts import from_the_beginning
 from estimator.closeloop.screen import Promise, Screening, screen
@@ -94,6 +96,21 @@ class Screened:
         residual = self.screening.fit.residual
         return float(residual @ residual) - len(residual)
 
+    @property
+    def likeness(self) -> float:
+        """Share of what is beyond noise that one effect could explain, by linear regression."""
+        return max((p.gain for p in self.promises), default=0.0) / max(self.beyond_noise, 1.0)
+
+    @property
+    def open_to_form(self) -> bool:
+        """Whether the residual could be another form of the FMU, as it is like no effect."""
+        return self.problem.form_error > 0 and self.likeness < ONE_EFFECT
+
+    @cached_property
+    def came(self) -> tuple[float, Fit] | None:
+        """What set in during the record; see `onset`."""
+        return onset(self.problem, self.base, self.size)
+
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual."""
         return self.floor_known and any(
@@ -119,11 +136,14 @@ def trace(
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
-    likeness = max((p.gain for p in screened.promises), default=0.0) / max(screened.beyond_noise, 1.0)
+    sets_in = screened.open_to_form and screened.came is not None
     detection = stages.done(
         "detection",
-        lambda: detect(problem, base, noise, over_noise, regressors, likeness, np.random.default_rng(seed)),
-    )
+        lambda: detect(
+            problem, base, noise, over_noise, regressors, screened.likeness, sets_in,
+            np.random.default_rng(seed),
+        ),
+    )  # fmt: skip
     level = LEVEL / len(detection.figures)
     owed = stages.done(
         "honesty", lambda: honesty(problem, base, seen, change, size, level, np.random.default_rng(seed))
@@ -150,7 +170,10 @@ def _screened(
     tell(f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     screening = Screening(problem, base.fit, size, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
-    promises = screen(screening.fit, [((c,), g) for c, g in change])
+    # bounds that another form pushes against say nothing of effects
+    fit = screening.fit if problem.form_error > 0 else loose(screening.fit)
+    promises = screen(fit, [((c,), g) for c, g in change])
+    promises = [replace(p, start={**base.fit.theta, **p.start}) for p in promises]
     return Screened(problem, base, noise, size, screening, change, promises)
 
 
@@ -171,7 +194,7 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
     brief = stages.done("brief", lambda: briefly(problem, base, rest, size, jobs))
     brief = best_by_label([*faults, *brief])
     sudden: list[Promise] = []
-    if not faults and any(sets_in(h) for h in brief[:LEADING]):
+    if not faults and (s.open_to_form or any(sets_in(h) for h in brief[:LEADING])):
         tell("looking for what set in during the record")
         physical = [c for c, _ in single if not c.is_fault]
         sudden, more = stages.done("sudden", lambda: _sudden(s, physical, jobs))
@@ -193,6 +216,11 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
     tell("asking whether a simpler law would do")
     ones, twos = ranked(problem, singles, size), ranked(problem, pairs, size)
     ones, twos = stages.done("simpler", lambda: (_simplified(s, ones, jobs), _simplified(s, twos, jobs)))
+    if s.explained(ones[:1]):
+        tell("looking at what is left for a second effect")
+        least = ONE_EFFECT if problem.form_error > 0 else 0.0
+        more = stages.done("beside", lambda: beside(problem, base, ones[0], s.screening, single, least, jobs))
+        twos = ranked(problem, best_by_label([*twos, *more]), size)
     return ranked(problem, with_twins(ones, alike), size), twos
 
 
@@ -227,10 +255,9 @@ def _sudden(
     s: Screened, candidates: Sequence[Candidate], jobs: int
 ) -> tuple[list[Promise], list[Hypothesis]]:
     """What may have set in at a moment that shows, and brief fits of the leading ones."""
-    came = onset(s.problem, s.base, s.size)
-    if not came:
+    if not s.came:
         return [], []
-    promises = since(s.problem, came, candidates, s.size, jobs)
+    promises = since(s.problem, s.came, candidates, s.size, jobs)
     return promises, briefly(s.problem, s.base, promises[:SUDDEN], s.size, jobs, known=False)
 
 

@@ -14,7 +14,7 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-BRIEF, LONG = 6, 20  # steps of a fit to rank it, and to finish it
+BRIEF, LONG = 4, 20  # steps of a fit to rank it, and to finish it
 FINALISTS = 5
 GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
 ROUNDS, LAST = 4, 2  # of further LONG fits of the leading finalists, where they have not converged

@@ -44,12 +44,12 @@ class Detection:
 
 def detect(
     problem: Problem, base: Hypothesis, noise: Array, screened: Fit, regressors: Sequence[Array],
-    likeness: float, rng: np.random.Generator,
+    likeness: float, sets_in: bool, rng: np.random.Generator,
 ) -> Detection:  # fmt: skip
     """Test the base hypothesis' residual.
 
     screened: its fit as it was screened, residual over `noise`; regressors: changes (m, k) of that residual;
-    likeness: share of what it has beyond noise that one effect could explain, by linear regression.
+    likeness, sets_in: see `matters`.
     """
     runs = problem.record.runs
     fit_mask, test_mask = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "test"))
@@ -74,16 +74,19 @@ def detect(
         reference = references[name]
         p_values.append((1 + np.sum(reference >= value)) / (REPLICATES + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
-    return Detection(
-        min(1.0, len(p_values) * float(min(p_values))), figures, matters(problem, base, noise, likeness)
-    )
+    p_value = min(1.0, len(p_values) * float(min(p_values)))
+    return Detection(p_value, figures, matters(problem, base, noise, likeness, sets_in))
 
 
-def matters(problem: Problem, base: Hypothesis, noise: Array, likeness: float = 1.0) -> bool:
+def matters(
+    problem: Problem, base: Hypothesis, noise: Array, likeness: float = 1.0, sets_in: bool = False
+) -> bool:
     """Whether a held-out residual is too large to be left alone, in any output.
 
     Compared with the signal is what it has beyond noise, beyond what chance makes of that too. Where the
-    FMU's form leaves something open, less than that matters only if one effect could explain much of it.
+    FMU's form leaves something open, less than that matters only if one effect could explain much of it, or
+    if it sets in during the record, as no form does.
+    likeness: share of what is beyond noise that one effect could explain, by linear regression.
     """
     signal, rms = signal_size(problem), base.rms(problem)
     samples = sum(int(run.test.sum()) for run in problem.record.runs)
@@ -92,7 +95,7 @@ def matters(problem: Problem, base: Hypothesis, noise: Array, likeness: float = 
     large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
     telling = (beyond >= SHARE * signal) | (beyond >= BEYOND * noise)
     if problem.form_error > 0:
-        return bool(np.any(large) or (np.any(telling) and likeness >= ONE_EFFECT))
+        return bool(np.any(large) or (np.any(telling) and (sets_in or likeness >= ONE_EFFECT)))
     return bool(np.any(telling))
 
 

@@ -1,7 +1,7 @@
 """Fit unknowns by simulation error on the identify part, with bounds and standard errors."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -17,6 +17,7 @@ GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
 LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
 REFUSED = 1e6  # size of a residual where the FMU could not be run
 WIDE = 1e3  # scales within which an unknown without bounds lies
+HELD = 1e-2  # of an unknown's scale: one that comes so near to a bound is held by it
 BLOCKS = 30  # pieces of the record between which residuals count as independent
 
 
@@ -50,6 +51,19 @@ class Fit:
         """Standard errors by name."""
         deviation = np.sqrt(np.maximum(np.diag(self.covariance), 0))
         return {u.name: float(s) for u, s in zip(self.unknowns, deviation, strict=True)}
+
+
+def loose(fit: Fit) -> Fit:
+    """The fit without the unknowns that a bound holds back: what they could take over they have taken."""
+    low, high, scale = (np.array([getattr(u, key) for u in fit.unknowns]) for key in ("low", "high", "scale"))
+    free = np.flatnonzero(np.minimum(fit.values - low, high - fit.values) > HELD * scale)
+    return replace(
+        fit,
+        unknowns=tuple(fit.unknowns[i] for i in free),
+        values=fit.values[free],
+        covariance=fit.covariance[np.ix_(free, free)],
+        jacobian=fit.jacobian[:, free],
+    )
 
 
 def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
@@ -108,15 +122,16 @@ def _descended(
 ) -> tuple[Array, bool]:  # fmt: skip
     """Where steps from x end, and whether not broken off.
 
-    Along secants; there, but not of a rough fit, with derivatives by differences again, until they gain
-    little from the start.
+    Along secants; there with derivatives by differences again, until these gain little from the start. A
+    rough fit, with known derivatives that secants would not tell from the others, has differences throughout.
     """
     left = evaluations
     while True:
         exact, before = slopes.exact, float(np.sum(residual(x) ** 2))
         found = least_squares(
-            residual, x, slopes.at, bounds, x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left
-        )
+            residual, x, slopes.by_differences if rough else slopes.at, bounds,
+            x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,
+        )  # fmt: skip
         x, left = found.x, left - found.nfev
         little = 2 * found.cost > (1 - LITTLE) * before
         if rough or (exact and little) or left <= 0:
@@ -130,16 +145,18 @@ def _descended(
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:
     """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
 
-    Never below the covariance for white residuals of variance 1. width: (n,) between the bounds, which say
-    as much as a uniform distribution between them; without bounds that is WIDE scales, so that what has no
-    influence is not taken for certain.
+    Never below the covariance for white residuals of variance 1. Where the score of the whole does not
+    vanish, as at a bound that holds an unknown back, the step that it asks for counts as an error too.
+    width: (n,) between the bounds, which say as much as a uniform distribution between them; without bounds
+    that is WIDE scales, so that what has no influence is not taken for certain.
     """
     j = jacobian * scale
     inverse = pinvh(j.T @ j + np.diag(12 * (scale / np.minimum(width, WIDE * scale)) ** 2))
     scores = np.array(
         [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
     )
-    robust = inverse @ (scores.T @ scores) @ inverse
+    whole = scores.sum(axis=0)
+    robust = inverse @ (scores.T @ scores + np.outer(whole, whole)) @ inverse
     grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(inverse), 1e-300), 1.0))
     covariance: Array = inverse * np.outer(grown, grown) * np.outer(scale, scale)
     return covariance

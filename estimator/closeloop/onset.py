@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import mannwhitneyu
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, fitted
@@ -19,7 +20,8 @@ from estimator.record import Array
 
 EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
 BLOCKS = 50  # of the identify part whose residuals are compared
-TIMES = 3.0  # as large as any before is a residual that something new has made
+TIMES = 2.0  # the mean square of before: what something new has made of it
+CHANCE = 1e-5  # that the blocks after are ranked above those before
 ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
 LONGER = 2.0  # times that in the short fits
@@ -36,12 +38,9 @@ def onset(problem: Problem, base: Hypothesis, size: Array) -> tuple[float, Fit] 
     unknowns, found = base.fit.unknowns, []
     for early in EARLY if unknowns else ():
         before = fit(problem.beginning(early), unknowns, size)
-        rms = _blocks(problem, before, size)
-        first = int(early * BLOCKS)
-        new = rms > TIMES * rms[:first].max()
-        stays = [k for k in range(first, BLOCKS) if new[k] and np.mean(new[k:]) > 0.5]
-        if stays:
-            found.append((float(rms[: stays[0]].mean()), stays[0] / BLOCKS, before))
+        squares = _blocks(problem, before, size)
+        if (k := grown(squares, int(early * BLOCKS))) is not None:
+            found.append((float(np.sqrt(squares[:k]).mean()), k / BLOCKS, before))
     if not found:
         return None
     least = min(level for level, _, _ in found)
@@ -50,9 +49,23 @@ def onset(problem: Problem, base: Hypothesis, size: Array) -> tuple[float, Fit] 
 
 
 def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
-    """Root mean square of the weighted residual of each block of the identify part, (BLOCKS,)."""
+    """Mean square of the weighted residual of each block of the identify part, (BLOCKS,)."""
     residual = problem.identify_residual(before.theta) / size
-    return np.array([float(np.sqrt(np.mean(b**2))) for b in np.array_split(residual, BLOCKS)])
+    return np.array([float(np.mean(b**2)) for b in np.array_split(residual, BLOCKS)])
+
+
+def grown(squares: Array, first: int) -> int | None:
+    """The block from which on mean squares (n,) are larger than before, `first` at the earliest, or None.
+
+    Where their logarithms come in two levels, told apart both by size and by rank: by rank alone blocks that
+    move more would do, by size alone a single one.
+    """
+    logs = np.log(squares + 1e-300)
+    spread = {k: k * logs[:k].var() + (len(logs) - k) * logs[k:].var() for k in range(first, len(logs))}
+    k = min(spread, key=spread.__getitem__)
+    before, after = squares[:k], squares[k:]
+    chance = float(mannwhitneyu(after, before, alternative="greater").pvalue)
+    return k if after.mean() > TIMES * before.mean() and chance < CHANCE else None
 
 
 def since(

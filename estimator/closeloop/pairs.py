@@ -8,6 +8,7 @@ import numpy as np
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, cost, finished, hypotheses
 from estimator.closeloop.fit import Fit
+from estimator.closeloop.grouped import grouped_fit
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, Screening, built, screen
 from estimator.record import Array
@@ -15,6 +16,7 @@ from estimator.record import Array
 PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
 FINALISTS = 2  # of them, fitted to the end
+BESIDE = 40.0  # gain of a second effect; of some hundred laws and places noise makes less than half of it
 SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
 
 Changes = Sequence[tuple[Candidate, Array]]
@@ -49,6 +51,28 @@ def try_pairs(
         Promise(tuple(c for c in h.candidates if c not in idle(h)), 0.0, h.fit.theta) for h in left.values()
     ]
     return kept, finished(problem, base.fit.unknowns, freed, size, jobs)
+
+
+def beside(
+    problem: Problem, base: Hypothesis, best: Hypothesis, screening: Screening, change: Changes, least: float,
+    jobs: int,
+) -> list[Hypothesis]:  # fmt: skip
+    """Fitted pairs of a hypothesis that explains with what its residual is still like, without idle members.
+
+    screening, change: of the base, whose linear picture is near enough to see whether there is anything;
+    least: share of what is left beyond noise that a second effect has to explain.
+    """
+    fit = grouped_fit(best.fit, len(screening.size), screening.group)
+    left = float(fit.residual @ fit.residual) - len(fit.residual)
+    own = {c.label for c in best.candidates}
+    promises = screen(fit, [((c,), g) for c, g in change if c.label not in own])
+    first = {p.label: p for p in reversed(promises) if p.gain > max(BESIDE, least * left)}
+    partners = sorted(first.values(), key=lambda p: -p.gain)[:PROMISES]
+    pairs = [
+        Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in partners
+    ]
+    found = hypotheses(problem, base, pairs, screening.size, jobs, FINALISTS) if pairs else []
+    return [h for h in found if not idle(h)]
 
 
 def _from_base(base: Fit, physical: Changes) -> list[Promise]:

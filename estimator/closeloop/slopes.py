@@ -20,7 +20,6 @@ class Slopes:
         self, residual: Callable[[Array], Array], scale: Array, high: Array, known: Sequence[Array | None]
     ) -> None:
         self._residual, self._scale, self._high, self._known = residual, scale, high, list(known)
-        self._free = np.array([column is None for column in known])
         self._last: tuple[Array, Array, Array] | None = None  # place, residual and Jacobian there
         self.exact = False  # at the last place by differences alone
 
@@ -42,7 +41,7 @@ class Slopes:
         if self._last is None:
             return self.by_differences(x)
         before, r_before, jacobian = self._last
-        step = np.where(self._free, (x - before) / self._scale, 0.0)
+        step = (x - before) / self._scale
         if (length := float(step @ step)) > 0:
             r = self._residual(x)
             missed = r - r_before - jacobian @ (x - before)

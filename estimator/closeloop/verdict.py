@@ -6,12 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from estimator.closeloop.compare import Hypothesis, beats, lead
+from estimator.closeloop.compare import Hypothesis, beats, cost, lead
 from estimator.closeloop.detect import Detection, signal_size
-from estimator.closeloop.pairs import idle
+from estimator.closeloop.pairs import BESIDE, idle
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.simpler import limits
 from estimator.record import Array, BoolArray
+from fmus.effects import EFFECTS
 
 Verdict = Literal[
     "no_discrepancy",
@@ -52,9 +53,9 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
     """Whether a hypothesis accounts for the discrepancy on the held-out part.
 
     Outputs with declared noise must come down to it, or nearly so; the others must lose most of their
-    variance. Every amplitude must be clear of zero, and the whole better than without.
+    variance. Of several effects every one must be clear of zero, and the whole better than without.
     """
-    if idle(h) or lead(problem, h, base, size)[0] < WON:
+    if (len(h.candidates) > 1 and idle(h)) or lead(problem, h, base, size)[0] < WON:
         return False
     declared = ~np.isnan(problem.record.noise_std)
     squares = [
@@ -149,10 +150,12 @@ def judge(
         h for h in pairs if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
     ]
     if better and (not good or beats(problem, better[0], good[0], size)):
-        members = equivalent(problem, better[0], better, size)
-        return _named(members, "several")
+        members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
+        return _named(members, "several") if members else _curve(better[0])
     if good:
         members = equivalent(problem, good[0], good, size)
+        if problem.form_error == 0 and any(outgrown(m, h) for m in members for h in good):
+            return _curve(members[0])
         return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
     best = singles[0].label if singles else "none"
     return Judgement(
@@ -163,6 +166,30 @@ def judge(
 def needed(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis], size: Array) -> bool:
     """Whether a pair is better than the best single hypothesis, so that neither member is idle."""
     return not singles or beats(problem, pair, singles[0], size)
+
+
+def outgrown(m: Hypothesis, h: Hypothesis) -> bool:
+    """Whether m, a limit of h that held-out data prefer, leaves what h could explain of the identify part.
+
+    A right law gains alike on both parts; where the richer one gains on one alone, both are wrong.
+    """
+    return becomes(h, m) and cost(m) - cost(h) > BESIDE
+
+
+def one_curve(h: Hypothesis) -> bool:
+    """Whether it has two laws over the same motion at one place: their sum is a curve, and any has such."""
+    kinds = [(c.location, EFFECTS[c.kind].over) for c in h.candidates if c.kind in EFFECTS]
+    laws = [(at, over) for at, over in kinds if over]
+    return len(set(laws)) < len(laws)
+
+
+def _curve(h: Hypothesis) -> Judgement:
+    c = next(c for c in h.candidates if c.kind in EFFECTS)
+    over = EFFECTS[c.kind].over or "motion"
+    reason = (
+        f"a force over the {over} at {c.location} that follows no law of the library; nearest was {h.label}"
+    )
+    return Judgement("unexplained", (), reason)
 
 
 def _named(members: Sequence[Hypothesis], verdict: Verdict) -> Judgement:

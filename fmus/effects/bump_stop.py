@@ -16,6 +16,7 @@ class BumpStop(ForceLaw):
     """F = -k max(q - gap, 0) - k min(q + gap, 0); side = 1 or -1 leaves the stop above or below alone."""
 
     kind = "bump_stop"
+    over = "displacement"
     source = "piecewise linear spring, Shaw and Holmes, Journal of Sound and Vibration 90 (1983), 129-155"
     amplitudes = ("k",)
     becomes = ("stiffness_change",)

@@ -16,6 +16,7 @@ class CoulombFriction(ForceLaw):
     """F = -F_c tanh(v / v_s); v_s rounds the step at zero velocity."""
 
     kind = "coulomb_friction"
+    over = "velocity"
     source = "Olsson et al., European Journal of Control 4 (1998), 176-195; the step rounded by tanh"
     amplitudes = ("F_c",)
     becomes = ("viscous_damping",)  # where it is all rounded

@@ -11,6 +11,7 @@ class CubicStiffness(ForceLaw):
     """F = -k_3 q^3."""
 
     kind = "cubic_stiffness"
+    over = "displacement"
     source = "Duffing's spring, Kovacic and Brennan, The Duffing Equation (2011)"
     amplitudes = ("k_3",)
     places = ("rests",)

@@ -11,6 +11,7 @@ class DampingChange(ComponentEffect):
     """b (1 + change) from t0 on; half is left at change = -0.5."""
 
     kind = "damping_change"
+    over = "velocity"
     source = (
         "the multiplicative parametric fault, Isermann, Fault-Diagnosis Systems (2006); of railway "
         "suspensions: Bruni et al., Vehicle System Dynamics 49 (2011), 1021-1072"

@@ -16,6 +16,7 @@ class FreePlay(ForceLaw):
     """F = k clip(q, -gap, gap); what a spring of stiffness k lacks within a clearance of 2 gap."""
 
     kind = "free_play"
+    over = "displacement"
     source = (
         "dead zone of a backlash, Nordin and Gutman, Automatica 38 (2002), 1633-1649: the spring's "
         "force k q becomes k (q - clip(q, -gap, gap)). What is lost is this law; k of the whole spring "

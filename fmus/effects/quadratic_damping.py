@@ -13,6 +13,7 @@ class QuadraticDamping(ForceLaw):
     """F = -c |v| v."""
 
     kind = "quadratic_damping"
+    over = "velocity"
     source = "Inman, Engineering Vibration (2014) (velocity-squared damping)"
     amplitudes = ("c",)
     c = Parameter("{F}.s2/{q}2", min=0.0, doc="drag coefficient")

@@ -11,6 +11,7 @@ class StiffnessChange(ComponentEffect):
     """k (1 + change) from t0 on; half is left at change = -0.5."""
 
     kind = "stiffness_change"
+    over = "displacement"
     source = (
         "the multiplicative parametric fault, Isermann, Fault-Diagnosis Systems (2006); of railway "
         "suspensions: Bruni et al., Vehicle System Dynamics 49 (2011), 1021-1072"

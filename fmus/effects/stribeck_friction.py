@@ -17,6 +17,7 @@ class StribeckFriction(ForceLaw):
     """F = -(F_c + F_b exp(-(v / v_b)^2)) tanh(v / v_s); v_s rounds the step at zero velocity."""
 
     kind = "stribeck_friction"
+    over = "velocity"
     source = "Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994), 1083-1138; exponent 2"
     amplitudes = ("F_c", "F_b")
     becomes = ("coulomb_friction", "viscous_damping")

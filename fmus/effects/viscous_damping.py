@@ -11,6 +11,7 @@ class ViscousDamping(ForceLaw):
     """F = -c v."""
 
     kind = "viscous_damping"
+    over = "velocity"
     source = "Inman, Engineering Vibration (2014)"
     amplitudes = ("c",)
     c = Parameter("{F}.s/{q}", min=0.0, doc="damping coefficient")

@@ -1,0 +1,204 @@
+"""Derivatives along secants, unknowns at bounds, and what is left once an effect explains."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from estimator.closeloop import pairs
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.fit import Fit, fit, loose, sandwich
+from estimator.closeloop.onset import grown
+from estimator.closeloop.pairs import BESIDE, beside
+from estimator.closeloop.problem import Unknown
+from estimator.closeloop.slopes import Slopes
+from estimator.closeloop.verdict import one_curve, outgrown
+from fmus.effects import EFFECTS
+
+# ---- derivatives along secants
+
+
+class Curved:
+    """An oscillation with unknown size, damping and frequency, and how often it was simulated."""
+
+    def __init__(self, truth: np.ndarray, noise: np.ndarray) -> None:
+        self.t, self.count = np.linspace(0.0, 10.0, len(noise)), 0
+        self.y = self.simulate(truth) + noise
+
+    def simulate(self, x: np.ndarray) -> np.ndarray:
+        return x[0] * np.exp(-x[1] * self.t) * np.sin(x[2] * self.t)
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        self.count += 1
+        return (self.y - self.simulate(np.array(list(theta.values()))))[:, None]
+
+
+NAMES = (
+    Unknown("A", 1.0, 0.0, 9.0, 0.1),
+    Unknown("d", 0.1, 0.0, 1.0, 0.02),
+    Unknown("w", 3.0, 2.0, 4.0, 0.1),
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.8, 1.3), st.floats(0.05, 0.2), st.floats(2.9, 3.1), st.integers(0, 99))
+def test_a_fit_along_secants_ends_where_no_direction_gains(size, damping, speed, seed):
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(2000)
+    asked = Curved(np.array([size, damping, speed]), noise)
+    found = fit(asked, NAMES, np.array([0.1]))
+    assert found.converged
+    score = found.jacobian.T @ found.residual
+    assert np.all(np.abs(score) * np.sqrt(np.diag(found.covariance)) < 0.2)  # of a standard error
+    h = 1e-6 * np.eye(3)
+    exact = -np.column_stack([asked.simulate(found.values + d) - asked.simulate(found.values - d) for d in h])
+    exact /= 2e-6 * 0.1
+    assert_allclose(found.jacobian, exact, atol=0.03 * np.abs(exact).max())
+
+
+def test_secants_spare_simulations():
+    asked = Curved(np.array([1.2, 0.12, 3.05]), 0.1 * np.random.default_rng(0).standard_normal(2000))
+    fit(asked, NAMES, np.array([0.1]), gain=1e-9)
+    assert asked.count < 20  # with differences at every step of the same way 6 times 4
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=6, max_size=6))
+def test_a_carried_jacobian_keeps_to_the_last_step(moves):
+    a = np.arange(12.0).reshape(4, 3) - 5.0
+
+    def residual(x):
+        return a @ x + 0.1 * (a @ x) ** 2
+
+    slopes = Slopes(residual, np.array([1.0, 2.0, 0.5]), np.full(3, np.inf), [None] * 3)
+    x = np.zeros(3)
+    slopes.by_differences(x)
+    for step in np.array(moves).reshape(2, 3):
+        before, x = x, x + step
+        jacobian = slopes.at(x)
+        if np.abs(step).max() > 1e-6:
+            assert_allclose(jacobian @ step, residual(x) - residual(before), atol=1e-6, rtol=1e-6)
+            assert not slopes.exact
+    slopes.by_differences(x)
+    assert slopes.exact
+
+
+def test_known_columns_stay():
+    given_column = np.full(4, 7.0)
+    slopes = Slopes(lambda x: np.full(4, x.sum()), np.ones(2), np.full(2, np.inf), [given_column, None])
+    assert_allclose(slopes.by_differences(np.zeros(2)), [[7.0, 1.0]] * 4)
+
+
+# ---- bounds
+
+
+def at_a_bound(value: float) -> Fit:
+    unknowns = (Unknown("held", 0.0, 0.0, 1.0, 0.1), Unknown("free", 0.0, -np.inf, np.inf, 1.0))
+    j = np.random.default_rng(0).standard_normal((300, 2))
+    return Fit(unknowns, np.array([value, 3.0]), np.eye(2), j @ np.array([2.0, 0.0]), j)
+
+
+def test_what_a_bound_holds_back_is_no_more_free():
+    assert [u.name for u in loose(at_a_bound(1.0)).unknowns] == ["free"]
+    left = loose(at_a_bound(0.0))
+    assert left.jacobian.shape == (300, 1)
+    assert left.theta == {"free": 3.0}
+    assert loose(at_a_bound(0.5)).theta == at_a_bound(0.5).theta
+
+
+@given(st.floats(0.0, 50.0))
+def test_what_a_bound_holds_back_counts_as_an_error(pull):
+    """Two unknowns that act alike, one held by a bound: the other one is off by what that one lacks."""
+    rng = np.random.default_rng(1)
+    a, noise = rng.standard_normal(3000), rng.standard_normal(3000)
+    j = np.column_stack([a, 0.8 * a + 0.6 * rng.standard_normal(3000)])
+    best = noise - j @ np.linalg.lstsq(j, noise, rcond=None)[0]
+    covariance = sandwich(best + j @ np.array([pull, 0.0]), j, np.ones(2), np.full(2, np.inf))
+    assert np.sqrt(covariance[0, 0]) >= 0.99 * pull
+    assert np.sqrt(covariance[1, 1]) < 0.1 + 0.05 * pull
+
+
+# ---- what sets in
+
+
+@given(st.integers(6, 44), st.floats(3.0, 50.0), st.integers(0, 99))
+def test_growth_is_dated(k, times, seed):
+    squares = np.random.default_rng(seed).chisquare(40, 50) / 40
+    assert grown(squares, 5) is None
+    squares[k:] *= times
+    assert grown(squares, 5) == pytest.approx(k, abs=1)
+
+
+def test_a_single_burst_does_not_set_in():
+    squares = np.ones(50) + 0.01 * np.arange(50) % 0.05
+    squares[30] = 400.0
+    assert grown(squares, 5) is None
+
+
+# ---- second effects
+
+
+def one(kind: str, location: str = "wheel") -> Candidate:
+    return Candidate(kind, location, (Unknown(f"{kind}_{location}_c", 0.0, -np.inf, np.inf, 1.0),))
+
+
+def several(*kinds: tuple[str, str], squares: float = 100.0) -> Hypothesis:
+    candidates = tuple(one(*kind) for kind in kinds)
+    unknowns = tuple(u for c in candidates for u in c.unknowns)
+    n = len(unknowns)
+    residual = np.full(100, np.sqrt(squares / 100))
+    return Hypothesis(candidates, Fit(unknowns, np.ones(n), np.eye(n), residual, np.zeros((100, n))), ())
+
+
+@pytest.mark.parametrize(
+    ("kinds", "curve"),
+    [
+        ((("coulomb_friction", "wheel"), ("quadratic_damping", "wheel")), True),
+        ((("coulomb_friction", "wheel"), ("quadratic_damping", "roller")), False),
+        ((("coulomb_friction", "wheel"), ("constant_force", "wheel")), False),
+        ((("viscous_damping", "wheel"), ("cubic_stiffness", "wheel")), False),
+        ((("bump_stop", "wheel"), ("cubic_stiffness", "wheel")), True),
+        ((("sensor_gain", "wheel"), ("sensor_bias", "wheel")), False),
+    ],
+)
+def test_two_laws_of_one_motion_at_one_place_are_a_curve(kinds, curve):
+    assert one_curve(several(*kinds)) is curve
+
+
+@pytest.mark.parametrize("kind", sorted(k for k, e in EFFECTS.items() if e.over))
+def test_a_law_and_its_limits_are_over_the_same_motion(kind):
+    assert {EFFECTS[other].over for other in EFFECTS[kind].becomes} <= {EFFECTS[kind].over}
+
+
+def test_a_law_is_outgrown_where_a_richer_one_gains_much_more_than_chance():
+    simple = several(("coulomb_friction", "wheel"), squares=500.0)
+    for gain, expected in ((0.0, False), (BESIDE - 1, False), (BESIDE + 1, True)):
+        assert outgrown(simple, several(("stribeck_friction", "wheel"), squares=500.0 - gain)) is expected
+        assert not outgrown(simple, several(("stribeck_friction", "roller"), squares=500.0 - gain))
+
+
+class Seen:
+    """A screening of white noise; see Screening."""
+
+    size, group = np.ones(1), 1
+
+
+@pytest.mark.parametrize(
+    ("second", "least", "asked"),
+    [(0.0, 0.0, []), (4.0, 0.0, []), (15.0, 0.0, ["viscous_damping@roller"]), (15.0, 0.99, [])],
+)
+def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch, second, least, asked):
+    rng = np.random.default_rng(3)
+    laws = [one(kind, at) for kind in ("viscous_damping", "cubic_stiffness") for at in ("wheel", "roller")]
+    change = [(c, rng.standard_normal((4000, 1))) for c in laws]
+    best = one("viscous_damping", "wheel")
+    g = {c.label: column[:, 0] / np.linalg.norm(column) for c, column in change}
+    residual = rng.standard_normal(4000) - second * g["viscous_damping@roller"]
+    found = Fit(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
+    fitted = []
+    monkeypatch.setattr(pairs, "hypotheses", lambda _p, _b, promises, *_: fitted.extend(promises) or [])
+    beside(None, None, Hypothesis((best,), found, ()), Seen(), change, least, 1)
+    assert [p.candidates[1].label for p in fitted] == asked
+    assert all(p.candidates[0] is best for p in fitted)
