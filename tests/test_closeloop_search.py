@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -224,6 +225,7 @@ class Line:
     t: np.ndarray
     y: np.ndarray
     builder: None = None
+    record = SimpleNamespace(noise_std=np.array([0.1]))
 
     def identify_residual(self, theta):
         return (self.y - theta["a"] * self.t)[:, None]

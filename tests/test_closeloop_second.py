@@ -1,6 +1,7 @@
 """Derivatives along secants, unknowns at bounds, and what is left once an effect explains."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,8 @@ class Curved:
 
     def simulate(self, x: np.ndarray) -> np.ndarray:
         return x[0] * np.exp(-x[1] * self.t) * np.sin(x[2] * self.t)
+
+    record = SimpleNamespace(noise_std=np.array([0.1]))
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         self.count += 1
@@ -123,12 +126,13 @@ def test_what_a_bound_holds_back_counts_as_an_error(pull):
 # ---- what sets in
 
 
-@given(st.integers(6, 44), st.floats(3.0, 50.0), st.integers(0, 99))
+@given(st.integers(6, 44), st.floats(12.0, 50.0), st.integers(0, 99))
 def test_growth_is_dated(k, times, seed):
     squares = np.random.default_rng(seed).chisquare(40, 50) / 40
     assert grown(squares, 5) is None
     squares[k:] *= times
     assert grown(squares, 5) == pytest.approx(k, abs=1)
+    assert grown(squares, 5, 2 * times) is None
 
 
 def test_a_single_burst_does_not_set_in():

@@ -33,6 +33,7 @@ SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside
 FAULTS = 4  # faults of sensors that are fitted
 LIKELY = 0.5  # of what is beyond noise: faults that could explain so much are fitted before all else
 RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain less are no rivals, but
+SLIGHT = 2.0  # times the mean square of before: what sets in where all is small, see onset
 PLACEBOS = 3  # of them, so that there is a best wrong one
 
 Tell = Callable[[str], None]
@@ -109,7 +110,7 @@ class Screened:
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
         """What set in during the record; see `onset`."""
-        return onset(self.problem, self.base, self.size)
+        return onset(self.problem, self.base, self.size, *([SLIGHT] if self.open_to_form else []))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual."""

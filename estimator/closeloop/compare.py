@@ -92,9 +92,7 @@ def hypothesis(
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
-    found = fit(
-        here, [*unknowns, *own], size, promise.start, evaluations=evaluations, known=known, guess=guess
-    )
+    found = fit(here, [*unknowns, *own], size, promise.start, None, evaluations, known, guess)
     try:
         residuals = here.residuals(found.theta)
     except FmuError:

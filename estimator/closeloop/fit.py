@@ -14,6 +14,7 @@ from estimator.record import Array
 from fmus.host.fmu import FmuError
 
 GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
+NEAR = 5.0  # mean square, in units of noise, from which down derivatives are carried along
 LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
 REFUSED = 1e6  # size of a residual where the FMU could not be run
 WIDE = 1e3  # scales within which an unknown without bounds lies
@@ -90,7 +91,7 @@ def fit(
 
     evaluations: steps at most, one simulation each, beside those for differences; gain: share of the sum of
     squares; a step that gains less is the last one. known: derivatives (m,) of the weighted residual by some
-    of the unknowns, taken as they are, which makes it a rough fit; guess: such as are good enough to begin.
+    of the unknowns, taken as they are; guess: such as are good enough to begin.
     """
     held = dict(fixed or {})
     low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
@@ -110,7 +111,10 @@ def fit(
     slopes = Slopes(residual, scale, high, [(known or {}).get(u.name) for u in unknowns])
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
-    x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, bool(known))
+    floor_known = not np.isnan(problem.record.noise_std).any()
+    x, converged = _descended(
+        residual, slopes, x, (low, high), scale, evaluations, gain, floor_known and not known
+    )
     jacobian = slopes.at(x)
     covariance = sandwich(residual(x), jacobian, scale, high - low)
     return Fit(tuple(unknowns), x, covariance, residual(x), jacobian, converged)
@@ -118,26 +122,27 @@ def fit(
 
 def _descended(
     residual: Callable[[Array], Array], slopes: Slopes, x: Array, bounds: tuple[Array, Array], scale: Array,
-    evaluations: int, gain: float, rough: bool,
+    evaluations: int, gain: float, secants: bool,
 ) -> tuple[Array, bool]:  # fmt: skip
     """Where steps from x end, and whether not broken off.
 
-    Along secants; there with derivatives by differences again, until these gain little from the start. A
-    rough fit, with known derivatives that secants would not tell from the others, has differences throughout.
+    With derivatives by differences throughout while the way is far; near the end along secants, and there by
+    differences again, until these gain little from the start.
     """
     left = evaluations
     while True:
         exact, before = slopes.exact, float(np.sum(residual(x) ** 2))
+        near = secants and before < NEAR * len(residual(x))
         found = least_squares(
-            residual, x, slopes.by_differences if rough else slopes.at, bounds,
+            residual, x, slopes.at if near else slopes.by_differences, bounds,
             x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,
         )  # fmt: skip
         x, left = found.x, left - found.nfev
         little = 2 * found.cost > (1 - LITTLE) * before
-        if rough or (exact and little) or left <= 0:
+        if not near or (exact and little) or left <= 0:
             break
         slopes.by_differences(x)
-    if not (rough or slopes.exact or (exact and little)):
+    if near and not (slopes.exact or (exact and little)):
         slopes.by_differences(x)
     return x, found.status > 0
 

@@ -20,7 +20,7 @@ from estimator.record import Array
 
 EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
 BLOCKS = 50  # of the identify part whose residuals are compared
-TIMES = 2.0  # the mean square of before: what something new has made of it
+TIMES = 9.0  # the mean square of before: what something new has made of it
 CHANCE = 1e-5  # that the blocks after are ranked above those before
 ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
@@ -30,16 +30,17 @@ GENTLE = 0.3  # of the amplitudes that the linear picture asks for: the other st
 GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
 
 
-def onset(problem: Problem, base: Hypothesis, size: Array) -> tuple[float, Fit] | None:
+def onset(problem: Problem, base: Hypothesis, size: Array, times: float = TIMES) -> tuple[float, Fit] | None:
     """Share of the identify part after which the residual is another, and the FMU's fit to what was before.
 
-    None where there is no such moment, or where nothing is to be calibrated.
+    times: as large its mean square has to be. None where there is no such moment, or where nothing is to be
+    calibrated.
     """
     unknowns, found = base.fit.unknowns, []
     for early in EARLY if unknowns else ():
         before = fit(problem.beginning(early), unknowns, size)
         squares = _blocks(problem, before, size)
-        if (k := grown(squares, int(early * BLOCKS))) is not None:
+        if (k := grown(squares, int(early * BLOCKS), times)) is not None:
             found.append((float(np.sqrt(squares[:k]).mean()), k / BLOCKS, before))
     if not found:
         return None
@@ -54,8 +55,8 @@ def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
     return np.array([float(np.mean(b**2)) for b in np.array_split(residual, BLOCKS)])
 
 
-def grown(squares: Array, first: int) -> int | None:
-    """The block from which on mean squares (n,) are larger than before, `first` at the earliest, or None.
+def grown(squares: Array, first: int, times: float = TIMES) -> int | None:
+    """The block from which on mean squares (n,) are so many times larger, `first` at the earliest, or None.
 
     Where their logarithms come in two levels, told apart both by size and by rank: by rank alone blocks that
     move more would do, by size alone a single one.
@@ -65,7 +66,7 @@ def grown(squares: Array, first: int) -> int | None:
     k = min(spread, key=spread.__getitem__)
     before, after = squares[:k], squares[k:]
     chance = float(mannwhitneyu(after, before, alternative="greater").pvalue)
-    return k if after.mean() > TIMES * before.mean() and chance < CHANCE else None
+    return k if after.mean() > times * before.mean() and chance < CHANCE else None
 
 
 def since(

@@ -93,7 +93,11 @@ def _grown(
     for part, evaluations in parts:
         share = before + (1 - before) * part
         found = hypothesis(
-            problem.beginning(share), unknowns, replace(promise, start=start), size, evaluations
+            problem.beginning(share),
+            unknowns,
+            replace(promise, start=start),
+            size,
+            evaluations,
         )
         if found is None:
             return best

@@ -30,6 +30,7 @@ CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residu
 FORM_EXPLAINED = 0.95  # share of the variance beyond the noise, where the FMU's form leaves something open
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
+FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
 
@@ -94,20 +95,23 @@ def _reached_in_form(problem: Problem, before: Array, after: Array, noise: Array
 def equivalent(
     problem: Problem, best: Hypothesis, others: Sequence[Hypothesis], size: Array
 ) -> list[Hypothesis]:
-    """The class of the best hypothesis: those that the held-out data do not tell from it.
+    """The class of the best hypothesis: those that the held-out data do not tell from it, nor the others.
 
+    Where the FMU's form leaves something open, what the best one leaves is no measure of a small difference.
     A simpler law that it becomes at a limit of its shape is told from it only where every further unknown is
     worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
     simpler one stays.
     """
-    members = [best]
+    members, alike = [best], SAME * -float(best.scores(problem, size).sum())
+    if problem.form_error > 0:
+        alike = max(alike, FORM * float(np.sum((best.held_out(problem) / size) ** 2 - 1)) / 2)
     for h in others:
         if h is best:
             continue
         mean, _ = lead(problem, best, h, size)
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
-        close = mean < max(price, SAME * -float(best.scores(problem, size).sum()))
-        if close or not beats(problem, best, h, size):
+        told = beats(problem, best, h, size) or cost(h) - cost(best) > max(BESIDE, SAME * cost(best))
+        if mean < max(price, alike) or not told:
             members.append(h)
     return [h for h in members if not any(becomes(h, other) for other in members)]
 
