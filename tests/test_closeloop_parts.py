@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop import sensors
 from estimator.closeloop.fit import Fit, fit, sandwich
+from estimator.closeloop.levers import Course, shifts
 from estimator.closeloop.missing_force import missing_forces
 from estimator.closeloop.noise import correlation_time, noise_floor
 from estimator.closeloop.problem import Problem, Unknown
@@ -20,6 +21,7 @@ from estimator.record import Record, Run
 from fmus.drive.model import Drive
 from fmus.effects.spectrum import orders
 from fmus.export.hypotheses import ForeignBuilder
+from fmus.export.outside import around
 from fmus.export.pythonfmu import build_python
 from fmus.host.description import PortNames
 
@@ -216,3 +218,18 @@ def test_screening_projects_out_what_calibration_can_explain() -> None:
     assert ranked[0].candidates == (other,)
     assert_allclose(ranked[0].start["b"], -3.0, rtol=0.01)
     assert_allclose(ranked[1].gain, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("rate", [20.0, 50.0, 100.0])
+def test_a_short_delay_is_followed_at_any_sampling_rate(drive: ForeignBuilder, rate: float) -> None:
+    made = around(drive.outside(), [("input_delay", "F")])
+    t = np.arange(500) / rate
+    given = np.zeros((len(t), len(made.given)))
+    given[:, made.given.index("F")] = np.sin(t)
+    course = Course(t, np.zeros((len(t), 2)), given, np.zeros(len(t)))
+    named = {p.name: p.start for p in made.parameters}
+    [delay] = [name for name in named if name.endswith("_T")]
+    on = {name: 1.0 for name in named if name.endswith("_share")}
+    moved = shifts(made, course, {**named, **on, delay: 0.03})["F"]
+    settled = t > 1
+    assert_allclose(moved[settled], (np.sin(t - 0.03) - np.sin(t))[settled], atol=2e-3)

@@ -211,7 +211,7 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
         tell("trying pairs of effects")
         alone = singles
         pairs, freed = stages.done(
-            "pairs", lambda: try_pairs(problem, base, s.screening.fit, alone, single, size, jobs)
+            "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, size, jobs)
         )
         singles = best_by_label([*singles, *freed])
     tell("asking whether a simpler law would do")

@@ -1,7 +1,7 @@
 """Joint fits of hypotheses and their comparison on data that no fit has seen."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -30,12 +30,14 @@ TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts a
 class Hypothesis:
     """A set of candidates fitted jointly with the calibrated parameters.
 
-    residuals: measured minus simulated of each run (N, n_y), whole record, free run.
+    residuals: measured minus simulated of each run (N, n_y), whole record, free run. worth: of a candidate,
+    by its label, what the sum of squares grows by without it, all else fitted again; where it was tried.
     """
 
     candidates: tuple[Candidate, ...]
     fit: Fit
     residuals: tuple[Array, ...]
+    worth: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
     def theta(self) -> dict[str, float]:
@@ -64,7 +66,11 @@ class Hypothesis:
         return np.array([-0.5 * b.sum() for b in np.array_split(squares, BLOCKS)])
 
     def significance(self) -> list[float]:
-        """Size of each candidate's amplitudes over their standard error; infinite where they are fixed."""
+        """Size of each candidate's amplitudes over their standard error; infinite where they are fixed.
+
+        Where more is known, the root of its worth: the stiffness of a stop so hard that nothing enters it has
+        no upper bound, and a standard error as large as itself, but without the stop nothing fits.
+        """
         names = [u.name for u in self.fit.unknowns]
         found = []
         for c in self.candidates:
@@ -73,7 +79,8 @@ class Hypothesis:
                 found.append(np.inf)
                 continue
             value, covariance = self.fit.values[i], self.fit.covariance[np.ix_(i, i)]
-            found.append(float(np.sqrt(value @ np.linalg.pinv(covariance) @ value)))
+            z = float(np.sqrt(value @ np.linalg.pinv(covariance) @ value))
+            found.append(max(z, float(np.sqrt(max(self.worth.get(c.label, 0.0), 0.0)))))
         return found
 
 

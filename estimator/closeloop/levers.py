@@ -7,6 +7,7 @@ without building an FMU for each.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import ceil
 
 import casadi as cs
 import numpy as np
@@ -15,6 +16,9 @@ from estimator.record import Array
 from fmus.effects.site import CLOCK, WAY
 from fmus.export.outside import Around, runge_kutta
 from fmus.variables import Expr
+
+FINE = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
+ROUNDING = 1e-6  # of a step
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,16 @@ def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
     step, seen = _step(made)
     start = np.array([s.start for s in made.states])
     w = np.array([(m if i == 0 else z)[row] for i, row in seen])
-    run = step.mapaccum(len(course.t) - 1)(start, w[:, :-1], w[:, 1:], np.diff(course.t)[None, :])
-    return np.column_stack([start, np.asarray(run)])
+    n = max(1, ceil(np.median(np.diff(course.t)) / FINE - ROUNDING))
+    at = np.arange((len(course.t) - 1) * n + 1) / n
+    t, w = (_between(at, rows) for rows in (course.t[None, :], w))
+    run = step.mapaccum(len(at) - 1)(start, w[:, :-1], w[:, 1:], np.diff(t))
+    return np.column_stack([start, np.asarray(run)[:, n - 1 :: n]])
+
+
+def _between(at: Array, rows: Array) -> Array:
+    """Rows (k, N) at fractions of their index, at: (M,), linearly."""
+    return np.array([np.interp(at, np.arange(rows.shape[1]), row) for row in rows])
 
 
 @lru_cache(maxsize=8)

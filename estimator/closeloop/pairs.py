@@ -1,18 +1,20 @@
 """Pairs of effects: a wrong single effect can hide the right one until its partner is there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, cost, finished, hypotheses
+from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished, hypotheses
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import grouped_fit
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, Screening, built, screen
+from estimator.closeloop.screen import Promise, Screening, built, label, screen
 from estimator.record import Array
 
+LEADING = 8  # single effects that partners are looked for
 PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
 FINALISTS = 2  # of them, fitted to the end
@@ -28,29 +30,38 @@ def idle(h: Hypothesis) -> list[Candidate]:
 
 
 def try_pairs(
-    problem: Problem, base: Hypothesis, screened: Fit, singles: Sequence[Hypothesis], change: Changes,
+    problem: Problem, base: Hypothesis, screening: Screening, singles: Sequence[Hypothesis], change: Changes,
     size: Array, jobs: int,
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
     """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
 
-    screened: the base's fit as `change`, of single candidates, belongs to it.
+    screening, change: of the base and the single candidates.
 
-    Pairs are nominated twice: by regression from the base, and as partners of the best single effect.
+    Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
     """
     physical = [(c, g) for c, g in change if not c.is_fault]
     alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
-    promises = _from_base(screened, physical)
+    promises = _from_base(screening.fit, physical)
     if alone:
-        best = next(iter(alone.values()))
-        promises += _partners(problem, best, [c for c, _ in physical], size)
+        promises += _partners(problem, screening, list(alone.values())[:LEADING], physical)
     found = hypotheses(problem, base, promises, size, jobs, FINALISTS)
-    kept = [h for h in found if not idle(h)]
     reached = min((cost(h) for h in singles), default=cost(base))
-    left = {h.label: h for h in found if len(idle(h)) == 1 and cost(h) < reached}
-    freed = [
-        Promise(tuple(c for c in h.candidates if c not in idle(h)), 0.0, h.fit.theta) for h in left.values()
-    ]
-    return kept, finished(problem, base.fit.unknowns, freed, size, jobs)
+    doubtful = [h for h in found if idle(h) and cost(h) < reached]
+    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in idle(h)]
+    freed = finished(problem, base.fit.unknowns, without, size, jobs) if without else []
+    least = {h.label: cost(h) for h in best_by_label([*alone.values(), *freed])}
+    found = [replace(h, worth=_worth(h, least)) if h in doubtful else h for h in found]
+    return [h for h in found if not idle(h)], freed
+
+
+def _rest(h: Hypothesis, c: Candidate) -> tuple[Candidate, ...]:
+    return tuple(other for other in h.candidates if other is not c)
+
+
+def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
+    """See Hypothesis.worth; least: sums of squares that hypotheses reached, by label."""
+    known = {c.label: label(_rest(h, c)) for c in h.candidates}
+    return {member: least[rest] - cost(h) for member, rest in known.items() if rest in least}
 
 
 def beside(
@@ -64,14 +75,8 @@ def beside(
     """
     fit = grouped_fit(best.fit, len(screening.size), screening.group)
     left = float(fit.residual @ fit.residual) - len(fit.residual)
-    own = {c.label for c in best.candidates}
-    promises = screen(fit, [((c,), g) for c, g in change if c.label not in own])
-    first = {p.label: p for p in reversed(promises) if p.gain > max(BESIDE, least * left)}
-    partners = sorted(first.values(), key=lambda p: -p.gain)[:PROMISES]
-    pairs = [
-        Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in partners
-    ]
-    found = hypotheses(problem, base, pairs, screening.size, jobs, FINALISTS) if pairs else []
+    promises = [p for p in _with(best, fit, change) if p.gain > max(BESIDE, least * left)]
+    found = hypotheses(problem, base, promises, screening.size, jobs, FINALISTS) if promises else []
     return [h for h in found if not idle(h)]
 
 
@@ -84,17 +89,37 @@ def _from_base(base: Fit, physical: Changes) -> list[Promise]:
         for a, b in combinations(leading, 2)
         if a.label != b.label
     ]
-    return screen(base, sets)[:PROMISES]
+    return _distinct(screen(base, sets))[:PROMISES]
 
 
 def _partners(
-    problem: Problem, best: Hypothesis, candidates: Sequence[Candidate], size: Array
+    problem: Problem, screening: Screening, leading: Sequence[Hypothesis], change: Changes
 ) -> list[Promise]:
-    others = [c for c in candidates if c.label != best.label]
-    here = built(problem, best.candidates)
-    screening = Screening(here, best.fit, size)
-    change = screening.changes(others)
-    promises = screen(screening.fit, [((c,), g) for c, g in zip(others, change, strict=True)])[:PROMISES]
-    return [
-        Promise((*best.candidates, *p.candidates), p.gain, {**best.fit.theta, **p.start}) for p in promises
-    ]
+    """Pairs of the leading single effects and what could explain most of what each leaves.
+
+    Those first that would leave least: a right partner of a single effect that is not the best one counts.
+    The best one is screened anew, with its effect in the FMU; the others by what the base told.
+    """
+    here = Screening(built(problem, leading[0].candidates), leading[0].fit, screening.size)
+    anew = list(zip((c for c, _ in change), here.changes([c for c, _ in change]), strict=True))
+    found = [(cost(leading[0]) - p.gain, p) for p in _with(leading[0], here.fit, anew)]
+    for h in leading[1:]:
+        fit = grouped_fit(h.fit, len(screening.size), screening.group)
+        found += [(cost(h) - p.gain, p) for p in _with(h, fit, change)]
+    found.sort(key=lambda pair: pair[0])
+    return _distinct([p for _, p in found])[:PROMISES]
+
+
+def _with(h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
+    """A hypothesis with its most promising partners; fit: its own, as the changes are compared with it."""
+    own = {c.label for c in h.candidates}
+    promises = _distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[:PROMISES]
+    return [Promise((*h.candidates, *p.candidates), p.gain, {**h.fit.theta, **p.start}) for p in promises]
+
+
+def _distinct(promises: Sequence[Promise]) -> list[Promise]:
+    """The first promise of each set of kinds and places."""
+    first: dict[frozenset[str], Promise] = {}
+    for p in promises:
+        first.setdefault(frozenset(c.label for c in p.candidates), p)
+    return list(first.values())
