@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from estimator.closeloop import pairs
+from estimator.closeloop import compare, dating, pairs
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit, fit, loose, sandwich
@@ -18,6 +18,7 @@ from estimator.closeloop.pairs import BESIDE, beside
 from estimator.closeloop.problem import Unknown
 from estimator.closeloop.slopes import Slopes
 from estimator.closeloop.verdict import one_curve, outgrown
+from estimator.record import Run
 from fmus.effects import EFFECTS
 
 # ---- derivatives along secants
@@ -206,3 +207,45 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch,
     beside(None, None, Hypothesis((best,), found, ()), Seen(), change, least, 1)
     assert [p.candidates[1].label for p in fitted] == asked
     assert all(p.candidates[0] is best for p in fitted)
+
+
+# ---- dating
+
+
+class Swinging:
+    """A force that sets in on an oscillator; the sum of squares over its moment has a minimum a swing."""
+
+    def __init__(self, moment: float) -> None:
+        t = np.linspace(0.0, 20.0, 4000)
+        fit = t < 15.0
+        self.run = Run(t, t[:, None], self.simulate(t, 1.0, moment), fit, ~fit)
+        self.record = SimpleNamespace(runs=(self.run,), noise_std=np.array([0.1]), outputs=("y",))
+        self.free_states = ()
+
+    def simulate(self, t: np.ndarray, size: float, moment: float) -> np.ndarray:
+        since = np.maximum(t - moment, 0.0)
+        return (size * (1.0 - np.cos(6.0 * since)) * np.exp(-0.2 * since))[:, None]
+
+    def residuals(self, theta: Mapping[str, float]) -> list[np.ndarray]:
+        return [self.run.y - self.simulate(self.run.t, *theta.values())]
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        return self.residuals(theta)[0][self.run.fit]
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(4.0, 9.0), st.floats(-0.7, 0.7))
+def test_a_moment_some_swings_off_is_found(moment, off):
+    asked, size = Swinging(moment), np.array([0.1])
+    own = Unknown("F_0", 0.0, -9.0, 9.0, 1.0), Unknown("step_t0", moment + off, -np.inf, np.inf, 0.1)
+    late = Candidate("step_force", "wheel", own[:1], own[1:])
+    start = fit(asked, own, size, {"F_0": 1.0})
+    assume(abs(start.theta["step_t0"] - moment) < 0.7)  # as far as is looked
+    h = Hypothesis((late,), start, tuple(asked.residuals(start.theta)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dating, "built", lambda problem, _: problem)
+        patch.setattr(compare, "built", lambda problem, _: problem)
+        patch.setattr(compare, "together", lambda problem, promises: [problem] * len(promises))
+        [best] = dating.dated(asked, (), [h], size, 1)
+    assert best.theta["step_t0"] == pytest.approx(moment, abs=0.01)
+    assert compare.cost(best) <= compare.cost(h)

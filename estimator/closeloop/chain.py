@@ -9,6 +9,7 @@ import numpy as np
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, hypotheses, ranked, to_the_end
+from estimator.closeloop.dating import dated
 from estimator.closeloop.detect import LEVEL, ONE_EFFECT, Detection, detect
 from estimator.closeloop.fit import Fit, loose
 from estimator.closeloop.freeform import free_form
@@ -201,7 +202,8 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
         sudden, more = stages.done("sudden", lambda: _sudden(s, physical, jobs))
         brief = best_by_label([*more, *brief])
     tell("fitting the leading ones to the end")
-    singles = stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
+    finals = stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
+    singles = stages.done("dated", lambda: dated(problem, base.fit.unknowns, finals, size, jobs))
     pairs: list[Hypothesis] = []
     if s.floor_known and not s.explained(singles):
         tell("fitting the leading ones to a growing part of the record")

@@ -15,6 +15,9 @@ from estimator.closeloop.screen import Promise, Screening, built, label, screen
 from estimator.record import Array
 
 LEADING = 8  # single effects that partners are looked for
+QUICK = (
+    3e6  # candidates times samples, up to which all of them are screened with each leading effect built in
+)
 PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
 FINALISTS = 2  # of them, fitted to the end
@@ -98,14 +101,18 @@ def _partners(
     """Pairs of the leading single effects and what could explain most of what each leaves.
 
     Those first that would leave least: a right partner of a single effect that is not the best one counts.
-    The best one is screened anew, with its effect in the FMU; the others by what the base told.
+    The best one is screened anew, with its effect in the FMU, and so are the others where that is quick.
     """
-    here = Screening(built(problem, leading[0].candidates), leading[0].fit, screening.size)
-    anew = list(zip((c for c, _ in change), here.changes([c for c, _ in change]), strict=True))
-    found = [(cost(leading[0]) - p.gain, p) for p in _with(leading[0], here.fit, anew)]
-    for h in leading[1:]:
-        fit = grouped_fit(h.fit, len(screening.size), screening.group)
-        found += [(cost(h) - p.gain, p) for p in _with(h, fit, change)]
+    quick = len(change) * len(screening.fit.residual) < QUICK
+    found = []
+    for i, h in enumerate(leading):
+        if i == 0 or quick:
+            here = Screening(built(problem, h.candidates), h.fit, screening.size)
+            others = [c for c, _ in change if c.label != h.label]
+            fit, seen = here.fit, list(zip(others, here.changes(others), strict=True))
+        else:
+            fit, seen = grouped_fit(h.fit, len(screening.size), screening.group), list(change)
+        found += [(cost(h) - p.gain, p) for p in _with(h, fit, seen)]
     found.sort(key=lambda pair: pair[0])
     return _distinct([p for _, p in found])[:PROMISES]
 
