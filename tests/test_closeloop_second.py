@@ -14,10 +14,10 @@ from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit, fit, loose, sandwich
 from estimator.closeloop.onset import grown
-from estimator.closeloop.pairs import BESIDE, beside
+from estimator.closeloop.pairs import beside
 from estimator.closeloop.problem import Unknown
 from estimator.closeloop.slopes import Slopes
-from estimator.closeloop.verdict import one_curve, outgrown
+from estimator.closeloop.verdict import CURVE, one_curve, outgrown
 from estimator.record import Run
 from fmus.effects import EFFECTS
 
@@ -179,7 +179,7 @@ def test_a_law_and_its_limits_are_over_the_same_motion(kind):
 
 def test_a_law_is_outgrown_where_a_richer_one_gains_much_more_than_chance():
     simple = several(("coulomb_friction", "wheel"), squares=500.0)
-    for gain, expected in ((0.0, False), (BESIDE - 1, False), (BESIDE + 1, True)):
+    for gain, expected in ((0.0, False), (CURVE - 1, False), (CURVE + 1, True)):
         assert outgrown(simple, several(("stribeck_friction", "wheel"), squares=500.0 - gain)) is expected
         assert not outgrown(simple, several(("stribeck_friction", "roller"), squares=500.0 - gain))
 
@@ -192,7 +192,13 @@ class Seen:
 
 @pytest.mark.parametrize(
     ("second", "least", "asked"),
-    [(0.0, 0.0, []), (4.0, 0.0, []), (15.0, 0.0, ["viscous_damping@roller"]), (15.0, 0.99, [])],
+    [
+        (0.0, 0.0, []),
+        (4.0, 0.0, []),
+        (12.0, 0.0, []),
+        (20.0, 0.0, ["viscous_damping@roller"]),
+        (20.0, 0.99, []),
+    ],
 )
 def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch, second, least, asked):
     rng = np.random.default_rng(3)

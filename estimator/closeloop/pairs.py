@@ -21,7 +21,7 @@ QUICK = (
 PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
 FINALISTS = 2  # of them, fitted to the end
-BESIDE = 40.0  # gain of a second effect; of some hundred laws and places noise makes less than half of it
+BESIDE = 0.25  # of an output's noise: the rms that a second effect has to explain
 SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
 
 Changes = Sequence[tuple[Candidate, Array]]
@@ -78,7 +78,8 @@ def beside(
     """
     fit = grouped_fit(best.fit, len(screening.size), screening.group)
     left = float(fit.residual @ fit.residual) - len(fit.residual)
-    promises = [p for p in _with(best, fit, change) if p.gain > max(BESIDE, least * left)]
+    enough = BESIDE**2 * len(best.fit.residual) / len(screening.size)
+    promises = [p for p in _with(best, fit, change) if p.gain > max(enough, least * left)]
     found = hypotheses(problem, base, promises, screening.size, jobs, FINALISTS) if promises else []
     return [h for h in found if not idle(h)]
 

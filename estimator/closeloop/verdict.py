@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.closeloop.compare import Hypothesis, beats, cost, lead
 from estimator.closeloop.detect import Detection, signal_size
-from estimator.closeloop.pairs import BESIDE, idle
+from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.simpler import limits
 from estimator.record import Array, BoolArray
@@ -30,6 +30,7 @@ CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residu
 FORM_EXPLAINED = 0.95  # share of the variance beyond the noise, where the FMU's form leaves something open
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
+CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
@@ -110,7 +111,7 @@ def equivalent(
             continue
         mean, _ = lead(problem, best, h, size)
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
-        told = beats(problem, best, h, size) or cost(h) - cost(best) > max(BESIDE, SAME * cost(best))
+        told = beats(problem, best, h, size) or cost(h) - cost(best) > max(CURVE, SAME * cost(best))
         if mean < max(price, alike) or not told:
             members.append(h)
     return [h for h in members if not any(becomes(h, other) for other in members)]
@@ -177,7 +178,7 @@ def outgrown(m: Hypothesis, h: Hypothesis) -> bool:
 
     A right law gains alike on both parts; where the richer one gains on one alone, both are wrong.
     """
-    return becomes(h, m) and cost(m) - cost(h) > BESIDE
+    return becomes(h, m) and cost(m) - cost(h) > CURVE
 
 
 def one_curve(h: Hypothesis) -> bool:
