@@ -242,9 +242,12 @@ def test_the_command_finds_the_hardening_of_another_solvers_oscillator(tmp_path:
     assert "cubic_stiffness at mass" in (out / "table.md").read_text()
 
 
+NAMED = ["silverbox", "emps", "tanks", "electric_drives"]
+
+
 @measured
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["silverbox", "emps"])
+@pytest.mark.parametrize("name", NAMED)
 def test_what_the_library_has_is_named_in_measured_data(name: str, tmp_path: Path) -> None:
     found = measure(BENCHMARKS[name], DATA, tmp_path)
     assert found.answer == "named"
@@ -254,7 +257,7 @@ def test_what_the_library_has_is_named_in_measured_data(name: str, tmp_path: Pat
 
 @measured
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(BENCHMARKS.keys() - {"silverbox", "emps"}))
+@pytest.mark.parametrize("name", sorted(BENCHMARKS.keys() - set(NAMED)))
 def test_what_measured_data_leave_open_is_not_given_a_wrong_name(name: str, tmp_path: Path) -> None:
     found = measure(BENCHMARKS[name], DATA, tmp_path)
     assert found.answer != "misnamed"
