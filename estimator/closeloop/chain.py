@@ -138,11 +138,11 @@ def trace(
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
-    sets_in = screened.open_to_form and screened.came is not None
+    began = screened.open_to_form and screened.came is not None
     detection = stages.done(
         "detection",
         lambda: detect(
-            problem, base, noise, over_noise, regressors, screened.likeness, sets_in,
+            problem, base, noise, over_noise, regressors, screened.likeness, began,
             np.random.default_rng(seed),
         ),
     )  # fmt: skip
@@ -213,7 +213,7 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
         tell("trying pairs of effects")
         alone = singles
         pairs, freed = stages.done(
-            "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, size, jobs)
+            "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, jobs)
         )
         singles = best_by_label([*singles, *freed])
     tell("asking whether a simpler law would do")

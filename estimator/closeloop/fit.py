@@ -93,31 +93,31 @@ def fit(
     squares; a step that gains less is the last one. known: derivatives (m,) of the weighted residual by some
     of the unknowns, taken as they are; guess: such as are good enough to begin.
     """
-    held = dict(fixed or {})
-    low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
-    scale = np.array([u.scale for u in unknowns])
+    low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
-
-    @lru_cache(len(unknowns) + 2)
-    def simulated(x: tuple[float, ...]) -> Array:
-        return weighted(problem, {**held, **dict(zip((u.name for u in unknowns), x, strict=True))}, size)
-
-    def residual(x: Array) -> Array:
-        return simulated(tuple(x.tolist()))
-
+    residual = _residual(problem, [u.name for u in unknowns], size, dict(fixed or {}))
     if not unknowns:
         alone = residual(x0)
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     slopes = Slopes(residual, scale, high, [(known or {}).get(u.name) for u in unknowns])
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
-    floor_known = not np.isnan(problem.record.noise_std).any()
-    x, converged = _descended(
-        residual, slopes, x, (low, high), scale, evaluations, gain, floor_known and not known
-    )
-    jacobian = slopes.at(x)
-    covariance = sandwich(residual(x), jacobian, scale, high - low)
-    return Fit(tuple(unknowns), x, covariance, residual(x), jacobian, converged)
+    secants = not known and not np.isnan(problem.record.noise_std).any()
+    x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, secants)
+    r, jacobian = residual(x), slopes.at(x)
+    return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)
+
+
+def _residual(
+    problem: Problem, names: Sequence[str], size: Array, held: Mapping[str, float]
+) -> Callable[[Array], Array]:
+    """The weighted residual (m,) as a function of the values of `names`; that of the last ones is kept."""
+
+    @lru_cache(len(names) + 2)
+    def simulated(x: tuple[float, ...]) -> Array:
+        return weighted(problem, {**held, **dict(zip(names, x, strict=True))}, size)
+
+    return lambda x: simulated(tuple(x.tolist()))
 
 
 def _descended(

@@ -34,7 +34,7 @@ def idle(h: Hypothesis) -> list[Candidate]:
 
 def try_pairs(
     problem: Problem, base: Hypothesis, screening: Screening, singles: Sequence[Hypothesis], change: Changes,
-    size: Array, jobs: int,
+    jobs: int,
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
     """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
 
@@ -42,6 +42,7 @@ def try_pairs(
 
     Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
     """
+    size = screening.size
     physical = [(c, g) for c, g in change if not c.is_fault]
     alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
     promises = _from_base(screening.fit, physical)
