@@ -47,6 +47,7 @@ class Result:
     There `placebo` is that of the best wrong effect, `black_box` that of the calibrated FMU with a linear
     model of its residual. power: the smallest effects that the record would have shown, null where none;
     free_form: where nothing explains, the curve that comes nearer, which `after` and the FMU then hold.
+    seconds: of wall time, by stage.
     """
 
     experiment: str
@@ -66,6 +67,7 @@ class Result:
     power: list[dict[str, Any]] = field(default_factory=list)
     nomination: dict[str, Any] = field(default_factory=dict)
     free_form: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
         """Write as JSON, whole or not at all."""
@@ -109,6 +111,7 @@ def result_of(
         power=[_line(v) for v in honesty.power] if honesty else [],
         nomination=_nomination(honesty) if honesty else {},
         free_form=_curve(curve) if curve else {},
+        seconds={stage: round(s, 2) for stage, s in found.seconds.items()},
     )
 
 

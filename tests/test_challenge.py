@@ -415,6 +415,15 @@ def test_failures_are_listed_with_truth_and_answer():
     assert all(line.count("|") in (0, 4, 8) for line in lines)
 
 
+def test_the_split_of_the_time_is_the_mean_over_answers_that_tell_it():
+    marked = [
+        (truth("none"), Answer("no_discrepancy", split={"calibrate": 1.0})),
+        (truth("none"), Answer("no_discrepancy", split={"calibrate": 2.0, "pairs": 5.0})),
+        (truth("none"), Answer(failure="time limit of 3 s", seconds=3.0)),
+    ]
+    assert figures(marked)["of it on average"] == "calibrate 1.5 s, pairs 2.5 s"
+
+
 # running
 
 

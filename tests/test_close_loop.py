@@ -49,6 +49,8 @@ def test_the_result_is_the_contracts_json(demo: tuple[Result, Path]) -> None:
         assert {"declared", "before", "after", "noise"} <= error.keys()
     assert all({"kind", "location", "score"} <= a.keys() for a in written["alternatives"])
     assert all(a["score"] < 0 for a in written["alternatives"])
+    assert {"calibrate", "screen", "detect", "brief fits", "long fits"} <= written["seconds"].keys()
+    assert sum(written["seconds"].values()) <= written["wall_seconds"] + 0.1
     assert written["effects"][0]["parameters"]["c"] == result.effects[0].parameters["c"]
 
 

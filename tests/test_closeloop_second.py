@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from estimator.closeloop import compare, dating, pairs
+from estimator.closeloop import compare, dating, pairs, progress
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit, fit, loose, sandwich
@@ -255,3 +255,19 @@ def test_a_moment_some_swings_off_is_found(moment, off):
         [best] = dating.dated(asked, (), [h], size, 1)
     assert best.theta["step_t0"] == pytest.approx(moment, abs=0.01)
     assert compare.cost(best) <= compare.cost(h)
+
+
+# ---- progress
+
+
+def test_the_time_of_each_stage_is_counted(monkeypatch):
+    clock = iter([0.0, 1.0, 3.0, 7.0, 12.0])
+    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    said = []
+    stages = progress.Progress(said.append)
+    stages("a", "beginning")
+    stages("b", "going on")
+    stages("a", "once more")
+    stages.end()
+    assert stages.seconds == {"a": 7.0, "b": 4.0}
+    assert said == ["beginning", "going on", "once more"]

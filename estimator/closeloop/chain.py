@@ -1,7 +1,7 @@
 """The chain: calibrate, detect, nominate, fit jointly, compare on held-out data, judge."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.onset import onset, since
 from estimator.closeloop.pairs import beside, try_pairs
 from estimator.closeloop.problem import Problem
+from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.restarts import from_the_beginning
 from estimator.closeloop.screen import Promise, Screening, screen
 from estimator.closeloop.simpler import simpler
@@ -37,13 +38,12 @@ RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain
 SLIGHT = 2.0  # times the mean square of before: what sets in where all is small, see onset
 PLACEBOS = 3  # of them, so that there is a best wrong one
 
-Tell = Callable[[str], None]
-
 
 @dataclass(frozen=True)
 class Outcome:
     """All that the chain found; hypotheses and promises best first.
 
+    seconds: of wall time that each stage took.
     noise: (n_y,) floor; size: (n_y,) size of a residual that counts as one in fits and scores.
     """
 
@@ -58,6 +58,7 @@ class Outcome:
     pairs: tuple[Hypothesis, ...]
     judgement: Judgement
     honesty: Honesty | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def chosen(self) -> Hypothesis | None:
@@ -128,13 +129,20 @@ def trace(
     stages: Stages = Stages(),  # noqa: B008 - immutable, keeps nothing
 ) -> Outcome:
     """Run the whole chain on a problem; `tell` hears what is being done, `stages` keeps what was found."""
+    progress = Progress(tell)
+    found = _traced(problem, progress, jobs, seed, stages)
+    progress.end()
+    return replace(found, seconds=progress.seconds)
+
+
+def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stages) -> Outcome:
     noise = noise_floor(problem.record)
-    tell("calibrating the declared parameters")
+    tell("calibrate", "calibrating the declared parameters")
     declared, base, size = stages.done("calibrated", lambda: calibrate(problem))
-    tell("inferring the missing force at each port")
+    tell("missing force", "inferring the missing force at each port")
     forces = stages.done("forces", lambda: missing_forces(problem, base.fit.theta, noise))
     screened = _screened(problem, base, noise, size, forces, tell)
-    tell("testing for a discrepancy against simulated records without one")
+    tell("detect", "testing for a discrepancy against simulated records without one")
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
@@ -146,6 +154,7 @@ def trace(
             np.random.default_rng(seed),
         ),
     )  # fmt: skip
+    tell("honesty", "working out what else would explain, and what could have been seen")
     level = LEVEL / len(detection.figures)
     owed = stages.done(
         "honesty", lambda: honesty(problem, base, seen, change, size, level, np.random.default_rng(seed))
@@ -157,19 +166,24 @@ def trace(
     singles, pairs = _fitted(screened, tell, jobs, stages)
     judgement = judge(problem, base, singles, pairs, noise, size)
     if judgement.verdict == "unexplained":
-        tell("fitting a force of free form")
+        tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
         owed = replace(owed, free_form=curve)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
 
 
 def _screened(
-    problem: Problem, base: Hypothesis, noise: Array, size: Array, forces: Sequence[MissingForce], tell: Tell
+    problem: Problem,
+    base: Hypothesis,
+    noise: Array,
+    size: Array,
+    forces: Sequence[MissingForce],
+    tell: Progress,
 ) -> Screened:
     builder = problem.builder
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     candidates += fault_candidates(problem.record, noise)
-    tell(f"screening {len(candidates)} candidates by their effect on the linearised FMU")
+    tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     screening = Screening(problem, base.fit, size, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     # bounds that another form pushes against say nothing of effects
@@ -179,7 +193,9 @@ def _screened(
     return Screened(problem, base, noise, size, screening, change, promises)
 
 
-def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hypothesis], list[Hypothesis]]:
+def _fitted(
+    s: Screened, tell: Progress, jobs: int, stages: Stages
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Single hypotheses and pairs, best first."""
     problem, base, size = s.problem, s.base, s.size
     alike = twins(s.change)
@@ -188,39 +204,40 @@ def _fitted(s: Screened, tell: Tell, jobs: int, stages: Stages) -> tuple[list[Hy
     promises = at_their_moments(s.screening, s.promises, LEADING)
     promises = [p for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
-    tell("fitting faults of sensors")
+    tell("faults", "fitting faults of sensors")
     faults, rest = stages.done("faults", lambda: _faults_first(s, chosen, jobs))
     tell(
-        f"fitting the {len(rest)} most promising effects inside the FMU, jointly with the declared parameters"
+        "brief fits",
+        f"fitting the {len(rest)} most promising effects inside the FMU, with the declared parameters",
     )
     brief = stages.done("brief", lambda: briefly(problem, base, rest, size, jobs))
     brief = best_by_label([*faults, *brief])
     sudden: list[Promise] = []
     if not faults and (s.open_to_form or any(sets_in(h) for h in brief[:LEADING])):
-        tell("looking for what set in during the record")
+        tell("onset", "looking for what set in during the record")
         physical = [c for c, _ in single if not c.is_fault]
         sudden, more = stages.done("sudden", lambda: _sudden(s, physical, jobs))
         brief = best_by_label([*more, *brief])
-    tell("fitting the leading ones to the end")
+    tell("long fits", "fitting the leading ones to the end")
     finals = stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
     singles = stages.done("dated", lambda: dated(problem, base.fit.unknowns, finals, size, jobs))
     pairs: list[Hypothesis] = []
     if s.floor_known and not s.explained(singles):
-        tell("fitting the leading ones to a growing part of the record")
+        tell("growing", "fitting the leading ones to a growing part of the record")
         found, hopes = singles, [*sudden, *promises]
         singles = stages.done("growing", lambda: from_the_beginning(problem, base, found, hopes, size, jobs))
     if not s.explained(singles):
-        tell("trying pairs of effects")
+        tell("pairs", "trying pairs of effects")
         alone = singles
         pairs, freed = stages.done(
             "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, jobs)
         )
         singles = best_by_label([*singles, *freed])
-    tell("asking whether a simpler law would do")
+    tell("simpler", "asking whether a simpler law would do")
     ones, twos = ranked(problem, singles, size), ranked(problem, pairs, size)
     ones, twos = stages.done("simpler", lambda: (_simplified(s, ones, jobs), _simplified(s, twos, jobs)))
     if s.explained(ones[:1]):
-        tell("looking at what is left for a second effect")
+        tell("second", "looking at what is left for a second effect")
         least = ONE_EFFECT if problem.form_error > 0 else 0.0
         more = stages.done("beside", lambda: beside(problem, base, ones[0], s.screening, single, least, jobs))
         twos = ranked(problem, best_by_label([*twos, *more]), size)

@@ -33,6 +33,7 @@ class Answer:
     seconds: float = 0.0
     cpu_seconds: float = 0.0
     failure: str = ""
+    split: dict[str, float] = field(default_factory=dict)  # seconds by stage
 
     @classmethod
     def of(cls, kept: dict[str, Any]) -> Answer:
@@ -42,7 +43,15 @@ class Answer:
             return cls(failure=kept["failure"], **times)
         r = kept["result"]
         names = tuple((e["kind"], e["location"]) for e in r["effects"])
-        return cls(r["verdict"], names, tuple(r["effects"]), r["gap_closed"], r["error"], **times)
+        return cls(
+            r["verdict"],
+            names,
+            tuple(r["effects"]),
+            r["gap_closed"],
+            r["error"],
+            **times,
+            split=r.get("seconds", {}),
+        )
 
     @property
     def label(self) -> str:

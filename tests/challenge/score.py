@@ -207,6 +207,11 @@ def times(marked: Sequence[Marked]) -> list[Row]:
                     f"{what} a record: median, 90 %, longest", f"{q[0]:.0f}, {q[1]:.0f}, {q[2]:.0f} s", target
                 )
             )
+    splits = [a.split for _, a in marked if a.split]
+    if splits:
+        stages = dict.fromkeys(stage for split in splits for stage in split)
+        mean = {stage: sum(split.get(stage, 0.0) for split in splits) / len(splits) for stage in stages}
+        rows.append(Row("of it on average", ", ".join(f"{stage} {s:.1f} s" for stage, s in mean.items())))
     rows.append(
         Row("no answer (crash or time limit)", share(sum(bool(a.failure) for _, a in marked), len(marked)))
     )
