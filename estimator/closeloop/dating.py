@@ -21,15 +21,11 @@ REACH, STEPS = 0.05, 25  # of the length that is fitted, to either side, and ste
 
 
 def dated(
-    problem: Problem, unknowns: Sequence[Unknown], found: Sequence[Hypothesis], size: Array, jobs: int,
-    reach: float = REACH,
-) -> list[Hypothesis]:  # fmt: skip
-    """All hypotheses, best first on the identify part; leading ones fitted again from a better moment.
-
-    reach: share of the length that is fitted, to either side, in which moments are tried.
-    """
+    problem: Problem, unknowns: Sequence[Unknown], found: Sequence[Hypothesis], size: Array, jobs: int
+) -> list[Hypothesis]:
+    """All hypotheses, best first on the identify part; leading ones fitted again from a better moment."""
     tried = [h for h in found[:LEADING] if begins(h) and cost(h) < RIVAL * cost(found[0])]
-    moments = Parallel(n_jobs=jobs)(delayed(_moment)(problem, h, size, reach) for h in tried)
+    moments = Parallel(n_jobs=jobs)(delayed(_moment)(problem, h, size) for h in tried)
     again = [
         Promise(h.candidates, 0.0, {**h.fit.theta, begins(h)[0]: moment})
         for h, moment in zip(tried, moments, strict=True)
@@ -43,12 +39,12 @@ def begins(h: Hypothesis) -> list[str]:
     return [u.name for c in h.candidates for u in c.shape if u.name.endswith(BEGINS)]
 
 
-def _moment(problem: Problem, h: Hypothesis, size: Array, reach: float) -> float | None:
+def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:
     """A moment with which, all else as it is, the identify part is matched better, or None."""
     [name, *_] = begins(h)
     here, run = built(problem, h.candidates), problem.record.runs[0]
     length, now = float(run.t[run.fit][-1] - run.t[0]), h.theta[name]
-    grid = now + reach * length * np.arange(-STEPS, STEPS + 1) / STEPS
+    grid = now + REACH * length * np.arange(-STEPS, STEPS + 1) / STEPS
     inside = [float(t) for t in grid if 0.0 < t < length and t != now]
     squares = [float(np.sum(weighted(here, {**h.theta, name: t}, size) ** 2)) for t in inside]
     best = int(np.argmin(squares)) if squares else 0

@@ -8,7 +8,6 @@ import numpy as np
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished, hypotheses
-from estimator.closeloop.dating import dated
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import grouped_fit
 from estimator.closeloop.problem import Problem
@@ -23,7 +22,6 @@ PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
 FINALISTS = 2  # of them, fitted to the end
 BESIDE = 0.25  # of an output's noise: the rms that a second effect has to explain
-DATED = (1.0, 0.05)  # of the length that is fitted: where a member's moment is looked for, far and then near
 SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
 
 Changes = Sequence[tuple[Candidate, Array]]
@@ -51,8 +49,6 @@ def try_pairs(
     if alone:
         promises += _partners(problem, screening, list(alone.values())[:LEADING], physical)
     found = hypotheses(problem, base, promises, size, jobs, FINALISTS)
-    for reach in DATED:
-        found = dated(problem, base.fit.unknowns, found, size, jobs, reach)
     reached = min((cost(h) for h in singles), default=cost(base))
     doubtful = [h for h in found if idle(h) and cost(h) < reached]
     without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in idle(h)]
