@@ -164,7 +164,7 @@ def test_the_moment_of_a_step_is_found(share, size):
     steps, c = Steps(t, base), candidate("step_force", "wheel", [("t0", 1.0)])
     tried = [set_in(c, m) for m in np.linspace(0, 20, 12)[1:-1]]
     promises = screen(base, [((x,), g) for x, g in zip(tried, steps.changes(tried), strict=True)])
-    found = at_their_moments(steps, promises, 1)
+    found = at_their_moments(steps, steps.fit, promises, 1)
     assert abs(moment(found[0].candidates[0]) - true) < 20.0 * 0.1 / 36 + 0.01
     assert found[0].gain >= promises[0].gain
     assert len(found) == len(promises)
@@ -175,7 +175,7 @@ def test_what_is_always_there_has_no_moment():
     assert moment(c) is None
     promise = Promise((c,), 1.0, {})
     steps = Steps(np.arange(3.0), nothing_calibrated(np.ones(3)))
-    assert at_their_moments(steps, [promise], 3) == [promise]
+    assert at_their_moments(steps, steps.fit, [promise], 3) == [promise]
 
 
 # ---- twins

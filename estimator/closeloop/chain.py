@@ -78,13 +78,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Screened:
-    """A question with its calibrated FMU, and what could explain the residual; see Outcome."""
+    """A question with its calibrated FMU, and what could explain the residual; see Outcome.
+
+    fit: of the screening, as changes are compared with it.
+    """
 
     problem: Problem
     base: Hypothesis
     noise: Array
     size: Array
     screening: Screening
+    fit: Fit
     change: list[tuple[Candidate, Array]]
     promises: list[Promise]
 
@@ -108,6 +112,11 @@ class Screened:
     def open_to_form(self) -> bool:
         """Whether the residual could be another form of the FMU, as it is like no effect."""
         return self.problem.form_error > 0 and self.likeness < ONE_EFFECT
+
+    @property
+    def began(self) -> bool:
+        """Whether what could be another form sets in during the record."""
+        return self.open_to_form and self.came is not None
 
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
@@ -146,18 +155,18 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
     regressors = [g for _, g in change]
-    began = screened.open_to_form and screened.came is not None
     detection = stages.done(
         "detection",
         lambda: detect(
-            problem, base, noise, over_noise, regressors, screened.likeness, began,
+            problem, base, noise, over_noise, regressors, screened.likeness, screened.began,
             np.random.default_rng(seed),
         ),
     )  # fmt: skip
     tell("honesty", "working out what else would explain, and what could have been seen")
     level = LEVEL / len(detection.figures)
     owed = stages.done(
-        "honesty", lambda: honesty(problem, base, seen, change, size, level, np.random.default_rng(seed))
+        "honesty",
+        lambda: honesty(problem, base, screened.fit, change, size, level, np.random.default_rng(seed)),
     )
     found = (declared, base, noise, size, detection, tuple(forces), tuple(screened.promises))
     early = without_fits(problem, base, detection, noise)
@@ -189,8 +198,7 @@ def _screened(
     # bounds that another form pushes against say nothing of effects
     fit = screening.fit if problem.form_error > 0 else loose(screening.fit)
     promises = screen(fit, [((c,), g) for c, g in change])
-    promises = [replace(p, start={**base.fit.theta, **p.start}) for p in promises]
-    return Screened(problem, base, noise, size, screening, change, promises)
+    return Screened(problem, base, noise, size, screening, fit, change, promises)
 
 
 def _fitted(
@@ -201,8 +209,8 @@ def _fitted(
     alike = twins(s.change)
     doubled = {label for others in alike.values() for label in others}
     single = [(c, g) for c, g in s.change if c.label not in doubled]
-    promises = at_their_moments(s.screening, s.promises, LEADING)
-    promises = [p for p in promises if p.label not in doubled]
+    promises = at_their_moments(s.screening, s.fit, s.promises, LEADING)
+    promises = [replace(p, start={**base.fit.theta, **p.start}) for p in promises if p.label not in doubled]
     chosen = nominated(promises, NOMINEES if problem.builder.quick else NOMINEES // 2)
     tell("faults", "fitting faults of sensors")
     faults, rest = stages.done("faults", lambda: _faults_first(s, chosen, jobs))

@@ -50,6 +50,11 @@ class Hypothesis:
         """Its candidates' labels joined; "none" for the base."""
         return label(self.candidates) or "none"
 
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The same whatever the order of its candidates."""
+        return tuple(sorted(c.label for c in self.candidates))
+
     def rms(self, problem: Problem) -> Array:
         """Root mean square of the residual on the held-out part, (n_y,)."""
         held_out: Array = np.sqrt(np.mean(self.held_out(problem) ** 2, axis=0))
@@ -125,13 +130,14 @@ def briefly(
 ) -> list[Hypothesis]:
     """A fit of few evaluations to each promise, best first on the identify part; one a label.
 
-    Start states, which hardly matter for the ranking, stay where the base has them. known: what the
-    base's other unknowns do is taken from the base too.
+    Start states, which hardly matter for the ranking, stay where the base has them, with the derivatives that
+    the base has. known: what the base's other unknowns do is taken from the base too.
     """
     states = {n: v for n, v in base.fit.theta.items() if n in problem.free_states}
     started = replace(problem, declared={**problem.declared, **states})
     others = [u for u in base.fit.unknowns if u.name not in states]
-    return fitted(started, others, promises, size, BRIEF, jobs, base.fit.columns if known else None)
+    found = fitted(started, others, promises, size, BRIEF, jobs, base.fit.columns if known else None)
+    return [replace(h, fit=h.fit.beside(base.fit, states)) for h in found]
 
 
 def to_the_end(
@@ -151,8 +157,8 @@ def to_the_end(
         done = best_by_label(
             [*done, *finished(problem, base.fit.unknowns, again, size, jobs, base.fit.columns)]
         )
-    labels = {h.label for h in done}
-    return best_by_label([*done, *(h for h in brief if h.label not in labels)])
+    keys = {h.key for h in done}
+    return best_by_label([*done, *(h for h in brief if h.key not in keys)])
 
 
 def finished(
@@ -215,11 +221,11 @@ def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
 
 
 def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
-    """Of several hypotheses with the same label the one that fits better; best first."""
-    best: dict[str, Hypothesis] = {}
+    """Of several hypotheses with the same labels the one that fits better; best first."""
+    best: dict[tuple[str, ...], Hypothesis] = {}
     for h in found:
-        if h.label not in best or cost(h) < cost(best[h.label]):
-            best[h.label] = h
+        if h.key not in best or cost(h) < cost(best[h.key]):
+            best[h.key] = h
     return sorted(best.values(), key=cost)
 
 

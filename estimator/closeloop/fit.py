@@ -1,11 +1,13 @@
 """Fit unknowns by simulation error on the identify part, with bounds and standard errors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import pinvh
+from scipy.linalg import block_diag, pinvh
 from scipy.optimize import least_squares
 
 from estimator.closeloop.problem import Problem, Unknown
@@ -46,6 +48,18 @@ class Fit:
     def columns(self) -> dict[str, Array]:
         """Derivatives (m,) of the residual by each unknown."""
         return {u.name: column for u, column in zip(self.unknowns, self.jacobian.T, strict=True)}
+
+    def beside(self, other: Fit, names: Collection[str]) -> Fit:
+        """The same with some unknowns of another fit as they are there."""
+        i = [k for k, u in enumerate(other.unknowns) if u.name in names]
+        return Fit(
+            (*self.unknowns, *(other.unknowns[k] for k in i)),
+            np.concatenate([self.values, other.values[i]]),
+            block_diag(self.covariance, other.covariance[np.ix_(i, i)]),
+            self.residual,
+            np.hstack([self.jacobian, other.jacobian[:, i]]),
+            self.converged,
+        )
 
     @property
     def std(self) -> dict[str, float]:
@@ -89,9 +103,9 @@ def fit(
 ) -> Fit:
     """Least squares of the simulation error over the unknowns, from `start` or their own start values.
 
-    evaluations: steps at most, one simulation each, beside those for differences; gain: share of the sum of
-    squares; a step that gains less is the last one. known: derivatives (m,) of the weighted residual by some
-    of the unknowns, taken as they are; guess: such as are good enough to begin.
+    evaluations: simulations at most, the first one of each leg counted and those for differences not; gain:
+    share of the sum of squares; a step that gains less is the last one. known: derivatives (m,) of the
+    weighted residual by some of the unknowns, taken as they are; guess: such as are good enough to begin.
     """
     low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.fit import Fit
 from estimator.closeloop.screen import Promise, Screening, screen
 
 BEGINS = "_t0"  # how the name of such an unknown ends
@@ -22,8 +23,11 @@ def moment(c: Candidate) -> float | None:
     return next((u.start for u in c.shape if u.name.endswith(BEGINS)), None)
 
 
-def at_their_moments(screening: Screening, promises: Sequence[Promise], most: int) -> list[Promise]:
-    """The promises, best first; the best one of each of `most` labels that set in has its best moment."""
+def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise], most: int) -> list[Promise]:
+    """The promises, best first; the best one of each of `most` labels that set in has its best moment.
+
+    fit: that the promises were worked out from.
+    """
     leading: dict[str, Promise] = {}
     for p in promises:
         if moment(p.candidates[0]) is not None:
@@ -33,7 +37,7 @@ def at_their_moments(screening: Screening, promises: Sequence[Promise], most: in
     for _ in range(ROUNDS):
         tried = [c for p in best.values() for c in _near(p.candidates[0], spacing)]
         change = screening.changes(tried)
-        found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
+        found = screen(fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
         for p in reversed(found):
             if p.gain > best[p.label].gain:
                 best[p.label] = p

@@ -12,7 +12,7 @@ from scipy.stats import mannwhitneyu
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, fitted
-from estimator.closeloop.fit import Fit, fit
+from estimator.closeloop.fit import Fit, fit, weighted
 from estimator.closeloop.moments import moment, set_in
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, Screening, screen
@@ -51,7 +51,7 @@ def onset(problem: Problem, base: Hypothesis, size: Array, times: float = TIMES)
 
 def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
     """Mean square of the weighted residual of each block of the identify part, (BLOCKS,)."""
-    residual = problem.identify_residual(before.theta) / size
+    residual = weighted(problem, before.theta, size).reshape(-1, len(size))
     return np.array([float(np.mean(b**2)) for b in np.array_split(residual, BLOCKS)])
 
 

@@ -137,5 +137,6 @@ class Problem:
 def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:
     for run in runs:
         if run.fit.any():
-            n = int(np.flatnonzero(run.fit)[max(1, int(share * run.fit.sum()) - 1)]) + 1
+            index = np.flatnonzero(run.fit)
+            n = int(index[min(len(index), max(2, int(share * len(index)))) - 1]) + 1
             yield run.part(0, n)

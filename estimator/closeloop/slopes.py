@@ -7,6 +7,7 @@ import numpy as np
 from estimator.record import Array
 
 STEP = 1e-2  # of an unknown's scale, for differences
+SHORT = 1e-3  # scales: a step too short to tell derivatives from what the FMU's solver leaves open
 
 
 class Slopes:
@@ -42,7 +43,7 @@ class Slopes:
             return self.by_differences(x)
         before, r_before, jacobian = self._last
         step = (x - before) / self._scale
-        if (length := float(step @ step)) > 0:
+        if (length := float(step @ step)) > SHORT**2:
             r = self._residual(x)
             missed = r - r_before - jacobian @ (x - before)
             jacobian = jacobian + np.outer(missed, step / self._scale / length)

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimator.closeloop.compare import Hypothesis, beats, cost, lead
 from estimator.closeloop.detect import Detection, signal_size
+from estimator.closeloop.moments import moment
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.simpler import limits
@@ -111,7 +112,8 @@ def equivalent(
             continue
         mean, _ = lead(problem, best, h, size)
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
-        told = beats(problem, best, h, size) or cost(h) - cost(best) > max(CURVE, SAME * cost(best))
+        worse = h.fit.converged and cost(h) - cost(best) > max(CURVE, SAME * cost(best))
+        told = worse or beats(problem, best, h, size)
         if mean < max(price, alike) or not told:
             members.append(h)
     return [h for h in members if not any(becomes(h, other) for other in members)]
@@ -159,7 +161,7 @@ def judge(
         return _named(members, "several") if members else _curve(better[0])
     if good:
         members = equivalent(problem, good[0], good, size)
-        if problem.form_error == 0 and any(outgrown(m, h) for m in members for h in good):
+        if problem.form_error == 0 and any(outgrown(members[0], h) for h in good):
             return _curve(members[0])
         return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
     best = singles[0].label if singles else "none"
@@ -182,8 +184,9 @@ def outgrown(m: Hypothesis, h: Hypothesis) -> bool:
 
 
 def one_curve(h: Hypothesis) -> bool:
-    """Whether it has two laws over the same motion at one place: their sum is a curve, and any has such."""
-    kinds = [(c.location, EFFECTS[c.kind].over) for c in h.candidates if c.kind in EFFECTS]
+    """Whether it has two laws over the same motion at one place from the start: any curve is such a sum."""
+    always = [c for c in h.candidates if c.kind in EFFECTS and moment(c) is None]
+    kinds = [(c.location, EFFECTS[c.kind].over) for c in always]
     laws = [(at, over) for at, over in kinds if over]
     return len(set(laws)) < len(laws)
 
