@@ -1,5 +1,6 @@
 """Which residual matters, and when an effect accounts for it: with and without an open form of the FMU."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.simpler import limits
-from estimator.closeloop.verdict import equivalent, reached
+from estimator.closeloop.verdict import becomes, completes, equivalent, reached
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.result import effects_of
@@ -126,3 +127,25 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
     drawn = np.random.default_rng(0).multivariate_normal(values, covariance, 20_000)
     assert size == pytest.approx(50.0)
     assert error == pytest.approx(np.hypot(*drawn.T).std(), rel=0.05)
+
+
+# ---- second effects
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "complete"),
+    [(1.2, 1.0, True), (1.2, 1.05, True), (1.2, 1.15, False), (60.0, 45.0, False), (60.0, 1.0, True)],
+)
+def test_a_second_effect_accounts_for_most_of_what_the_first_leaves(one, two, complete):
+    assert completes(asked(), left(two, 1.0), left(one, 1.0), NOISE) is complete
+
+
+def test_a_pair_becomes_a_simpler_one_in_either_order():
+    friction = [law(kind, 0, 0.0).candidates[0] for kind in ("stribeck_friction", "coulomb_friction")]
+    offset = law("constant_force", 0, 0.0).candidates[0]
+    rich, simple = (replace(law("constant_force", 0, 0.0), candidates=(c, offset)) for c in friction)
+    swapped = replace(simple, candidates=simple.candidates[::-1])
+    assert becomes(rich, simple)
+    assert becomes(rich, swapped)
+    assert not becomes(simple, rich)
+    assert not becomes(swapped, rich)

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Literal
 
 import numpy as np
 
+from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, beats, cost, lead
 from estimator.closeloop.detect import Detection, signal_size
 from estimator.closeloop.moments import moment
@@ -31,6 +33,7 @@ CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residu
 FORM_EXPLAINED = 0.95  # share of the variance beyond the noise, where the FMU's form leaves something open
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
+SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
@@ -105,6 +108,7 @@ def equivalent(
     simpler one stays.
     """
     members, alike = [best], SAME * -float(best.scores(problem, size).sum())
+    floor_known = not np.isnan(problem.record.noise_std).any()
     if problem.form_error > 0:
         alike = max(alike, FORM * float(np.sum((best.held_out(problem) / size) ** 2 - 1)) / 2)
     for h in others:
@@ -112,7 +116,7 @@ def equivalent(
             continue
         mean, _ = lead(problem, best, h, size)
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
-        worse = h.fit.converged and cost(h) - cost(best) > max(CURVE, SAME * cost(best))
+        worse = floor_known and h.fit.converged and cost(h) - cost(best) > max(CURVE, SAME * cost(best))
         told = worse or beats(problem, best, h, size)
         if mean < max(price, alike) or not told:
             members.append(h)
@@ -123,7 +127,11 @@ def becomes(h: Hypothesis, other: Hypothesis) -> bool:
     """Whether a hypothesis turns into another one, which is simpler, at a limit of its shape."""
     if h is other or len(h.candidates) != len(other.candidates):
         return False
-    pairs = list(zip(h.candidates, other.candidates, strict=True))
+    return any(_member_by_member(h.candidates, order) for order in permutations(other.candidates))
+
+
+def _member_by_member(candidates: Sequence[Candidate], others: Sequence[Candidate]) -> bool:
+    pairs = list(zip(candidates, others, strict=True))
     same = [a.label == b.label for a, b in pairs]
     simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
     return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))
@@ -156,7 +164,7 @@ def judge(
     better = [
         h for h in pairs if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
     ]
-    if better and (not good or beats(problem, better[0], good[0], size)):
+    if better and (not good or completes(problem, better[0], good[0], size)):
         members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
         return _named(members, "several") if members else _curve(better[0])
     if good:
@@ -173,6 +181,15 @@ def judge(
 def needed(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis], size: Array) -> bool:
     """Whether a pair is better than the best single hypothesis, so that neither member is idle."""
     return not singles or beats(problem, pair, singles[0], size)
+
+
+def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Array) -> bool:
+    """Whether a pair is better than a single hypothesis that explains, and accounts for what that one leaves.
+
+    Where most of that stays, it is neither effect, and the second one no finding.
+    """
+    left = float(np.sum((single.held_out(problem) / size) ** 2 - 1))
+    return beats(problem, pair, single, size) and 2 * lead(problem, pair, single, size)[0] >= SECOND * left
 
 
 def outgrown(m: Hypothesis, h: Hypothesis) -> bool:
