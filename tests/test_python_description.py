@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 
 import fmus
 from fmus.drive.model import Drive
+from fmus.export.native.build import build_native
 from fmus.export.pythonfmu import build_python
 from fmus.host.archive import problems
 from fmus.host.fmu import Fmu
@@ -127,6 +128,12 @@ def test_two_builds_have_the_same_bytes(built, name, tmp_path, monkeypatch):
     again = build_python(MODELS[name](), Path("out") / "other_name.fmu")
     assert sums(again) == sums(built(name))  # says in which file a difference lies
     assert again.read_bytes() == built(name).read_bytes()
+
+
+def test_a_native_build_before_changes_no_byte(tmp_path):
+    before = sums(build_python(MODELS["wheelset"](), tmp_path / "a.fmu"))
+    build_native(MODELS["wheelset"](), tmp_path)
+    assert sums(build_python(MODELS["wheelset"](), tmp_path / "b.fmu")) == before
 
 
 def test_a_build_elsewhere_has_the_same_bytes(built, tmp_path):
