@@ -29,6 +29,11 @@ class Run:
     fit: BoolArray  # (N,) samples used to identify
     test: BoolArray  # (N,) samples held out
 
+    @property
+    def fit_length(self) -> float:
+        """From its first sample to the last one that is fitted, s."""
+        return float(self.t[self.fit][-1] - self.t[0])
+
     def part(self, first: int, end: int) -> "Run":
         """The samples from `first` to before `end`."""
         some = slice(first, end)
@@ -47,3 +52,8 @@ class Record:
     outputs: tuple[str, ...]  # the columns of y
     noise_std: Array  # (n_y,) in the FMU's units, nan where not declared
     notes: tuple[Note, ...] = ()
+
+    @property
+    def floor_known(self) -> bool:
+        """Whether the noise of all outputs is declared, so that a residual can be seen to be noise."""
+        return not np.isnan(self.noise_std).any()

@@ -225,7 +225,7 @@ class Line:
     t: np.ndarray
     y: np.ndarray
     builder: None = None
-    record = SimpleNamespace(noise_std=np.array([0.1]))
+    record = SimpleNamespace(floor_known=True)
 
     def identify_residual(self, theta):
         return (self.y - theta["a"] * self.t)[:, None]

@@ -29,7 +29,7 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
     ]
     unknowns = [*parameters, *states]
     base, size = declared, weights(record, list(declared.residuals))
-    for _ in range(2 if np.isnan(record.noise_std).any() else 1):
+    for _ in range(1 if record.floor_known else 2):
         found = fit(problem, unknowns, size, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < NEAR:
             found = fit(problem, unknowns, size, found.theta)

@@ -17,7 +17,7 @@ from estimator.closeloop.honesty import Honesty, honesty
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.moments import at_their_moments, moment
 from estimator.closeloop.noise import noise_floor
-from estimator.closeloop.onset import onset, since
+from estimator.closeloop.onset import SLIGHT, TIMES, onset, since
 from estimator.closeloop.pairs import beside, try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.progress import Progress, Tell
@@ -35,7 +35,6 @@ SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside
 FAULTS = 4  # faults of sensors that are fitted
 LIKELY = 0.5  # of what is beyond noise: faults that could explain so much are fitted before all else
 RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain less are no rivals, but
-SLIGHT = 2.0  # times the mean square of before: what sets in where all is small, see onset
 PLACEBOS = 3  # of them, so that there is a best wrong one
 
 
@@ -94,14 +93,13 @@ class Screened:
 
     @property
     def floor_known(self) -> bool:
-        """Whether the noise of all outputs is declared, so that a residual can be seen to be noise."""
-        return not np.isnan(self.problem.record.noise_std).any()
+        """See Record."""
+        return self.problem.record.floor_known
 
     @property
     def beyond_noise(self) -> float:
         """What the sum of squares of the screened residual has more than noise would."""
-        residual = self.screening.fit.residual
-        return float(residual @ residual) - len(residual)
+        return self.screening.fit.beyond_noise
 
     @property
     def likeness(self) -> float:
@@ -121,7 +119,7 @@ class Screened:
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
         """What set in during the record; see `onset`."""
-        return onset(self.problem, self.base, self.size, *([SLIGHT] if self.open_to_form else []))
+        return onset(self.problem, self.base, self.size, SLIGHT if self.open_to_form else TIMES)
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual."""

@@ -9,7 +9,7 @@ from joblib import Parallel, delayed
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import BLOCKS, Fit, fit
 from estimator.closeloop.problem import Problem, Unknown
-from estimator.closeloop.screen import Promise, built, label
+from estimator.closeloop.screen import Promise, built, key, label
 from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
@@ -53,7 +53,7 @@ class Hypothesis:
     @property
     def key(self) -> tuple[str, ...]:
         """The same whatever the order of its candidates."""
-        return tuple(sorted(c.label for c in self.candidates))
+        return key(self.candidates)
 
     def rms(self, problem: Problem) -> Array:
         """Root mean square of the residual on the held-out part, (n_y,)."""
@@ -137,7 +137,7 @@ def briefly(
     started = replace(problem, declared={**problem.declared, **states})
     others = [u for u in base.fit.unknowns if u.name not in states]
     found = fitted(started, others, promises, size, BRIEF, jobs, base.fit.columns if known else None)
-    return [replace(h, fit=h.fit.beside(base.fit, states)) for h in found]
+    return [replace(h, fit=h.fit.extended(base.fit, states)) for h in found]
 
 
 def to_the_end(

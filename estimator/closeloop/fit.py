@@ -49,7 +49,12 @@ class Fit:
         """Derivatives (m,) of the residual by each unknown."""
         return {u.name: column for u, column in zip(self.unknowns, self.jacobian.T, strict=True)}
 
-    def beside(self, other: Fit, names: Collection[str]) -> Fit:
+    @property
+    def beyond_noise(self) -> float:
+        """What its sum of squares has more than noise would."""
+        return float(self.residual @ self.residual) - len(self.residual)
+
+    def extended(self, other: Fit, names: Collection[str]) -> Fit:
         """The same with some unknowns of another fit as they are there."""
         i = [k for k, u in enumerate(other.unknowns) if u.name in names]
         return Fit(
@@ -116,7 +121,7 @@ def fit(
     slopes = Slopes(residual, scale, high, [(known or {}).get(u.name) for u in unknowns])
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
-    secants = not known and not np.isnan(problem.record.noise_std).any()
+    secants = not known and problem.record.floor_known
     x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, secants)
     r, jacobian = residual(x), slopes.at(x)
     return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)

@@ -15,12 +15,13 @@ from estimator.closeloop.compare import Hypothesis, fitted
 from estimator.closeloop.fit import Fit, fit, weighted
 from estimator.closeloop.moments import moment, set_in
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, Screening, screen
+from estimator.closeloop.screen import Promise, Screening, distinct, screen
 from estimator.record import Array
 
 EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
 BLOCKS = 50  # of the identify part whose residuals are compared
 TIMES = 9.0  # the mean square of before: what something new has made of it
+SLIGHT = 2.0  # the same where all is small
 CHANCE = 1e-5  # that the blocks after are ranked above those before
 ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
@@ -102,8 +103,7 @@ def _by_response(
     problem: Problem, at: tuple[float, Fit], candidates: Sequence[Candidate], size: Array
 ) -> list[Promise]:
     share, before = at
-    run = problem.record.runs[0]
-    length = float(run.t[run.fit][-1] - run.t[0])
+    length = problem.record.runs[0].fit_length
     here = problem.beginning(min(1.0, share + AFTER))
     there = fit(here, before.unknowns, size, before.theta, evaluations=1)
     labels = {c.label: c for c in reversed(candidates) if moment(c) is not None}
@@ -111,7 +111,4 @@ def _by_response(
     screening = Screening(here, there, size)
     change = screening.changes(tried)
     found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
-    best: dict[str, Promise] = {}
-    for p in found:
-        best.setdefault(p.label, p)
-    return list(best.values())
+    return distinct(found)

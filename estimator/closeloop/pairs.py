@@ -11,13 +11,11 @@ from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finishe
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import grouped_fit
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, Screening, built, label, screen
+from estimator.closeloop.screen import Promise, Screening, built, distinct, label, screen
 from estimator.record import Array
 
 LEADING = 8  # single effects that partners are looked for
-QUICK = (
-    3e6  # candidates times samples, up to which all of them are screened with each leading effect built in
-)
+QUICK = 3e6  # candidates times samples, up to which all leading effects are built in and screened anew
 PARTNERS = 12  # leading candidates among which pairs are screened
 PROMISES = 4  # pairs from each of the two screenings that are fitted
 FINALISTS = 2  # of them, fitted to the end
@@ -78,9 +76,8 @@ def beside(
     least: share of what is left beyond noise that a second effect has to explain.
     """
     fit = grouped_fit(best.fit, len(screening.size), screening.group)
-    left = float(fit.residual @ fit.residual) - len(fit.residual)
     enough = BESIDE**2 * len(best.fit.residual) / len(screening.size)
-    promises = [p for p in _with(best, fit, change) if p.gain > max(enough, least * left)]
+    promises = [p for p in _with(best, fit, change) if p.gain > max(enough, least * fit.beyond_noise)]
     found = hypotheses(problem, base, promises, screening.size, jobs, FINALISTS) if promises else []
     return [h for h in found if not idle(h)]
 
@@ -94,7 +91,7 @@ def _from_base(base: Fit, physical: Changes) -> list[Promise]:
         for a, b in combinations(leading, 2)
         if a.label != b.label
     ]
-    return _distinct(screen(base, sets))[:PROMISES]
+    return distinct(screen(base, sets))[:PROMISES]
 
 
 def _partners(
@@ -116,19 +113,11 @@ def _partners(
             fit, seen = grouped_fit(h.fit, len(screening.size), screening.group), list(change)
         found += [(cost(h) - p.gain, p) for p in _with(h, fit, seen)]
     found.sort(key=lambda pair: pair[0])
-    return _distinct([p for _, p in found])[:PROMISES]
+    return distinct([p for _, p in found])[:PROMISES]
 
 
 def _with(h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
     """A hypothesis with its most promising partners; fit: its own, as the changes are compared with it."""
     own = {c.label for c in h.candidates}
-    promises = _distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[:PROMISES]
+    promises = distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[:PROMISES]
     return [Promise((*h.candidates, *p.candidates), p.gain, {**h.fit.theta, **p.start}) for p in promises]
-
-
-def _distinct(promises: Sequence[Promise]) -> list[Promise]:
-    """The first promise of each set of kinds and places."""
-    first: dict[frozenset[str], Promise] = {}
-    for p in promises:
-        first.setdefault(frozenset(c.label for c in p.candidates), p)
-    return list(first.values())

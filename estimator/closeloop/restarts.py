@@ -92,13 +92,8 @@ def _grown(
     best: Hypothesis | None = None
     for part, evaluations in parts:
         share = before + (1 - before) * part
-        found = hypothesis(
-            problem.beginning(share),
-            unknowns,
-            replace(promise, start=start),
-            size,
-            evaluations,
-        )
+        here = problem.beginning(share)
+        found = hypothesis(here, unknowns, replace(promise, start=start), size, evaluations)
         if found is None:
             return best
         start = found.fit.theta
@@ -109,5 +104,5 @@ def _grown(
 
 def _before(problem: Problem, promise: Promise) -> float:
     """Share of the identify part that lies before what a promise lets set in."""
-    begins, run = moment(promise.candidates[0]), problem.record.runs[0]
-    return 0.0 if begins is None else begins / float(run.t[run.fit][-1] - run.t[0])
+    begins = moment(promise.candidates[0])
+    return 0.0 if begins is None else begins / problem.record.runs[0].fit_length

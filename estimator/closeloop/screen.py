@@ -54,6 +54,19 @@ def label(candidates: Sequence[Candidate]) -> str:
     return " + ".join(c.label for c in candidates)
 
 
+def key(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """Their labels, the same whatever their order."""
+    return tuple(sorted(c.label for c in candidates))
+
+
+def distinct(promises: Sequence[Promise]) -> list[Promise]:
+    """The first promise of each set of kinds and places."""
+    first: dict[tuple[str, ...], Promise] = {}
+    for p in promises:
+        first.setdefault(key(p.candidates), p)
+    return list(first.values())
+
+
 def built(problem: Problem, candidates: Sequence[Candidate]) -> Problem:
     """The problem with the FMU that has these candidates' effects, their fixed values declared."""
     extra = [(c.kind, c.location) for c in candidates if not c.is_fault]

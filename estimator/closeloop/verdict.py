@@ -108,15 +108,15 @@ def equivalent(
     simpler one stays.
     """
     members, alike = [best], SAME * -float(best.scores(problem, size).sum())
-    floor_known = not np.isnan(problem.record.noise_std).any()
     if problem.form_error > 0:
-        alike = max(alike, FORM * float(np.sum((best.held_out(problem) / size) ** 2 - 1)) / 2)
+        alike = max(alike, FORM * beyond_noise(problem, best, size) / 2)
     for h in others:
         if h is best:
             continue
         mean, _ = lead(problem, best, h, size)
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
-        worse = floor_known and h.fit.converged and cost(h) - cost(best) > max(CURVE, SAME * cost(best))
+        behind = cost(h) - cost(best)
+        worse = problem.record.floor_known and h.fit.converged and behind > max(CURVE, SAME * cost(best))
         told = worse or beats(problem, best, h, size)
         if mean < max(price, alike) or not told:
             members.append(h)
@@ -188,8 +188,13 @@ def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Arra
 
     Where most of that stays, it is neither effect, and the second one no finding.
     """
-    left = float(np.sum((single.held_out(problem) / size) ** 2 - 1))
-    return beats(problem, pair, single, size) and 2 * lead(problem, pair, single, size)[0] >= SECOND * left
+    least = SECOND * beyond_noise(problem, single, size)
+    return beats(problem, pair, single, size) and 2 * lead(problem, pair, single, size)[0] >= least
+
+
+def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
+    """What the sum of squares of the held-out part has more than noise would."""
+    return float(np.sum((h.held_out(problem) / size) ** 2 - 1))
 
 
 def outgrown(m: Hypothesis, h: Hypothesis) -> bool:

@@ -46,7 +46,7 @@ class Challenge:
 
     def answer(self, plan: Plan) -> Kept:
         """The record's answer: what was kept, or the chain's, or how it failed."""
-        kept = self.folder / "answers" / f"{plan.name}.json"
+        kept = self._kept(plan)
         if not kept.exists():
             kept.parent.mkdir(parents=True, exist_ok=True)
             part = kept.with_suffix(".part")
@@ -59,7 +59,10 @@ class Challenge:
 
     def answered(self, plan: Plan) -> bool:
         """Whether there is an answer."""
-        return (self.folder / "answers" / f"{plan.name}.json").exists()
+        return self._kept(plan).exists()
+
+    def _kept(self, plan: Plan) -> Path:
+        return self.folder / "answers" / f"{plan.name}.json"
 
     def command(self, record: Path, answer: Path) -> list[str]:
         """What closes one record."""
