@@ -34,6 +34,16 @@ class Run:
         """From its first sample to the last one that is fitted, s."""
         return float(self.t[self.fit][-1] - self.t[0])
 
+    def fit_time(self, share: float) -> float:
+        """From its first sample to the moment when such a share of the fitted samples has passed, s."""
+        fitted = self.t[self.fit]
+        return float(np.interp(share, np.linspace(0.0, 1.0, len(fitted)), fitted) - self.t[0])
+
+    def fit_share(self, time: float) -> float:
+        """Share of the fitted samples that have passed at a time from its first sample, s."""
+        fitted = self.t[self.fit] - self.t[0]
+        return float(np.interp(time, fitted, np.linspace(0.0, 1.0, len(fitted))))
+
     def part(self, first: int, end: int) -> "Run":
         """The samples from `first` to before `end`."""
         some = slice(first, end)

@@ -201,6 +201,7 @@ def test_effects_that_act_alike_are_named_together():
     ("kind", "simpler", "expected"),
     [
         ("free_play", "stiffness_change", True),
+        ("free_play", "constant_force", True),
         ("stribeck_friction", "coulomb_friction", True),
         ("coulomb_friction", "stribeck_friction", False),
         ("cubic_stiffness", "viscous_damping", False),

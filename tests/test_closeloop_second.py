@@ -38,6 +38,18 @@ def test_a_single_burst_does_not_set_in():
     assert grown(squares, 5) is None
 
 
+@given(st.floats(0.0, 0.5), st.floats(0.6, 1.0), st.floats(0.0, 1.0), st.floats(-50.0, 50.0))
+def test_shares_of_the_fitted_part_are_dated_wherever_it_lies(first, last, share, begin):
+    t = begin + np.linspace(0.0, 40.0, 2001)
+    fit = (t - begin >= 40.0 * first) & (t - begin <= 40.0 * last)
+    run = Run(t, t[:, None], t[:, None], fit, ~fit)
+    at = run.fit_time(share)
+    assert at == pytest.approx(40.0 * (first + share * (last - first)), abs=0.03)
+    assert run.fit_share(at) == pytest.approx(share, abs=1e-6)
+    assert np.mean(t[fit] - begin < at) == pytest.approx(share, abs=0.01)
+    assert (run.fit_share(0.0), run.fit_share(41.0)) == (0.0, 1.0)
+
+
 # ---- second effects
 
 
@@ -69,15 +81,25 @@ def test_two_laws_of_one_motion_at_one_place_are_a_curve(kinds, curve):
 
 
 @pytest.mark.parametrize("kind", sorted(k for k, e in EFFECTS.items() if e.over))
-def test_a_law_and_its_limits_are_over_the_same_motion(kind):
-    assert {EFFECTS[other].over for other in EFFECTS[kind].becomes} <= {EFFECTS[kind].over}
+def test_a_law_and_its_limits_are_over_the_same_motion_or_none(kind):
+    limits = [other for other in EFFECTS[kind].becomes if other != "constant_force"]
+    assert {EFFECTS[other].over for other in limits} <= {EFFECTS[kind].over}
 
 
-def test_a_law_is_outgrown_where_a_richer_one_gains_much_more_than_chance():
-    simple = several(("coulomb_friction", "wheel"), squares=500.0)
-    for gain, expected in ((0.0, False), (CURVE - 1, False), (CURVE + 1, True)):
-        assert outgrown(simple, several(("stribeck_friction", "wheel"), squares=500.0 - gain)) is expected
-        assert not outgrown(simple, several(("stribeck_friction", "roller"), squares=500.0 - gain))
+@pytest.mark.parametrize(("before", "enough"), [(9e3, CURVE), (5e6, 5e3)])
+@pytest.mark.parametrize(
+    ("richer", "counts"),
+    [
+        ([("stribeck_friction", "wheel")], True),
+        ([("stribeck_friction", "roller")], False),
+        ([("step_force", "roller"), ("coulomb_friction", "wheel")], True),
+        ([("step_force", "roller"), ("coulomb_friction", "roller")], False),
+    ],
+)
+def test_a_law_is_outgrown_where_more_gains_much_more_than_chance(before, enough, richer, counts):
+    simple, base = several(("coulomb_friction", "wheel"), squares=2e4), several(squares=2e4 + before)
+    for gain, expected in ((0.0, False), (0.9 * enough, False), (1.1 * enough, counts)):
+        assert outgrown(simple, several(*richer, squares=2e4 - gain), base) is expected
 
 
 class Seen:

@@ -9,6 +9,7 @@ import numpy as np
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, hypotheses, ranked, to_the_end
+from estimator.closeloop.curvature import confirmed
 from estimator.closeloop.dating import dated
 from estimator.closeloop.detect import LEVEL, ONE_EFFECT, Detection, detect
 from estimator.closeloop.fit import Fit, loose
@@ -171,7 +172,9 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     if early:
         return Outcome(*found, (), (), early, owed)
     singles, pairs = _fitted(screened, tell, jobs, stages)
+    tell("verdict", "asking whether it is the law's curve")
     judgement = judge(problem, base, singles, pairs, noise, size)
+    judgement = stages.done("verdict", lambda: confirmed(problem, base, judgement, forces, size))
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))

@@ -103,11 +103,11 @@ def _by_response(
     problem: Problem, at: tuple[float, Fit], candidates: Sequence[Candidate], size: Array
 ) -> list[Promise]:
     share, before = at
-    length = problem.record.runs[0].fit_length
+    run = problem.record.runs[0]
     here = problem.beginning(min(1.0, share + AFTER))
     there = fit(here, before.unknowns, size, before.theta, evaluations=1)
     labels = {c.label: c for c in reversed(candidates) if moment(c) is not None}
-    tried = [set_in(c, (share + g / BLOCKS) * length) for c in labels.values() for g in GRID]
+    tried = [set_in(c, run.fit_time(share + g / BLOCKS)) for c in labels.values() for g in GRID]
     screening = Screening(here, there, size)
     change = screening.changes(tried)
     found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])

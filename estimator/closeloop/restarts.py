@@ -105,4 +105,4 @@ def _grown(
 def _before(problem: Problem, promise: Promise) -> float:
     """Share of the identify part that lies before what a promise lets set in."""
     begins = moment(promise.candidates[0])
-    return 0.0 if begins is None else begins / problem.record.runs[0].fit_length
+    return 0.0 if begins is None else problem.record.runs[0].fit_share(begins)

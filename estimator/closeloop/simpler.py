@@ -1,11 +1,12 @@
 """Would a simpler law do? The one that a leading effect becomes at a limit, fitted in its place."""
 
 from collections.abc import Sequence
+from itertools import product
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, finished
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.screen import Promise, label
+from estimator.closeloop.screen import Promise, distinct, key
 from estimator.record import Array
 from fmus.effects import EFFECTS
 
@@ -23,18 +24,18 @@ def simpler(
     size: Array,
     jobs: int,
 ) -> list[Hypothesis]:
-    """Fits of the best of `found`, best first, with each of its laws replaced by one that it becomes.
+    """Fits of the best of `found`, best first, with one or more of its laws replaced by one that it becomes.
 
     candidates: that can be built in, in all shapes. What was fitted to the end already is left out.
     """
-    known = {h.label for h in found if h.fit.converged}
+    known = {h.key for h in found if h.fit.converged}
     promises = [
-        Promise(others, 0.0, _start(found[0], others))
+        Promise(laws, 0.0, _start(h, laws))
         for h in found[:1]
-        for i, c in enumerate(h.candidates)
-        for new in _in_place_of(c, candidates)
-        if label(others := (*h.candidates[:i], new, *h.candidates[i + 1 :])) not in known
+        for laws in product(*([c, *_in_place_of(c, candidates)] for c in h.candidates))
+        if laws != h.candidates and key(laws) not in known
     ]
+    promises = distinct(promises)
     return finished(problem, base.fit.unknowns, promises, size, jobs) if promises else []
 
 

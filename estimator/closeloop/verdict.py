@@ -35,6 +35,7 @@ EXPLAINED = 0.75  # share of the residual's variance, where the floor that a mod
 UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
 SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
+MISSED = 1e-3  # of what a law explains: right ones leave less than a tenth of it to a curve
 FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
@@ -117,8 +118,8 @@ def equivalent(
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
         behind = cost(h) - cost(best)
         worse = problem.record.floor_known and h.fit.converged and behind > max(CURVE, SAME * cost(best))
-        told = worse or beats(problem, best, h, size)
-        if mean < max(price, alike) or not told:
+        close = mean < max(price, alike) and (problem.form_error > 0 or not worse)
+        if close or not (worse or beats(problem, best, h, size)):
             members.append(h)
     return [h for h in members if not any(becomes(h, other) for other in members)]
 
@@ -166,15 +167,17 @@ def judge(
     ]
     if better and (not good or completes(problem, better[0], good[0], size)):
         members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
-        return _named(members, "several") if members else _curve(better[0])
+        return _named(members, "several") if members else no_law(better[0])
     if good:
         members = equivalent(problem, good[0], good, size)
-        if problem.form_error == 0 and any(outgrown(members[0], h) for h in good):
-            return _curve(members[0])
+        best = members[0]
+        more = [h for h in (*good, *pairs) if problem.form_error == 0 and outgrown(best, h, base)]
+        if more:
+            return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
         return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
-    best = singles[0].label if singles else "none"
+    nearest = singles[0].label if singles else "none"
     return Judgement(
-        "unexplained", (), f"no effect of the library accounts for the residual; nearest was {best}"
+        "unexplained", (), f"no effect of the library accounts for the residual; nearest was {nearest}"
     )
 
 
@@ -197,12 +200,19 @@ def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
     return float(np.sum((h.held_out(problem) / size) ** 2 - 1))
 
 
-def outgrown(m: Hypothesis, h: Hypothesis) -> bool:
-    """Whether m, a limit of h that held-out data prefer, leaves what h could explain of the identify part.
+def outgrown(m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:
+    """Whether m, which held-out data do not tell from h, leaves what h could explain of the identify part.
 
-    A right law gains alike on both parts; where the richer one gains on one alone, both are wrong.
+    h: a law that becomes m, or m and one more. A right law gains alike on both parts; where the richer one
+    gains on one alone, both are wrong.
     """
-    return becomes(h, m) and cost(m) - cost(h) > CURVE
+    richer = becomes(h, m) or set(m.key) < set(h.key)
+    return richer and cost(m) - cost(h) > noticed(m, base)
+
+
+def noticed(h: Hypothesis, base: Hypothesis) -> float:
+    """Fall of the sum of squares by something more from which on a hypothesis is not the whole of it."""
+    return max(CURVE, MISSED * (cost(base) - cost(h)))
 
 
 def one_curve(h: Hypothesis) -> bool:
@@ -213,11 +223,19 @@ def one_curve(h: Hypothesis) -> bool:
     return len(set(laws)) < len(laws)
 
 
-def _curve(h: Hypothesis) -> Judgement:
+def no_law(h: Hypothesis) -> Judgement:
+    """The verdict where a force keeps to a curve, but not to that of the law which comes nearest."""
     c = next(c for c in h.candidates if c.kind in EFFECTS)
     over = EFFECTS[c.kind].over or "motion"
     reason = (
         f"a force over the {over} at {c.location} that follows no law of the library; nearest was {h.label}"
+    )
+    return Judgement("unexplained", (), reason)
+
+
+def _not_all(m: Hypothesis, h: Hypothesis) -> Judgement:
+    reason = (
+        f"{m.label} accounts for the held-out part alone; in the part to identify was more, like {h.label}"
     )
     return Judgement("unexplained", (), reason)
 

@@ -23,7 +23,7 @@ class FreePlay(ForceLaw):
         "is lost at most"
     )
     amplitudes = ("k",)
-    becomes = ("stiffness_change",)
+    becomes = ("stiffness_change", "constant_force")  # wider than the motion; narrow, where q keeps its sign
     places = ("rests",)
     k = Parameter("{F}/{q}", min=0.0, doc="stiffness that is missing within the clearance")
     gap = Parameter("{q}", 1e-3, min=0.0, doc="half of the clearance")

@@ -1,0 +1,44 @@
+"""Is it the law's curve? What a free curve over the same motion could explain of what a law leaves."""
+
+from collections.abc import Sequence
+
+from estimator.closeloop.candidates import physical_candidates
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.freeform import FREE_FORMS
+from estimator.closeloop.missing_force import MissingForce
+from estimator.closeloop.problem import Problem
+from estimator.closeloop.screen import Screening, built, screen
+from estimator.closeloop.verdict import Judgement, no_law, noticed
+from estimator.record import Array
+from fmus.effects import EFFECTS
+
+
+def confirmed(
+    problem: Problem, base: Hypothesis, judgement: Judgement, forces: Sequence[MissingForce], size: Array
+) -> Judgement:
+    """The judgement, or `unexplained` where its best single law is not the curve that the force follows.
+
+    Asked where noise is declared and the FMU's form leaves nothing open: else what is left is no measure.
+    """
+    best = judgement.members[:1]
+    if not best or len(best[0].candidates) > 1 or not problem.record.floor_known or problem.form_error > 0:
+        return judgement
+    [h] = best
+    more = curvature(problem, h, forces, size)
+    return no_law(h) if more > noticed(h, base) else judgement
+
+
+def curvature(problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array) -> float:
+    """Fall of the sum of squares that a free curve beside a hypothesis' law would bring, by regression.
+
+    Zero for an effect that is no curve over velocity or displacement.
+    """
+    [c] = h.candidates
+    over = EFFECTS[c.kind].over if c.kind in EFFECTS else ""
+    offers = [(kind, c.location) for kind, law in FREE_FORMS.items() if law.against == over]
+    curves = physical_candidates(offers, problem.builder.outside(), problem.record, forces)
+    if not curves:
+        return 0.0
+    screening = Screening(built(problem, h.candidates), h.fit, size)
+    change = screening.changes(curves)
+    return screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)])[0].gain
