@@ -8,9 +8,11 @@ from estimator.closeloop.freeform import FREE_FORMS
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Screening, built, screen
-from estimator.closeloop.verdict import Judgement, no_law, noticed
+from estimator.closeloop.verdict import CURVE, SECOND, Judgement, no_law, noticed
 from estimator.record import Array
 from fmus.effects import EFFECTS
+
+SEEN = 0.05  # of the sum of squares of noise: where much is known, so much shows a law that only comes near
 
 
 def confirmed(
@@ -24,8 +26,16 @@ def confirmed(
     if not best or len(best[0].candidates) > 1 or not problem.record.floor_known or problem.form_error > 0:
         return judgement
     [h] = best
-    more = curvature(problem, h, forces, size)
-    return no_law(h) if more > noticed(h, base) else judgement
+    return no_law(h) if another(h, base, curvature(problem, h, forces, size)) else judgement
+
+
+def another(h: Hypothesis, base: Hypothesis, more: float) -> bool:
+    """Whether a curve that explains so much `more` than a hypothesis' law is another one.
+
+    Where it is much of what the law explains; or where it is most of what the law leaves, and plain.
+    """
+    most = more > max(CURVE, SEEN * len(h.fit.residual), SECOND * h.fit.beyond_noise)
+    return more > noticed(h, base) or most
 
 
 def curvature(problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array) -> float:

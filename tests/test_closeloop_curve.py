@@ -1,0 +1,84 @@
+"""A law that is named is the curve that the force follows, not one that comes near it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.closeloop.curvature import confirmed, curvature
+from estimator.closeloop.transfer import Traced
+from estimator.closeloop.verdict import CURVE, Judgement
+from fmus.export.hypotheses import ModelBuilder
+from tests.carriage import Force, coulomb, looked_at, problem, record, to_and_fro, viscous
+
+
+def root(bump: float, rebound: float) -> Force:
+    """A damper with a square-root law, softer one way."""
+    return lambda t, q, v: (bump if v > 0 else rebound) * float(np.sign(v) * np.sqrt(abs(v)))
+
+
+def cubic(size: float) -> Force:
+    return lambda t, q, v: size * q**3
+
+
+def bowl(size: float) -> Force:
+    """A spring that pushes one way alone, more and more."""
+    return lambda t, q, v: size * max(q, 0.0) ** 1.5
+
+
+@pytest.fixture(scope="module")
+def builder(tmp_path_factory: pytest.TempPathFactory) -> ModelBuilder:
+    return ModelBuilder("drive", tmp_path_factory.mktemp("drive"))
+
+
+def asked(builder: ModelBuilder, resistance: Force, kind: str, seed: int) -> Traced:
+    """A record with a resistance, to which one law is fitted."""
+    found = looked_at("one", problem(builder, record(to_and_fro(2.0), resistance, seed)), (kind,))
+    best = found.found.singles[0]
+    named = Judgement("traced", (best,), "it accounts for the residual")
+    return replace(found, found=replace(found.found, judgement=named))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("resistance", "kind"),
+    [
+        (coulomb(40.0), "coulomb_friction"),
+        (viscous(200.0), "viscous_damping"),
+        (cubic(3e3), "cubic_stiffness"),
+        (viscous(0.0), "constant_force"),
+        (lambda t, q, v: 20.0, "constant_force"),
+    ],
+)
+def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
+    o = asked(builder, resistance, kind, seed).found
+    here = problem(builder, record(to_and_fro(2.0), resistance, seed))
+    assert curvature(here, o.singles[0], o.forces, o.size) < CURVE
+    assert confirmed(here, o.base, o.judgement, o.forces, o.size) is o.judgement
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("resistance", "kind", "over"),
+    [
+        (root(80.0, 80.0), "coulomb_friction", "velocity"),
+        (root(60.0, 120.0), "coulomb_friction", "velocity"),
+        (root(60.0, 120.0), "viscous_damping", "velocity"),
+        (bowl(2e3), "cubic_stiffness", "displacement"),
+    ],
+)
+def test_a_law_that_is_near_is_not_named(builder, resistance, kind, over, seed):
+    traced = asked(builder, resistance, kind, seed)
+    o = traced.found
+    told = confirmed(traced.problem, o.base, o.judgement, o.forces, o.size)
+    assert (told.verdict, told.members) == ("unexplained", ())
+    assert f"over the {over} at carriage" in told.reason
+    assert f"nearest was {kind}@carriage" in told.reason
+
+
+def test_it_is_not_asked_where_what_is_left_is_no_measure(builder):
+    traced = asked(builder, root(60.0, 120.0), "coulomb_friction", 1)
+    o, here = traced.found, traced.problem
+    unknown = replace(here, record=replace(here.record, noise_std=np.array([1e-3, np.nan])))
+    for other in (replace(here, form_error=0.05), unknown):
+        assert confirmed(other, o.base, o.judgement, o.forces, o.size) is o.judgement
