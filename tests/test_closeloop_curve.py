@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.closeloop.curvature import confirmed, curvature
+from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.curvature import another, confirmed, curvature
+from estimator.closeloop.fit import Fit
 from estimator.closeloop.transfer import Traced
 from estimator.closeloop.verdict import CURVE, Judgement
 from fmus.export.hypotheses import ModelBuilder
@@ -80,5 +82,24 @@ def test_it_is_not_asked_where_what_is_left_is_no_measure(builder):
     traced = asked(builder, root(60.0, 120.0), "coulomb_friction", 1)
     o, here = traced.found, traced.problem
     unknown = replace(here, record=replace(here.record, noise_std=np.array([1e-3, np.nan])))
-    for other in (replace(here, form_error=0.05), unknown):
-        assert confirmed(other, o.base, o.judgement, o.forces, o.size) is o.judgement
+    assert confirmed(unknown, o.base, o.judgement, o.forces, o.size) is o.judgement
+
+
+@pytest.mark.parametrize(
+    ("left", "more", "closed", "opened"),
+    [
+        (0, CURVE - 1, False, False),
+        (0, CURVE + 1, True, False),
+        (0, 60, True, True),
+        (1000, 60, True, False),
+        (1000, 400, True, False),
+        (1000, 600, True, True),
+    ],
+)
+def test_an_open_form_may_leave_a_curve_that_is_not_most_of_it(left, more, closed, opened):
+    one = np.ones(1000)
+    base, h = (
+        Hypothesis((), Fit((), one[:0], np.eye(0), one * np.sqrt(squares / 1000), np.eye(1000, 0)), ())
+        for squares in (3e4, 1000 + left)
+    )
+    assert (another(h, base, more, False), another(h, base, more, True)) == (closed, opened)

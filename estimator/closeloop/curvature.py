@@ -20,22 +20,24 @@ def confirmed(
 ) -> Judgement:
     """The judgement, or `unexplained` where its best single law is not the curve that the force follows.
 
-    Asked where noise is declared and the FMU's form leaves nothing open: else what is left is no measure.
+    Asked where noise is declared: else what is left is no measure.
     """
     best = judgement.members[:1]
-    if not best or len(best[0].candidates) > 1 or not problem.record.floor_known or problem.form_error > 0:
+    if not best or len(best[0].candidates) > 1 or not problem.record.floor_known:
         return judgement
     [h] = best
-    return no_law(h) if another(h, base, curvature(problem, h, forces, size)) else judgement
+    more, open_form = curvature(problem, h, forces, size), problem.form_error > 0
+    return no_law(h) if another(h, base, more, open_form) else judgement
 
 
-def another(h: Hypothesis, base: Hypothesis, more: float) -> bool:
+def another(h: Hypothesis, base: Hypothesis, more: float, open_form: bool) -> bool:
     """Whether a curve that explains so much `more` than a hypothesis' law is another one.
 
-    Where it is much of what the law explains; or where it is most of what the law leaves, and plain.
+    Where it is most of what the law leaves, and plain; or much of what the law explains, unless the FMU's
+    form leaves something open, which could be as much.
     """
     most = more > max(CURVE, SEEN * len(h.fit.residual), SECOND * h.fit.beyond_noise)
-    return more > noticed(h, base) or most
+    return most or (not open_form and more > noticed(h, base))
 
 
 def curvature(problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array) -> float:
