@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.compare import Hypothesis, cost
 from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.simpler import limits
-from estimator.closeloop.verdict import becomes, completes, equivalent, reached
+from estimator.closeloop.verdict import CURVE, becomes, completes, equivalent, reached
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.result import effects_of
@@ -102,6 +102,15 @@ def law(kind: str, extra: int, gain: float) -> Hypothesis:
 def test_further_unknowns_have_to_be_worth_their_price(gain, stays):
     complex_one, simple = law("stribeck_friction", 2, gain), law("coulomb_friction", 0, 0.0)
     [only] = equivalent(asked(), complex_one, [complex_one, simple], NOISE)
+    assert only.candidates[0].kind == stays
+
+
+@pytest.mark.parametrize(("form", "stays"), [(0.0, "stribeck_friction"), (0.05, "coulomb_friction")])
+def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(form, stays):
+    complex_one, simple = law("stribeck_friction", 2, 0.5), law("coulomb_friction", 0, 0.0)
+    denied = replace(simple, fit=replace(simple.fit, residual=1.5 * simple.fit.residual))
+    assert cost(denied) - cost(complex_one) > CURVE
+    [only] = equivalent(asked(form), complex_one, [complex_one, denied], NOISE)
     assert only.candidates[0].kind == stays
 
 
