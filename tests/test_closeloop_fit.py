@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.fit import Fit, fit, loose, sandwich
 from estimator.closeloop.problem import Unknown
-from estimator.closeloop.slopes import Slopes
+from estimator.closeloop.slopes import FADED, PARTS, Slopes
 
 # ---- derivatives along secants
 
@@ -26,7 +26,7 @@ class Curved:
     def simulate(self, x: np.ndarray) -> np.ndarray:
         return x[0] * np.exp(-x[1] * self.t) * np.sin(x[2] * self.t)
 
-    record = SimpleNamespace(floor_known=True)
+    record, free_states = SimpleNamespace(floor_known=True), ()
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         self.count += 1
@@ -87,6 +87,36 @@ def test_known_columns_stay():
     given_column = np.full(4, 7.0)
     slopes = Slopes(lambda x: np.full(4, x.sum()), np.ones(2), np.full(2, np.inf), [given_column, None])
     assert_allclose(slopes.by_differences(np.zeros(2)), [[7.0, 1.0]] * 4)
+
+
+class Fading:
+    """A residual of two unknowns, the second of which fades at a rate that the first one sets."""
+
+    def __init__(self) -> None:
+        self.t, self.samples = np.linspace(0.0, 1.0, 2400), 0
+
+    def __call__(self, x, share=1.0):
+        t = self.t[: int(share * len(self.t))]
+        self.samples += len(t)
+        return x[0] * t + x[1] * np.exp(-x[0] * t)
+
+
+@given(st.floats(5.0, 400.0), st.floats(5.0, 400.0))
+def test_what_fades_is_not_simulated_to_the_end(before, now):
+    asked, whole = Fading(), Fading()
+    ones, high = np.ones(2), np.full(2, np.inf)
+    slopes, plain = (
+        Slopes(asked, ones, high, [None] * 2, (1,), asked),
+        Slopes(whole, ones, high, [None] * 2),
+    )
+    for rate in (before, now):
+        x = np.array([rate, 0.3])
+        found, expected = slopes.by_differences(x), plain.by_differences(x)
+        assert_allclose(found, expected, atol=2 * np.sqrt(FADED * np.sum(expected[:, 1] ** 2)))
+    length = int(np.ceil(PARTS * min(1.0, 7.0 / before)) + 1) / PARTS
+    short = now >= before and length < 1.0
+    assert (asked.samples < whole.samples) or not short
+    assert asked.samples <= whole.samples + length * len(whole.t)
 
 
 # ---- bounds

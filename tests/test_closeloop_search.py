@@ -226,7 +226,7 @@ class Line:
     t: np.ndarray
     y: np.ndarray
     builder: None = None
-    record = SimpleNamespace(floor_known=True)
+    record, free_states = SimpleNamespace(floor_known=True), ()
 
     def identify_residual(self, theta):
         return (self.y - theta["a"] * self.t)[:, None]

@@ -114,11 +114,14 @@ def fit(
     """
     low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
-    residual = _residual(problem, [u.name for u in unknowns], size, dict(fixed or {}))
+    names = [u.name for u in unknowns]
+    residual = _residual(problem, names, size, dict(fixed or {}))
     if not unknowns:
         alone = residual(x0)
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
-    slopes = Slopes(residual, scale, high, [(known or {}).get(u.name) for u in unknowns])
+    fading = [i for i, name in enumerate(names) if name in problem.free_states]
+    begun = _begun(problem, names, size, dict(fixed or {})) if fading else None
+    slopes = Slopes(residual, scale, high, [(known or {}).get(name) for name in names], fading, begun)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
     secants = not known and problem.record.floor_known
@@ -137,6 +140,16 @@ def _residual(
         return weighted(problem, {**held, **dict(zip(names, x, strict=True))}, size)
 
     return lambda x: simulated(tuple(x.tolist()))
+
+
+def _begun(
+    problem: Problem, names: Sequence[str], size: Array, held: Mapping[str, float]
+) -> Callable[[Array, float], Array] | None:
+    """The first share of the weighted residual as a function of values of `names`; None of several runs."""
+    if sum(run.fit.any() for run in problem.record.runs) > 1:
+        return None
+    part = lru_cache(problem.beginning)
+    return lambda x, share: weighted(part(share), {**held, **dict(zip(names, x.tolist(), strict=True))}, size)
 
 
 def _descended(

@@ -1,6 +1,9 @@
-"""Derivatives of a residual: by differences, a simulation each, then along the steps by secants."""
+"""Derivatives of a residual: by differences, a simulation each, then along the steps by secants.
 
-from collections.abc import Callable, Sequence
+What another start state does fades: once that is seen, its differences are simulated no longer than so far.
+"""
+
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
@@ -8,19 +11,26 @@ from estimator.record import Array
 
 STEP = 1e-2  # of an unknown's scale, for differences
 SHORT = 1e-3  # scales: a step too short to tell derivatives from what the FMU's solver leaves open
+FADED = 1e-6  # of a column's sum of squares: what may come after its end
+PARTS = 24  # of the residual, in which ends are counted
+
+Begun = Callable[[Array, float], Array]
 
 
 class Slopes:
     """Jacobian (m, n) of a residual function, carried from place to place by Broyden's update.
 
     residual: (m,) of x (n,); scale, high: (n,) of the unknowns; known: for each its column where that is
-    given and stays as it is, or None. Source: C. G. Broyden, Mathematics of Computation 19, 1965.
+    given and stays as it is, or None; fading: those whose columns may fade; begun: the first share of the
+    residual at x. Source: C. G. Broyden, Mathematics of Computation 19, 1965.
     """
 
     def __init__(
-        self, residual: Callable[[Array], Array], scale: Array, high: Array, known: Sequence[Array | None]
-    ) -> None:
+        self, residual: Callable[[Array], Array], scale: Array, high: Array, known: Sequence[Array | None],
+        fading: Collection[int] = (), begun: Begun | None = None,
+    ) -> None:  # fmt: skip
         self._residual, self._scale, self._high, self._known = residual, scale, high, list(known)
+        self._begun, self._parts = begun, dict.fromkeys(fading, PARTS)
         self._last: tuple[Array, Array, Array] | None = None  # place, residual and Jacobian there
         self.exact = False  # at the last place by differences alone
 
@@ -30,12 +40,23 @@ class Slopes:
         self.exact = not any(column is not None for column in guess or ())
         for i, known in enumerate(self._known):
             given = known if known is not None else guess[i] if guess else None
-            h = STEP * self._scale[i] * (1 if x[i] + STEP * self._scale[i] <= self._high[i] else -1)
-            aside = x + h * np.eye(len(x))[i]
-            columns.append(given if given is not None else (self._residual(aside) - r) / h)
+            columns.append(given if given is not None else self._column(i, x, r))
+            if i in self._parts:
+                self._parts[i] = faded(columns[i])
         jacobian: Array = np.column_stack(columns)
         self._last = x.copy(), r, jacobian
         return jacobian
+
+    def _column(self, i: int, x: Array, r: Array) -> Array:
+        h = STEP * self._scale[i] * (1 if x[i] + STEP * self._scale[i] <= self._high[i] else -1)
+        aside = x + h * np.eye(len(x))[i]
+        parts = self._parts.get(i, PARTS) + 1  # one in which nothing is to be seen
+        if self._begun and parts < PARTS:
+            begun = self._begun(aside, parts / PARTS)
+            column = np.append((begun - r[: len(begun)]) / h, np.zeros(len(r) - len(begun)))
+            if faded(column) < parts:
+                return column
+        return np.asarray((self._residual(aside) - r) / h)
 
     def at(self, x: Array) -> Array:
         """The Jacobian at x, from the last place on."""
@@ -49,3 +70,10 @@ class Slopes:
             jacobian = jacobian + np.outer(missed, step / self._scale / length)
             self._last, self.exact = (x.copy(), r, jacobian), False
         return jacobian
+
+
+def faded(column: Array) -> int:
+    """How many of its PARTS a column (m,) takes until nothing is left of it."""
+    squares = np.array([float(part @ part) for part in np.array_split(column, PARTS)])
+    left = np.cumsum(squares[::-1])[::-1]
+    return int(np.sum(left > FADED * left[0]))
