@@ -29,11 +29,6 @@ class Run:
     fit: BoolArray  # (N,) samples used to identify
     test: BoolArray  # (N,) samples held out
 
-    @property
-    def fit_length(self) -> float:
-        """From its first sample to the last one that is fitted, s."""
-        return float(self.t[self.fit][-1] - self.t[0])
-
     def fit_time(self, share: float) -> float:
         """From its first sample to the moment when such a share of the fitted samples has passed, s."""
         fitted = self.t[self.fit]

@@ -53,8 +53,8 @@ def asked(builder: ModelBuilder, resistance: Force, kind: str, seed: int) -> Tra
     ],
 )
 def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
-    o = asked(builder, resistance, kind, seed).found
-    here = problem(builder, record(to_and_fro(2.0), resistance, seed))
+    traced = asked(builder, resistance, kind, seed)
+    o, here = traced.found, traced.problem
     assert curvature(here, o.singles[0], o.forces, o.size) < CURVE
     assert confirmed(here, o.base, o.judgement, o.forces, o.size) is o.judgement
 

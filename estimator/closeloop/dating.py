@@ -42,7 +42,7 @@ def begins(h: Hypothesis) -> list[str]:
 def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:
     """A moment with which, all else as it is, the identify part is matched better, or None."""
     [name, *_] = begins(h)
-    here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_length, h.theta[name]
+    here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
     grid = now + REACH * length * np.arange(-STEPS, STEPS + 1) / STEPS
     inside = [float(t) for t in grid if 0.0 < t < length and t != now]
     squares = [float(np.sum(weighted(here, {**h.theta, name: t}, size) ** 2)) for t in inside]

@@ -23,6 +23,8 @@ WIDE = 1e3  # scales within which an unknown without bounds lies
 HELD = 1e-2  # of an unknown's scale: one that comes so near to a bound is held by it
 BLOCKS = 30  # pieces of the record between which residuals count as independent
 
+Named = Callable[[Sequence[float]], dict[str, float]]  # values by name, of a place
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -115,12 +117,16 @@ def fit(
     low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
     names = [u.name for u in unknowns]
-    residual = _residual(problem, names, size, dict(fixed or {}))
+
+    def theta(x: Sequence[float]) -> dict[str, float]:
+        return {**(fixed or {}), **dict(zip(names, x, strict=True))}
+
+    residual = _residual(problem, theta, size, len(names) + 2)
     if not unknowns:
         alone = residual(x0)
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
-    begun = _begun(problem, names, size, dict(fixed or {})) if fading else None
+    begun = _begun(problem, theta, size) if fading else None
     slopes = Slopes(residual, scale, high, [(known or {}).get(name) for name in names], fading, begun)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
@@ -130,26 +136,22 @@ def fit(
     return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)
 
 
-def _residual(
-    problem: Problem, names: Sequence[str], size: Array, held: Mapping[str, float]
-) -> Callable[[Array], Array]:
-    """The weighted residual (m,) as a function of the values of `names`; that of the last ones is kept."""
+def _residual(problem: Problem, theta: Named, size: Array, places: int) -> Callable[[Array], Array]:
+    """The weighted residual (m,) as a function of x; that of the last places is kept."""
 
-    @lru_cache(len(names) + 2)
+    @lru_cache(places)
     def simulated(x: tuple[float, ...]) -> Array:
-        return weighted(problem, {**held, **dict(zip(names, x, strict=True))}, size)
+        return weighted(problem, theta(x), size)
 
     return lambda x: simulated(tuple(x.tolist()))
 
 
-def _begun(
-    problem: Problem, names: Sequence[str], size: Array, held: Mapping[str, float]
-) -> Callable[[Array, float], Array] | None:
-    """The first share of the weighted residual as a function of values of `names`; None of several runs."""
+def _begun(problem: Problem, theta: Named, size: Array) -> Callable[[Array, float], Array] | None:
+    """The first share of the weighted residual as a function of x; None of several runs."""
     if sum(run.fit.any() for run in problem.record.runs) > 1:
         return None
     part = lru_cache(problem.beginning)
-    return lambda x, share: weighted(part(share), {**held, **dict(zip(names, x.tolist(), strict=True))}, size)
+    return lambda x, share: weighted(part(share), theta(x.tolist()), size)
 
 
 def _descended(

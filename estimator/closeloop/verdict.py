@@ -235,7 +235,7 @@ def no_law(h: Hypothesis) -> Judgement:
 
 def _not_all(m: Hypothesis, h: Hypothesis) -> Judgement:
     reason = (
-        f"{m.label} accounts for the held-out part alone; in the part to identify was more, like {h.label}"
+        f"{m.label} accounts for the held-out part, but not for the part to identify, where {h.label} would"
     )
     return Judgement("unexplained", (), reason)
 
