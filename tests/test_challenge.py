@@ -189,6 +189,14 @@ def test_sizes_that_lock_the_wheel_are_drawn_again(tmp_path):
     assert truth.items[0].parameters["F_0"] == 10.0
 
 
+def test_what_acts_where_the_record_is_held_out_is_drawn_again(tmp_path):
+    moments = iter([50.0, 30.0])  # s, of 60
+    usual = plan("single", "step_force", "roller").entries[0][0]
+    late = replace(usual, sizes=lambda rng: {"F_0": 20.0, "t0": next(moments)})
+    truth = make(Plan(5, "single", "rig", ((late, "roller"),)), 3, tmp_path / "r", tmp_path / "t")
+    assert truth.items[0].parameters["t0"] == 30.0
+
+
 def test_a_plan_that_never_works_is_refused(tmp_path):
     with pytest.raises(
         ValueError,

@@ -1,4 +1,4 @@
-"""How close-loop finds its way: smoothing, moments, twins, onsets, inputs between samples."""
+"""How close-loop finds its way: smoothing, moments, twins, lookalikes, onsets, inputs between samples."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,9 +15,11 @@ from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import group_size, grouped
 from estimator.closeloop.linear import Linearised, shows_its_state
+from estimator.closeloop.lookalikes import lookalikes
 from estimator.closeloop.moments import at_their_moments, moment, set_in
 from estimator.closeloop.onset import BLOCKS, onset
 from estimator.closeloop.problem import Problem, Unknown
+from estimator.closeloop.regressors import Calibration
 from estimator.closeloop.screen import Promise, screen
 from estimator.closeloop.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.twins import twins, with_twins
@@ -194,6 +196,50 @@ def test_effects_that_act_alike_are_named_together():
     assert second.residuals is first.residuals
 
 
+# ---- lookalikes
+
+
+@dataclass
+class Columns:
+    """Answers a candidate with its column."""
+
+    known: dict[str, np.ndarray]
+
+    def changes(self, candidates):
+        return [self.known[c.label][:, None] for c in candidates]
+
+
+@given(st.integers(0, 10_000), st.floats(-30.0, 30.0).filter(lambda a: abs(a) > 0.1), st.floats(-5.0, 5.0))
+def test_a_law_that_looks_like_the_best_one_starts_where_that_one_is(seed, ratio, taken_over):
+    rng = np.random.default_rng(seed)
+    calibrated, g, other, noise = rng.standard_normal((4, 400))
+    best = candidate("parameter_offset", "b1")
+    alike, near, far = (
+        candidate(k, "secondary") for k in ("damping_change", "coulomb_friction", "step_force")
+    )
+    columns = {
+        best.label: g,
+        alike.label: ratio * g + taken_over * calibrated,
+        near.label: g + 0.2 * noise,
+        far.label: other,
+    }
+    screening, change = Columns(columns), [(c, columns[c.label][:, None]) for c in (best, far, near, alike)]
+    calibration = Calibration(calibrated[:, None] / np.linalg.norm(calibrated))
+    unknowns = (Unknown("mu0", 0.3, *FREE, 1.0), *best.unknowns)
+    fit = replace(nothing_calibrated(np.ones(400)), unknowns=unknowns, values=np.array([0.4, 7.0]))
+    stuck = Hypothesis((alike,), replace(fit, unknowns=alike.unknowns, residual=np.full(400, 2.0)), ())
+    found = [Hypothesis((best,), fit, ()), stuck]
+    [promise] = lookalikes(screening, calibration, found, change)
+    assert promise.candidates == (alike,)
+    assert promise.start["mu0"] == 0.4
+    assert promise.start[alike.amplitudes[0].name] == pytest.approx(7.0 / ratio)
+    two = replace(fit, unknowns=(*unknowns, *far.unknowns), values=np.array([0.4, 7.0, 2.0]))
+    [pair] = lookalikes(screening, calibration, [Hypothesis((far, best), two, ())], change)
+    assert pair.candidates == (far, alike)
+    done = replace(stuck, fit=replace(fit, unknowns=alike.unknowns))  # as good as the best one
+    assert lookalikes(screening, calibration, [found[0], done], change) == []
+
+
 # ---- laws that fall together
 
 
@@ -203,6 +249,7 @@ def test_effects_that_act_alike_are_named_together():
         ("free_play", "stiffness_change", True),
         ("free_play", "constant_force", True),
         ("stribeck_friction", "coulomb_friction", True),
+        ("flexible_mode", "viscous_damping", True),
         ("coulomb_friction", "stribeck_friction", False),
         ("cubic_stiffness", "viscous_damping", False),
         ("sensor_gain", "sensor_bias", False),

@@ -8,13 +8,22 @@ import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
-from estimator.closeloop.compare import Hypothesis, best_by_label, briefly, hypotheses, ranked, to_the_end
+from estimator.closeloop.compare import (
+    Hypothesis,
+    best_by_label,
+    briefly,
+    finished,
+    hypotheses,
+    ranked,
+    to_the_end,
+)
 from estimator.closeloop.curvature import confirmed
 from estimator.closeloop.dating import dated
 from estimator.closeloop.detect import LEVEL, ONE_EFFECT, Detection, detect
 from estimator.closeloop.fit import Fit, loose
 from estimator.closeloop.freeform import free_form
 from estimator.closeloop.honesty import Honesty, honesty
+from estimator.closeloop.lookalikes import lookalikes
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.moments import at_their_moments, moment
 from estimator.closeloop.noise import noise_floor
@@ -22,8 +31,9 @@ from estimator.closeloop.onset import SLIGHT, TIMES, onset, since
 from estimator.closeloop.pairs import beside, try_pairs
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.progress import Progress, Tell
+from estimator.closeloop.regressors import Calibration, Changes
 from estimator.closeloop.restarts import from_the_beginning
-from estimator.closeloop.screen import Promise, Screening, screen
+from estimator.closeloop.screen import Promise, Screening, distinct, screen
 from estimator.closeloop.simpler import simpler
 from estimator.closeloop.stages import Stages
 from estimator.closeloop.twins import twins, with_twins
@@ -242,9 +252,9 @@ def _fitted(
             "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, jobs)
         )
         singles = best_by_label([*singles, *freed])
-    tell("simpler", "asking whether a simpler law would do")
+    tell("simpler", "asking whether a simpler law would do, or one that looks like it")
     ones, twos = ranked(problem, singles, size), ranked(problem, pairs, size)
-    ones, twos = stages.done("simpler", lambda: (_simplified(s, ones, jobs), _simplified(s, twos, jobs)))
+    ones, twos = stages.done("simpler", lambda: tuple(_replaced(s, h, single, jobs) for h in (ones, twos)))
     if s.explained(ones[:1]):
         tell("second", "looking at what is left for a second effect")
         least = ONE_EFFECT if problem.form_error > 0 else 0.0
@@ -253,12 +263,13 @@ def _fitted(
     return ranked(problem, with_twins(ones, alike), size), twos
 
 
-def _simplified(s: Screened, found: list[Hypothesis], jobs: int) -> list[Hypothesis]:
-    """Ranked hypotheses with simpler laws in place of those of the best one, where it may be the answer."""
+def _replaced(s: Screened, found: list[Hypothesis], change: Changes, jobs: int) -> list[Hypothesis]:
+    """Ranked hypotheses with other laws in place of those of the best one, where it may be the answer."""
     if not found or (s.floor_known and not s.explained(found[:1])):
         return found
-    candidates = [c for c, _ in s.change]
-    more = simpler(s.problem, s.base, found, candidates, s.size, jobs)
+    promises = simpler(found, [c for c, _ in s.change])
+    promises += lookalikes(s.screening, Calibration.of(s.fit), found, change)
+    more = finished(s.problem, s.base.fit.unknowns, distinct(promises), s.size, jobs)
     return ranked(s.problem, best_by_label([*found, *more]), s.size)
 
 

@@ -1,13 +1,11 @@
-"""Would a simpler law do? The one that a leading effect becomes at a limit, fitted in its place."""
+"""Would a simpler law do? The one that the leading effect becomes at a limit takes its place."""
 
 from collections.abc import Sequence
 from itertools import product
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, finished
-from estimator.closeloop.problem import Problem
+from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.screen import Promise, distinct, key
-from estimator.record import Array
 from fmus.effects import EFFECTS
 
 
@@ -16,27 +14,18 @@ def limits(kind: str) -> tuple[str, ...]:
     return EFFECTS[kind].becomes if kind in EFFECTS else ()
 
 
-def simpler(
-    problem: Problem,
-    base: Hypothesis,
-    found: Sequence[Hypothesis],
-    candidates: Sequence[Candidate],
-    size: Array,
-    jobs: int,
-) -> list[Hypothesis]:
-    """Fits of the best of `found`, best first, with one or more of its laws replaced by one that it becomes.
+def simpler(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> list[Promise]:
+    """Promises of the best of `found`, best first, with one or more of its laws as what they become.
 
     candidates: that can be built in, in all shapes. What was fitted to the end already is left out.
     """
-    known = {h.key for h in found if h.fit.converged}
+    best, known = found[0], {h.key for h in found if h.fit.converged}
     promises = [
-        Promise(laws, 0.0, _start(h, laws))
-        for h in found[:1]
-        for laws in product(*([c, *_in_place_of(c, candidates)] for c in h.candidates))
-        if laws != h.candidates and key(laws) not in known
+        Promise(laws, 0.0, _start(best, laws))
+        for laws in product(*([c, *_in_place_of(c, candidates)] for c in best.candidates))
+        if laws != best.candidates and key(laws) not in known
     ]
-    promises = distinct(promises)
-    return finished(problem, base.fit.unknowns, promises, size, jobs) if promises else []
+    return distinct(promises)
 
 
 def _in_place_of(c: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -29,6 +29,7 @@ class FlexibleMode(ForceLaw):
     )
     amplitudes = ("m",)
     places = ("rests", "turns")
+    becomes = ("viscous_damping",)  # a mass so heavy that it stays where it is
     told = ("v_0",)
     of_run = ("v_0",)
     m = Parameter("{F}.s2/{q}", min=0.0, doc="modal mass")

@@ -22,13 +22,18 @@ WORSE = ("wet", "low", "very_low")  # than dry
 DIGITS = 8
 ATTEMPTS = 20
 FAINT = 2.0  # times the noise: less may be left alone by the rule of what matters
+IDENTIFY = 0.6  # of the record, as every bench splits it
+LATE = (
+    0.1  # of its ratio over all of the record: an effect that has less in the part to identify is not there
+)
 
 
 def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
     """Write the record's folder, then the file of its truth; what is there already is kept.
 
     Sizes under which the system leaves what its model can say (a wheel locks, a flange climbs) are drawn
-    again, and faults of a sensor alone that drown in its noise. Raises ValueError where that does not help.
+    again, faults of a sensor alone that drown in its noise, and what acts first where the record is held out.
+    Raises ValueError where that does not help.
     """
     told = truths / f"{plan.name}.json"
     if told.exists():
@@ -120,10 +125,12 @@ def shown(here: Bench, clean: Outputs, items: tuple[Item, ...]) -> Outputs:
     return {o: measured(here.t, y, fault_of(items, o), 0.0, still) for o, y in clean.items()}
 
 
-def ratios(here: Bench, with_it: Outputs, without: Outputs) -> dict[str, float]:
-    """Rms of the difference over the noise, by output."""
+def ratios(here: Bench, with_it: Outputs, without: Outputs, part: float = 1.0) -> dict[str, float]:
+    """Rms of the difference over the noise, by output; part: of the record, from its start."""
+    seen = here.t <= part * here.t[-1]
     return {
-        o: float(np.sqrt(np.mean((with_it[o] - without[o]) ** 2)) / noise) for o, noise in here.noise.items()
+        o: float(np.sqrt(np.mean((with_it[o] - without[o])[seen] ** 2)) / noise)
+        for o, noise in here.noise.items()
     }
 
 
@@ -135,6 +142,9 @@ def measure(
     clean = here.simulate(more, more)
     with_it = shown(here, clean, items)
     sound = clean if more == NO_MORE else here.simulate(NO_MORE, more)
+    early, whole = (max(ratios(here, with_it, sound, part).values()) for part in (IDENTIFY, 1.0))
+    if early < LATE * whole:
+        raise ValueError(f"{early:.2f} times the noise in the part to identify, {whole:.2f} in all")
     each = []
     for item in items if len(items) > 1 else ():
         alone = here.simulate(effect_of((item,), here), more)
