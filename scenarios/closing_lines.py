@@ -20,7 +20,8 @@ def lines_of(result: Result) -> Iterator[str]:
         before, after, noise = (f"{error[k]:.3g}" for k in ("before", "after", "noise"))
         yield f"  {name}: error {before} before, {after} after, noise {noise}"
     if result.next_experiment:
-        yield f"  to tell them apart: {result.next_experiment}"
+        aim = "to tell them apart" if result.verdict == "ambiguous" else "to find out more"
+        yield f"  {aim}: {result.next_experiment}"
 
 
 def table_of(found: Results) -> Iterator[str]:

@@ -14,7 +14,7 @@ from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.simpler import limits
-from estimator.closeloop.verdict import CURVE, becomes, completes, equivalent, reached
+from estimator.closeloop.verdict import CURVE, becomes, completes, equivalent, judge, reached
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.result import effects_of
@@ -82,6 +82,17 @@ def test_less_matters_where_the_form_is_open(a, b, likeness):
 def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
     problem = asked(form)
     assert tuple(reached(problem, left(*after), left(*before), NOISE).tolist()) == found
+
+
+@pytest.mark.parametrize(("early", "late"), [(1.0, True), (1.2, False)])
+def test_what_begins_where_the_record_is_held_out_is_said_to_do_so(early, late):
+    nothing = left(5.0, 1.0)
+    [residual] = nothing.residuals
+    base = replace(nothing, residuals=(np.where(T[:, None] < SAMPLES, early * np.sign(residual), residual),))
+    told = judge(asked(), base, [base], [], NOISE, NOISE)
+    assert told.verdict == "unexplained"
+    assert ("begins in the held-out part" in told.reason) is late
+    assert bool(told.next_experiment) is late
 
 
 # ---- simpler laws

@@ -175,6 +175,9 @@ def judge(
         if more:
             return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
         return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
+    if _begins_late(problem, base, noise):
+        reason = "the part to identify shows no more than noise: what there is begins in the held-out part"
+        return Judgement("unexplained", (), reason, "a split with some of it in the part to identify")
     nearest = singles[0].label if singles else "none"
     return Judgement(
         "unexplained", (), f"no effect of the library accounts for the residual; nearest was {nearest}"
@@ -213,6 +216,14 @@ def outgrown(m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:
 def noticed(h: Hypothesis, base: Hypothesis) -> float:
     """Fall of the sum of squares by something more from which on a hypothesis is not the whole of it."""
     return max(CURVE, MISSED * (cost(base) - cost(h)))
+
+
+def _begins_late(problem: Problem, base: Hypothesis, noise: Array) -> bool:
+    """Whether the part to identify is matched as well as noise lets it be."""
+    runs = zip(base.residuals, problem.record.runs, strict=True)
+    fitted = np.concatenate([r[run.fit] for r, run in runs])
+    scatter = SCATTER / np.sqrt(2 * len(fitted))
+    return bool(np.all(np.sqrt(np.mean(fitted**2, axis=0)) < (1 + scatter) * noise))
 
 
 def one_curve(h: Hypothesis) -> bool:
