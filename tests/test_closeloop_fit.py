@@ -1,7 +1,7 @@
 """Fits: derivatives along secants, unknowns at bounds, unknowns of two fits."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.fit import Fit, fit, loose, sandwich
 from estimator.closeloop.problem import Unknown
-from estimator.closeloop.slopes import FADED, PARTS, Slopes
+from estimator.closeloop.slopes import FADED, FINE, PARTS, Slopes
 
 # ---- derivatives along secants
 
@@ -59,6 +59,37 @@ def test_secants_spare_simulations():
     asked = Curved(np.array([1.2, 0.12, 3.05]), 0.1 * np.random.default_rng(0).standard_normal(2000))
     fit(asked, NAMES, np.array([0.1]), gain=1e-9)
     assert asked.count < 20  # with differences at every step of the same way 6 times 4
+
+
+# ---- rugged valleys
+
+
+@dataclass
+class Rugged:
+    """A valley in x with ripples shorter than the usual step, and a step of the output at a sample."""
+
+    phase: float
+    record, free_states = SimpleNamespace(floor_known=False), ()  # no secants
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        x, t0 = theta["x"], theta["step_force_wheel_t0"]
+        t = np.arange(0.0, 1.0, 0.01)
+        ripple = 1e-3 * np.cos(x / 0.004 + self.phase)
+        return np.concatenate([x + 0 * t, 1 + ripple + 0 * t, 1.0 * (t >= t0) - (t >= 0.5)])[:, None]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 6.0), st.floats(0.3, 0.8))
+def test_finer_differences_see_the_slopes_of_a_rugged_valley(phase, t0):
+    asked = Rugged(phase)
+    x, moment = Unknown("x", 0.5, -9.0, 9.0, 1.0), Unknown("step_force_wheel_t0", t0, 0.0, 1.0, 1.0)
+    valley = fit(asked, (x,), np.ones(1), fixed={moment.name: 0.5})
+    found = fit(asked, (x,), np.ones(1), valley.theta, fixed={moment.name: 0.5}, step=FINE)
+    assert found.residual @ found.residual <= valley.residual @ valley.residual < 0.45**2 * 100 + 101
+    slope = -1e-3 / 0.004 * np.sin(found.values[0] / 0.004 + phase)
+    assert_allclose(found.jacobian[100:200, 0], slope, atol=1e-3)
+    timed = fit(asked, (x, moment), np.ones(1), step=FINE)
+    assert np.any(timed.jacobian[:, 1])  # a moment is not moved less than a sample
 
 
 MOVE = st.one_of(st.just(0.0), st.floats(0.05, 2.0), st.floats(-2.0, -0.05))

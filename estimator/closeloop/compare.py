@@ -10,6 +10,7 @@ from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import BLOCKS, Fit, fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built, key, label
+from estimator.closeloop.slopes import STEP
 from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
@@ -97,14 +98,15 @@ def hypothesis(
     evaluations: int,
     known: Mapping[str, Array] | None = None,
     guess: Mapping[str, Array] | None = None,
+    step: float = STEP,
 ) -> Hypothesis | None:
     """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
 
-    known, guess: see `fit`. None where the FMU does not run with them.
+    known, guess, step: see `fit`. None where the FMU does not run with them.
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
-    found = fit(here, [*unknowns, *own], size, promise.start, None, evaluations, known, guess)
+    found = fit(here, [*unknowns, *own], size, promise.start, None, evaluations, known, guess, step=step)
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
@@ -163,13 +165,13 @@ def to_the_end(
 
 def finished(
     problem: Problem, unknowns: Sequence[Unknown], promises: Sequence[Promise], size: Array, jobs: int,
-    guess: Mapping[str, Array] | None = None,
+    guess: Mapping[str, Array] | None = None, step: float = STEP,
 ) -> list[Hypothesis]:  # fmt: skip
     """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain.
 
-    guess: see `fit`.
+    guess, step: see `fit`.
     """
-    found = fitted(problem, unknowns, promises, size, LONG, jobs, guess=guess)
+    found = fitted(problem, unknowns, promises, size, LONG, jobs, guess=guess, step=step)
     for _ in range(ROUNDS):
         short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < RIVAL * cost(found[0])]
         if not short:
@@ -177,7 +179,7 @@ def finished(
         more = [Promise(h.candidates, 0.0, h.fit.theta) for h in short]
         before = sum(cost(h) for h in short)
         rest = [h for h in found if h not in short]
-        longer = fitted(problem, unknowns, more, size, LONG, jobs)
+        longer = fitted(problem, unknowns, more, size, LONG, jobs, step=step)
         found = best_by_label([*rest, *short, *longer])
         if sum(cost(h) for h in longer) > GAINS * before:
             break
@@ -193,11 +195,12 @@ def fitted(
     jobs: int,
     known: Mapping[str, Array] | None = None,
     guess: Mapping[str, Array] | None = None,
+    step: float = STEP,
 ) -> list[Hypothesis]:
     """Fit each promise with so many evaluations; one hypothesis a label, best first on the identify part."""
     where = together(problem, promises)
     tasks = (
-        delayed(hypothesis)(here, unknowns, p, size, evaluations, known, guess)
+        delayed(hypothesis)(here, unknowns, p, size, evaluations, known, guess, step)
         for here, p in zip(where, promises, strict=True)
     )
     return best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)

@@ -11,7 +11,6 @@ from joblib import Parallel, delayed
 
 from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished
 from estimator.closeloop.fit import weighted
-from estimator.closeloop.moments import BEGINS
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built
 from estimator.record import Array
@@ -36,7 +35,7 @@ def dated(
 
 def begins(h: Hypothesis) -> list[str]:
     """Names of a hypothesis' unknowns that are moments."""
-    return [u.name for c in h.candidates for u in c.shape if u.name.endswith(BEGINS)]
+    return [u.name for c in h.candidates for u in c.shape if u.is_moment]
 
 
 def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:

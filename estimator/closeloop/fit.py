@@ -11,7 +11,7 @@ from scipy.linalg import block_diag, pinvh
 from scipy.optimize import least_squares
 
 from estimator.closeloop.problem import Problem, Unknown
-from estimator.closeloop.slopes import Slopes
+from estimator.closeloop.slopes import STEP, Slopes
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
@@ -107,12 +107,14 @@ def fit(
     known: Mapping[str, Array] | None = None,
     guess: Mapping[str, Array] | None = None,
     gain: float = GAIN,
+    step: float = STEP,
 ) -> Fit:
     """Least squares of the simulation error over the unknowns, from `start` or their own start values.
 
     evaluations: simulations at most, the first one of each leg counted and those for differences not; gain:
     share of the sum of squares; a step that gains less is the last one. known: derivatives (m,) of the
-    weighted residual by some of the unknowns, taken as they are; guess: such as are good enough to begin.
+    weighted residual by some of the unknowns, taken as they are; guess: such as are good enough to begin;
+    step: of differences, in scales; a moment, which a model meets only at its own steps, has the usual one.
     """
     low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
@@ -127,7 +129,8 @@ def fit(
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
     begun = _begun(problem, theta, size) if fading else None
-    slopes = Slopes(residual, scale, high, [(known or {}).get(name) for name in names], fading, begun)
+    steps = np.array([STEP if u.is_moment else step for u in unknowns])
+    slopes = Slopes(residual, scale, high, [(known or {}).get(n) for n in names], fading, begun, steps)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
     secants = not known and problem.record.floor_known

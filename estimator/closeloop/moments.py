@@ -13,14 +13,13 @@ from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.screen import Promise, Screening, screen
 
-BEGINS = "_t0"  # how the name of such an unknown ends
 FIRST = 0.1  # of the length that is fitted: between the moments that were tried before
 ROUNDS, STEPS = 2, 6  # grids, and their points on either side
 
 
 def moment(c: Candidate) -> float | None:
     """When a candidate sets in, s; None where it is always there."""
-    return next((u.start for u in c.shape if u.name.endswith(BEGINS)), None)
+    return next((u.start for u in c.shape if u.is_moment), None)
 
 
 def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise], most: int) -> list[Promise]:
@@ -55,4 +54,4 @@ def _near(c: Candidate, spacing: float) -> list[Candidate]:
 
 def set_in(c: Candidate, t: float) -> Candidate:
     """The candidate setting in at a time, s."""
-    return replace(c, shape=tuple(replace(u, start=t) if u.name.endswith(BEGINS) else u for u in c.shape))
+    return replace(c, shape=tuple(replace(u, start=t) if u.is_moment else u for u in c.shape))

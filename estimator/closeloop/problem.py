@@ -30,6 +30,11 @@ class Unknown:
     high: float
     scale: float
 
+    @property
+    def is_moment(self) -> bool:
+        """A time at which an effect sets in."""
+        return self.name.endswith("_t0")
+
 
 class Builder(Protocol):
     """Gives the FMU with effects built in; picklable, and quick where it was asked before."""

@@ -3,7 +3,8 @@
 Where an effect is strong, the base's values have taken over what they could of it, and a small error of an
 unknown leads the FMU to quite another motion in the end: the sum of squares is rugged. Over the first
 seconds it is not, and what is found there leads the way on, for those that fit them best. Start states,
-which could take over much of so short a part, stay as measured until the whole is fitted.
+which could take over much of so short a part, stay as measured until the whole is fitted. Differences of
+the usual step smooth what is rugged and end in the valley; from there finer ones find the way further down.
 """
 
 from collections.abc import Sequence
@@ -12,10 +13,11 @@ from dataclasses import replace
 from joblib import Parallel, delayed
 
 from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished, hypothesis, together
-from estimator.closeloop.fit import fit
+from estimator.closeloop.fit import NEAR, fit
 from estimator.closeloop.moments import moment
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise
+from estimator.closeloop.slopes import FINE
 from estimator.record import Array
 
 Parts = tuple[tuple[float, int], ...]  # shares of the identify part, and evaluations of a fit to it
@@ -23,6 +25,7 @@ FIRST: Parts = ((0.125, 8), (0.25, 6))
 THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
 SURVIVORS, RIVAL = 4, 4.0  # of the first parts: so many go on, up to so many times the best mean square
 LEADING = 4  # labels, of those that fit best and of the most promising ones
+REFINED = 2  # of all in the end, that are still far from noise: fitted again by finer differences
 SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
 
 
@@ -58,8 +61,15 @@ def from_the_beginning(
         if mean_square(h) < RIVAL * mean_square(alive[0][0])
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
-    again = [Promise(h.candidates, 0.0, h.fit.theta) for h in grown[:LEADING]]
-    return best_by_label([*found, *grown, *finished(problem, unknowns, again, size, jobs)])
+    again = finished(problem, unknowns, _from_there(grown[:LEADING]), size, jobs)
+    best = best_by_label([*found, *grown, *again])
+    rugged = [h for h in best[:REFINED] if mean_square(h) > NEAR and cost(h) < RIVAL * cost(best[0])]
+    return best_by_label([*best, *finished(problem, unknowns, _from_there(rugged), size, jobs, step=FINE)])
+
+
+def _from_there(found: Sequence[Hypothesis]) -> list[Promise]:
+    """Promises that begin where hypotheses are."""
+    return [Promise(h.candidates, 0.0, h.fit.theta) for h in found]
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from estimator.record import Array
 
-STEP = 1e-2  # of an unknown's scale, for differences
+STEP = 1e-2  # of an unknown's scale, for differences: further than what a solver leaves open
+FINE = 1e-6  # the same in a valley that is rugged
 SHORT = 1e-3  # scales: a step too short to tell derivatives from what the FMU's solver leaves open
 FADED = 1e-6  # of a column's sum of squares: what may come after its end
 PARTS = 24  # of the residual, in which ends are counted
@@ -22,15 +23,16 @@ class Slopes:
 
     residual: (m,) of x (n,); scale, high: (n,) of the unknowns; known: for each its column where that is
     given and stays as it is, or None; fading: those whose columns may fade; begun: the first share of the
-    residual at x. Source: C. G. Broyden, Mathematics of Computation 19, 1965.
+    residual at x; step: of differences, in scales. Source: C. G. Broyden, Mathematics of Computation 19
+    (1965), 577-593.
     """
 
     def __init__(
         self, residual: Callable[[Array], Array], scale: Array, high: Array, known: Sequence[Array | None],
-        fading: Collection[int] = (), begun: Begun | None = None,
+        fading: Collection[int] = (), begun: Begun | None = None, step: Array | float = STEP,
     ) -> None:  # fmt: skip
         self._residual, self._scale, self._high, self._known = residual, scale, high, list(known)
-        self._begun, self._parts = begun, dict.fromkeys(fading, PARTS)
+        self._step, self._begun, self._parts = step * scale, begun, dict.fromkeys(fading, PARTS)
         self._last: tuple[Array, Array, Array] | None = None  # place, residual and Jacobian there
         self.exact = False  # at the last place by differences alone
 
@@ -48,7 +50,7 @@ class Slopes:
         return jacobian
 
     def _column(self, i: int, x: Array, r: Array) -> Array:
-        h = STEP * self._scale[i] * (1 if x[i] + STEP * self._scale[i] <= self._high[i] else -1)
+        h = self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i]
         aside = x + h * np.eye(len(x))[i]
         parts = self._parts.get(i, PARTS) + 1  # one in which nothing is to be seen
         if self._begun and parts < PARTS:
