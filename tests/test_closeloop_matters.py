@@ -14,7 +14,7 @@ from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.simpler import limits
-from estimator.closeloop.verdict import CURVE, becomes, completes, equivalent, judge, reached
+from estimator.closeloop.verdict import CURVE, becomes, completes, equivalent, judge, reached, whole
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.result import effects_of
@@ -158,6 +158,19 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
 )
 def test_a_second_effect_accounts_for_most_of_what_the_first_leaves(one, two, complete):
     assert completes(asked(), left(two, 1.0), left(one, 1.0), NOISE) is complete
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "all_of_it"),
+    [(3.0, 1.0, True), (3.0, 1.02, True), (3.0, 1.1, True), (3.0, 1.3, False), (1.5, 1.1, False)],
+)
+def test_a_pair_leaves_little_of_what_a_single_effect_leaves(one, two, all_of_it):
+    def fitted(mean_square):
+        h = left(1.0, 1.0)
+        return replace(h, fit=replace(h.fit, residual=np.sqrt(mean_square) * h.fit.residual))
+
+    assert whole(fitted(two), [fitted(5.0), fitted(one)]) is all_of_it
+    assert whole(fitted(two), [])
 
 
 def test_a_pair_becomes_a_simpler_one_in_either_order():

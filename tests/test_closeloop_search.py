@@ -240,6 +240,24 @@ def test_a_law_that_looks_like_the_best_one_starts_where_that_one_is(seed, ratio
     assert lookalikes(screening, calibration, [found[0], done], change) == []
 
 
+def test_at_another_place_a_law_is_looked_at_in_the_shape_that_it_has():
+    here, there = (
+        candidate("harmonic_excitation", at, [("f", f)]) for at, f in (("secondary", 1.0), ("body", 5.0))
+    )
+
+    class Asked:
+        def changes(self, candidates):
+            return [np.full((9, 1), c.shape[0].start) for c in candidates]
+
+    fit = replace(nothing_calibrated(np.ones(9)), unknowns=here.unknowns, values=np.array([3.0, 1.7]))
+    nothing = Calibration(np.zeros((9, 0)))
+    change = [(here, np.ones((9, 1))), (there, np.ones((9, 1)))]
+    [promise] = lookalikes(Asked(), nothing, [Hypothesis((here,), fit, ())], change)
+    assert promise.label == "harmonic_excitation@body"
+    assert promise.start["harmonic_excitation_body_f"] == 1.7
+    assert promise.start["harmonic_excitation_body_F_0"] == pytest.approx(3.0)
+
+
 # ---- laws that fall together
 
 

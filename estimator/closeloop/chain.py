@@ -253,18 +253,19 @@ def _fitted(
         )
         singles = best_by_label([*singles, *freed])
     tell("simpler", "asking whether a simpler law would do, or one that looks like it")
-    ones, twos = ranked(problem, singles, size), ranked(problem, pairs, size)
-    ones, twos = stages.done("simpler", lambda: tuple(_replaced(s, h, single, jobs) for h in (ones, twos)))
+    ones = stages.done("simpler", lambda: _replaced(s, singles, single, jobs))
     if s.explained(ones[:1]):
         tell("second", "looking at what is left for a second effect")
         least = ONE_EFFECT if problem.form_error > 0 else 0.0
         more = stages.done("beside", lambda: beside(problem, base, ones[0], s.screening, single, least, jobs))
-        twos = ranked(problem, best_by_label([*twos, *more]), size)
+        pairs = [*pairs, *more]
+    twos = stages.done("simpler pairs", lambda: _replaced(s, pairs, single, jobs))
     return ranked(problem, with_twins(ones, alike), size), twos
 
 
-def _replaced(s: Screened, found: list[Hypothesis], change: Changes, jobs: int) -> list[Hypothesis]:
-    """Ranked hypotheses with other laws in place of those of the best one, where it may be the answer."""
+def _replaced(s: Screened, found: Sequence[Hypothesis], change: Changes, jobs: int) -> list[Hypothesis]:
+    """Hypotheses ranked, with other laws in place of those of the best one, where it may be the answer."""
+    found = ranked(s.problem, best_by_label(found), s.size)
     if not found or (s.floor_known and not s.explained(found[:1])):
         return found
     promises = simpler(found, [c for c, _ in s.change])

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from estimator.closeloop.candidates import physical_candidates
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.compare import Hypothesis, cost
 from estimator.closeloop.freeform import FREE_FORMS
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
@@ -13,6 +13,8 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 
 SEEN = 0.05  # of the sum of squares of noise: where much is known, so much shows a law that only comes near
+OPEN_LEFT = 0.05  # where the FMU's form leaves something open, of what the law leaves beyond noise, and
+OPEN_MISSED = 2.5e-3  # of what it explains: right laws leave a curve of half of it at most
 
 
 def confirmed(
@@ -33,11 +35,13 @@ def confirmed(
 def another(h: Hypothesis, base: Hypothesis, more: float, open_form: bool) -> bool:
     """Whether a curve that explains so much `more` than a hypothesis' law is another one.
 
-    Where it is most of what the law leaves, and plain; or much of what the law explains, unless the FMU's
-    form leaves something open, which could be as much.
+    Where it is most of what the law leaves, and plain; or much of what the law explains. Where the FMU's form
+    leaves something open, right laws leave some curve too: there it has to be much of both.
     """
-    most = more > max(CURVE, SEEN * len(h.fit.residual), SECOND * h.fit.beyond_noise)
-    return most or (not open_form and more > noticed(h, base))
+    plain, left = max(CURVE, SEEN * len(h.fit.residual)), h.fit.beyond_noise
+    if open_form:
+        return more > max(plain, OPEN_LEFT * left, OPEN_MISSED * (cost(base) - cost(h)))
+    return more > max(plain, SECOND * left) or more > noticed(h, base)
 
 
 def curvature(problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array) -> float:

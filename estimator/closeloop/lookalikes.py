@@ -5,8 +5,9 @@ is strong, the fit of one may end where that of the other does not. Whether the 
 asked when both are there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -18,6 +19,7 @@ from estimator.closeloop.screen import Promise, Screening, distinct, key
 from estimator.record import Array
 
 ALIKE = 0.05  # of what a law does and calibration cannot take over: one that looks like it leaves less of it
+UNTOLD = 20.0  # of the sum of squares: what noise could hide
 WORSE = 1.5  # times the sum of squares of the best one, from which on a fit may have ended elsewhere
 MOST = 3  # that are fitted
 
@@ -28,34 +30,55 @@ def lookalikes(
     """Promises of the best of `found`, best first, with one of its laws replaced by one that looks like it.
 
     calibration: of the screening's fit; change: of the candidates that may take a place. What was fitted
-    nearly as well is left out.
+    nearly as well is left out. The gain of a promise is what it misses, negative.
     """
     best = found[0]
     known = {h.key for h in found if cost(h) < WORSE * cost(best)}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):
-        if not c.is_fault:
-            own = calibration.without(_response(screening, c, best))
-            for other, g in change:
-                laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
-                if not other.is_fault and key(laws) not in known:
-                    share, start = _nearest(other, calibration.without(g), own)
-                    promises.append(Promise(laws, share, {**best.theta, **start}))
+        if c.is_fault:
+            continue
+        fitted = _shaped(c, _shape(c, best.theta))
+        [own] = screening.changes([fitted])
+        response = calibration.without(own @ [best.theta[u.name] / u.scale for u in c.amplitudes])
+        for other, g in _others(screening, fitted, change):
+            laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
+            if key(laws) in known:
+                continue
+            missed, start = _nearest(other, calibration.without(g), response)
+            if missed < max(UNTOLD, ALIKE**2 * float(response @ response)):
+                promises.append(Promise(laws, -missed, {**best.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
-    return distinct([p for p in promises if p.gain > 1 - ALIKE**2])[:MOST]
+    return distinct(promises)[:MOST]
 
 
-def _response(screening: Screening, c: Candidate, h: Hypothesis) -> Array:
-    """Change of the screened residual (m,) by a hypothesis' candidate, as it was fitted."""
-    shape = tuple(replace(u, start=h.theta[u.name]) for u in c.shape)
-    [g] = screening.changes([replace(c, shape=shape)])
-    return np.asarray(g @ [h.theta[u.name] / u.scale for u in c.amplitudes])
+def _others(screening: Screening, c: Candidate, change: Changes) -> list[tuple[Candidate, Array]]:
+    """What could take a candidate's place, with its changes; of the same kind in the shape that it has."""
+    elsewhere = {other.location: other for other, _ in change if other.kind == c.kind}
+    moved = [_shaped(other, _shape(c)) for at, other in elsewhere.items() if at != c.location]
+    same = zip(moved, screening.changes(moved), strict=True)
+    return [*same, *((o, g) for o, g in change if o.kind != c.kind and not o.is_fault)]
+
+
+def _shape(c: Candidate, theta: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
+    """Values of a candidate's shape by the name of the parameter alone."""
+    return {u.name.removeprefix(_prefix(c)): theta.get(u.name, u.start) for u in c.shape}
+
+
+def _shaped(c: Candidate, shape: Mapping[str, float]) -> Candidate:
+    """The candidate in another shape; what that does not tell stays."""
+    named = ((u, u.name.removeprefix(_prefix(c))) for u in c.shape)
+    return replace(c, shape=tuple(replace(u, start=shape.get(name, u.start)) for u, name in named))
+
+
+def _prefix(c: Candidate) -> str:
+    return f"{c.kind}_{c.location}_"
 
 
 def _nearest(c: Candidate, g: Array, response: Array) -> tuple[float, dict[str, float]]:
-    """The share of a response (m,) that a candidate with the changes g (m, k) has too, and its values."""
+    """What a candidate with the changes g (m, k) misses of a response (m,), squared, and its values."""
     low, high = (np.array([getattr(u, side) / u.scale for u in c.amplitudes]) for side in ("low", "high"))
     size = lsq_linear(g, response, (low, high)).x
-    left = float(np.sum((response - g @ size) ** 2) / max(float(response @ response), 1e-300))
+    missed = float(np.sum((response - g @ size) ** 2))
     values = {u.name: float(b * u.scale) for u, b in zip(c.amplitudes, size, strict=True)}
-    return 1 - left, values | {u.name: u.start for u in c.shape}
+    return missed, values | {u.name: u.start for u in c.shape}

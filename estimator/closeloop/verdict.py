@@ -33,6 +33,7 @@ CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residu
 FORM_EXPLAINED = 0.9  # share of the variance beyond the noise, where the FMU's form leaves something open
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
+LITTLE = 0.1  # of what a second effect explains: two right ones leave less than that
 SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 MISSED = 1e-3  # of what a law explains: right ones leave less than a tenth of it to a curve
@@ -163,7 +164,10 @@ def judge(
     """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy."""
     good = [h for h in singles if explains(problem, h, base, noise, size)]
     better = [
-        h for h in pairs if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
+        h
+        for h in pairs
+        if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
+        if problem.form_error > 0 or not problem.record.floor_known or whole(h, singles)
     ]
     if better and (not good or completes(problem, better[0], good[0], size)):
         members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
@@ -187,6 +191,16 @@ def judge(
 def needed(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis], size: Array) -> bool:
     """Whether a pair is better than the best single hypothesis, so that neither member is idle."""
     return not singles or beats(problem, pair, singles[0], size)
+
+
+def whole(pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
+    """Whether a pair leaves noise in the part to identify, or little of what the best single effect leaves.
+
+    What is neither of two effects may be brought near to noise by both, one after the other.
+    """
+    left, chance = pair.fit.beyond_noise, SCATTER * np.sqrt(2 * len(pair.fit.residual))
+    gained = min((cost(s) for s in singles), default=np.inf) - cost(pair)
+    return bool(left < max(chance, LITTLE * gained))
 
 
 def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Array) -> bool:
