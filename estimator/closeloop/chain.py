@@ -183,7 +183,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
         return Outcome(*found, (), (), early, owed)
     singles, pairs = _fitted(screened, tell, jobs, stages)
     tell("verdict", "asking whether it is the law's curve")
-    judgement = judge(problem, base, singles, pairs, noise, size)
+    judgement = judge(problem, base, singles, pairs, noise, size, screened.began)
     judgement = stages.done("verdict", lambda: confirmed(problem, base, judgement, forces, size))
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")

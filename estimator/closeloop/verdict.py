@@ -9,7 +9,7 @@ import numpy as np
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, beats, cost, lead
-from estimator.closeloop.detect import Detection, signal_size
+from estimator.closeloop.detect import Detection, matters, signal_size
 from estimator.closeloop.moments import moment
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
@@ -37,6 +37,7 @@ LITTLE = 0.1  # of what a second effect explains: two right ones leave less than
 SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 MISSED = 1e-3  # of what a law explains: right ones leave less than a tenth of it to a curve
+HALF = 0.5  # the same where all of it is within what the form leaves
 FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
@@ -87,16 +88,16 @@ def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array) -> 
 def _reached_in_form(problem: Problem, before: Array, after: Array, noise: Array) -> BoolArray:
     """The same (n_y,) where the FMU's form leaves a share of each output open.
 
-    What was large comes within that share, what was small does not grow. Where all was small, most of what
-    was beyond the noise in all outputs together is explained.
+    What was large beyond noise comes within that share, what was small does not grow. Where all was small, so
+    that it could be form too, at least half of what was beyond noise in all outputs together is explained.
     """
     left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
-    open_share = problem.form_error * signal_size(problem)
-    large = before >= open_share
-    most = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
+    share = (problem.form_error * signal_size(problem) / noise) ** 2
+    large = was >= share
     if large.any():
-        return most | np.where(large, after < open_share, after <= CLEAN * before)
-    return most | (np.sum(left) <= (1 - FORM_EXPLAINED) * np.sum(was))
+        most = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
+        return most | np.where(large, left < share, after <= CLEAN * before)
+    return np.full(len(noise), np.sum(left) <= HALF * np.sum(was))
 
 
 def equivalent(
@@ -159,9 +160,12 @@ def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise
 
 def judge(
     problem: Problem, base: Hypothesis, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
-    noise: Array, size: Array,
+    noise: Array, size: Array, began: bool = False,
 ) -> Judgement:  # fmt: skip
-    """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy."""
+    """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy.
+
+    began: whether it sets in during the record.
+    """
     good = [h for h in singles if explains(problem, h, base, noise, size)]
     better = [
         h
@@ -179,6 +183,11 @@ def judge(
         if more:
             return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
         return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
+    if not matters(problem, base, noise, 0.0, began):
+        reason = (
+            "the residual is within what another form of the FMU leaves, and no effect explains most of it"
+        )
+        return Judgement("no_discrepancy", (), reason)
     if _begins_late(problem, base, noise):
         reason = "the part to identify shows no more than noise: what there is begins in the held-out part"
         return Judgement("unexplained", (), reason, "a split with some of it in the part to identify")
