@@ -81,23 +81,25 @@ def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array) -> 
     scatter = SCATTER / np.sqrt(2 * len(h.held_out(problem)))
     found: BoolArray = (after < (CLEAN + scatter) * noise) | (gap_closed(before, after, noise) >= GAP)
     if problem.form_error > 0:
-        found |= _reached_in_form(problem, before, after, noise)
+        found |= _reached_in_form(problem, before, after, noise, len(h.candidates))
     return found
 
 
-def _reached_in_form(problem: Problem, before: Array, after: Array, noise: Array) -> BoolArray:
+def _reached_in_form(problem: Problem, before: Array, after: Array, noise: Array, effects: int) -> BoolArray:
     """The same (n_y,) where the FMU's form leaves a share of each output open.
 
     What was large beyond noise comes within that share, what was small does not grow. Where all was small, so
-    that it could be form too, at least half of what was beyond noise in all outputs together is explained.
+    that it could be form too, one effect explains at least half of what was beyond noise in all outputs
+    together; several, which could come near to any form, nearly all of it.
     """
     left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
     share = (problem.form_error * signal_size(problem) / noise) ** 2
     large = was >= share
     if large.any():
-        most = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
-        return most | np.where(large, left < share, after <= CLEAN * before)
-    return np.full(len(noise), np.sum(left) <= HALF * np.sum(was))
+        gone = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
+        return gone | np.where(large, left < share, after <= CLEAN * before)
+    most = HALF if effects == 1 else 1 - FORM_EXPLAINED
+    return np.full(len(noise), np.sum(left) <= most * np.sum(was))
 
 
 def equivalent(
