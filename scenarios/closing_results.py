@@ -146,7 +146,7 @@ def joint(c: Common, target: Traced) -> Joint:
     effects = [x for x in c.alone[0].candidates if x.label in c.label.split(" + ")]
     words = glossary(target.problem, [c.alone[0]])
     units = {
-        u.name: words.unit_of_parameter(x, u.name.removeprefix(f"{x.kind}_{x.location}_"))
+        u.name: words.unit_of_parameter(x, u.name.removeprefix(x.prefix))
         for x in effects
         for u in chart([x]).machine
     }

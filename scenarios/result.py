@@ -156,7 +156,7 @@ def effects_of(h: Hypothesis) -> list[Effect]:
 
 
 def _parameters(h: Hypothesis, c: Candidate) -> dict[str, Figure]:
-    prefix = f"{c.kind}_{c.location}_"
+    prefix = c.prefix
     if c.is_fault:
         return {c.kind.removeprefix("sensor_"): _figure(h, c.amplitudes[0].name)}
     found = {u.name.removeprefix(prefix): _figure(h, u.name) for u in c.unknowns}

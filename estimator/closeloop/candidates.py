@@ -61,6 +61,11 @@ class Candidate:
         """kind@location."""
         return f"{self.kind}@{self.location}"
 
+    @property
+    def prefix(self) -> str:
+        """How the names of its unknowns begin; of a sensor's fault they do not."""
+        return f"{self.kind}_{self.location}_"
+
 
 def physical_candidates(
     offers: Sequence[tuple[str, str]], site: Site, record: Record, forces: Sequence[MissingForce]

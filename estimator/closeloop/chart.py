@@ -82,7 +82,7 @@ def chart(candidates: Sequence[Candidate]) -> Chart:
     waves: list[Wave] = []
     for c in candidates:
         own = EFFECTS[c.kind].of_run
-        prefix = f"{c.kind}_{c.location}_"
+        prefix = c.prefix
         left = list(c.unknowns)
         if PHASE in own and is_wave(c):
             cosine, sine = sorted(c.amplitudes, key=lambda u: u.name[-4:])

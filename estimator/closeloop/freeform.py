@@ -170,7 +170,7 @@ def _candidates(problem: Problem, d: Dependence, forces: Sequence[MissingForce])
 def curve_of(h: Hypothesis) -> Curve:
     """The curve of a force of free form with the standard error that its fit gives."""
     c = next(c for c in h.candidates if c.kind in FREE_FORMS)
-    law, prefix = FREE_FORMS[c.kind], f"{c.kind}_{c.location}_"
+    law, prefix = FREE_FORMS[c.kind], c.prefix
     shape = {n.removeprefix(prefix): v for n, v in c.fixed.items()}
     x = law.span(shape, GRID)
     splines = law.splines(shape, *law.motion(x))

@@ -62,17 +62,13 @@ def _others(screening: Screening, c: Candidate, change: Changes) -> list[tuple[C
 
 def _shape(c: Candidate, theta: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
     """Values of a candidate's shape by the name of the parameter alone."""
-    return {u.name.removeprefix(_prefix(c)): theta.get(u.name, u.start) for u in c.shape}
+    return {u.name.removeprefix(c.prefix): theta.get(u.name, u.start) for u in c.shape}
 
 
 def _shaped(c: Candidate, shape: Mapping[str, float]) -> Candidate:
     """The candidate in another shape; what that does not tell stays."""
-    named = ((u, u.name.removeprefix(_prefix(c))) for u in c.shape)
+    named = ((u, u.name.removeprefix(c.prefix)) for u in c.shape)
     return replace(c, shape=tuple(replace(u, start=shape.get(name, u.start)) for u, name in named))
-
-
-def _prefix(c: Candidate) -> str:
-    return f"{c.kind}_{c.location}_"
 
 
 def _nearest(c: Candidate, g: Array, response: Array) -> tuple[float, dict[str, float]]:

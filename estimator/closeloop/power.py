@@ -112,11 +112,11 @@ def _most(c: Candidate, u: Unknown, room: Mapping[str, float]) -> float:
 
 
 def _name(c: Candidate, u: Unknown) -> str:
-    return c.kind.removeprefix("sensor_") if c.is_fault else u.name.removeprefix(f"{c.kind}_{c.location}_")
+    return c.kind.removeprefix("sensor_") if c.is_fault else u.name.removeprefix(c.prefix)
 
 
 def _shape(c: Candidate) -> dict[str, float]:
-    return {u.name.removeprefix(f"{c.kind}_{c.location}_"): u.start for u in c.shape}
+    return {u.name.removeprefix(c.prefix): u.start for u in c.shape}
 
 
 def _both(a: Visible, b: Visible) -> Visible:

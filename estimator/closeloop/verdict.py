@@ -31,13 +31,13 @@ GAP = 0.95  # share of the gap to the noise that an effect must close where nois
 WON = 10.0  # log score over the FMU without the effect, on held-out data
 CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residual that is noise
 FORM_EXPLAINED = 0.9  # share of the variance beyond the noise, where the FMU's form leaves something open
+HALF = 0.5  # the same for one effect, where all of it is within what the form leaves
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
 LITTLE = 0.1  # of what a second effect explains: two right ones leave less than that
 SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 MISSED = 1e-3  # of what a law explains: right ones leave less than a tenth of it to a curve
-HALF = 0.5  # the same where all of it is within what the form leaves
 FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
 SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 

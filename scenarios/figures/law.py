@@ -54,7 +54,7 @@ def law_at(h: Hypothesis | None, missing: MissingForce) -> Law | None:
     for c in h.candidates:
         effect = EFFECTS.get(c.kind)
         if c.location == missing.port.name and effect and issubclass(effect, ForceLaw):
-            prefix = f"{c.kind}_{c.location}_"
+            prefix = c.prefix
             own = {n.removeprefix(prefix): x for n, x in h.theta.items() if n.startswith(prefix)}
             return Law(c, effect, own, missing)
     return None

@@ -41,7 +41,7 @@ def _sizes(parameters: dict[str, Figure], c: Candidate, words: Glossary) -> str:
     told = dict(parameters)
     if "amplitude" in told:  # it says what its sine and cosine say apart
         for u in c.amplitudes:
-            told.pop(u.name.removeprefix(f"{c.kind}_{c.location}_"))
+            told.pop(u.name.removeprefix(c.prefix))
         told = {"amplitude": told.pop("amplitude"), **told}
     return ", ".join(
         f"{parameter_name(c, name)}{HELD}={HELD}"

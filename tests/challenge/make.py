@@ -23,9 +23,7 @@ DIGITS = 8
 ATTEMPTS = 20
 FAINT = 2.0  # times the noise: less may be left alone by the rule of what matters
 IDENTIFY = 0.6  # of the record, as every bench splits it
-LATE = (
-    0.1  # of its ratio over all of the record: an effect that has less in the part to identify is not there
-)
+LATE = 0.1  # of the ratio over all of the record: an effect with less in the part to identify is not there
 
 
 def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
