@@ -66,7 +66,7 @@ def test_a_run_goes_on_where_it_stopped(carriage: Path, tmp_path: Path, capsys) 
     assert "--resume" in capsys.readouterr().err
     assert not (out / "result.json").exists()
     with pytest.MonkeyPatch.context() as patch:
-        for done in ("calibrate", "missing_forces", "detect", "honesty", "briefly"):
+        for done in ("calibrate", "missing_forces", "onset", "detect", "honesty", "briefly"):
             patch.setattr(chain, done, refused)
         assert close(carriage, out, "--resume") == 0
     assert not (out / STAGES).exists()

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from estimator.closeloop.allowed import allowed
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
 from estimator.closeloop.compare import (
@@ -101,6 +102,7 @@ class Screened:
     fit: Fit
     change: list[tuple[Candidate, Array]]
     promises: list[Promise]
+    stages: Stages
 
     @property
     def floor_known(self) -> bool:
@@ -130,7 +132,8 @@ class Screened:
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
         """What set in during the record; see `onset`."""
-        return onset(self.problem, self.base, self.size, SLIGHT if self.open_to_form else TIMES)
+        least = SLIGHT if self.open_to_form else TIMES
+        return self.stages.done("onset", lambda: onset(self.problem, self.base, self.size, least))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual."""
@@ -159,7 +162,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     declared, base, size = stages.done("calibrated", lambda: calibrate(problem))
     tell("missing force", "inferring the missing force at each port")
     forces = stages.done("forces", lambda: missing_forces(problem, base.fit.theta, noise))
-    screened = _screened(problem, base, noise, size, forces, tell)
+    screened = _screened(problem, base, noise, size, forces, tell, stages)
     tell("detect", "testing for a discrepancy against simulated records without one")
     change, seen = screened.change, screened.screening.fit
     over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
@@ -181,9 +184,10 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early, owed)
-    singles, pairs = _fitted(screened, tell, jobs, stages)
+    singles, pairs = _fitted(screened, tell, jobs)
     tell("verdict", "asking whether it is the law's curve")
-    judgement = judge(problem, base, singles, pairs, noise, size, screened.began)
+    judged = stages.done("allowed", lambda: allowed(problem, singles, size))
+    judgement = judge(problem, base, judged, pairs, noise, size, screened.began).of([*singles, *pairs])
     judgement = stages.done("verdict", lambda: confirmed(problem, base, judgement, forces, size))
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")
@@ -199,6 +203,7 @@ def _screened(
     size: Array,
     forces: Sequence[MissingForce],
     tell: Progress,
+    stages: Stages,
 ) -> Screened:
     builder = problem.builder
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
@@ -209,14 +214,12 @@ def _screened(
     # bounds that another form pushes against say nothing of effects
     fit = screening.fit if problem.form_error > 0 else loose(screening.fit)
     promises = screen(fit, [((c,), g) for c, g in change])
-    return Screened(problem, base, noise, size, screening, fit, change, promises)
+    return Screened(problem, base, noise, size, screening, fit, change, promises, stages)
 
 
-def _fitted(
-    s: Screened, tell: Progress, jobs: int, stages: Stages
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
+def _fitted(s: Screened, tell: Progress, jobs: int) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Single hypotheses and pairs, best first."""
-    problem, base, size = s.problem, s.base, s.size
+    problem, base, size, stages = s.problem, s.base, s.size, s.stages
     alike = twins(s.change)
     doubled = {label for others in alike.values() for label in others}
     single = [(c, g) for c, g in s.change if c.label not in doubled]

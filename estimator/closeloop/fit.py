@@ -18,6 +18,7 @@ from fmus.host.fmu import FmuError
 GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
 NEAR = 5.0  # mean square, in units of noise, from which down derivatives are carried along
 LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
+SLIGHT = 0.1  # standard errors: a shift that makes no difference
 REFUSED = 1e6  # size of a residual where the FMU could not be run
 WIDE = 1e3  # scales within which an unknown without bounds lies
 HELD = 1e-2  # of an unknown's scale: one that comes so near to a bound is held by it
@@ -136,6 +137,9 @@ def fit(
     secants = not known and problem.record.floor_known
     x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, secants)
     r, jacobian = residual(x), slopes.at(x)
+    middle = _middle(x, jacobian, scale, low, high)
+    if np.any(middle != x) and np.sum(residual(middle) ** 2) < r @ r + len(x):
+        x, r = middle, residual(middle)
     return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)
 
 
@@ -184,6 +188,28 @@ def _descended(
     return x, found.status > 0
 
 
+def _middle(x: Array, jacobian: Array, scale: Array, low: Array, high: Array) -> Array:
+    """The mean of what data and bounds leave, (n,); x: where the sum of squares is least.
+
+    What the data tell stays where it is; where they tell only the sum of two, each goes as far from its
+    bounds as the other lets it. Small shifts, which make no difference, are none.
+    """
+    bounded = high - low < WIDE * scale
+    away = np.zeros(len(x))
+    away[bounded] = ((low[bounded] + high[bounded]) / 2 - x[bounded]) / scale[bounded]
+    inverse, prior = _inverse(jacobian * scale, scale, high - low)
+    shift = inverse @ (prior * away)
+    if np.all(np.abs(shift) < SLIGHT * np.sqrt(np.diag(inverse))):
+        return x
+    return np.asarray(np.clip(x + shift * scale, low, high))
+
+
+def _inverse(j: Array, scale: Array, width: Array) -> tuple[Array, Array]:
+    """Covariance (n, n) of the unknowns in scales for white residuals, and what bounds alone say, (n,)."""
+    prior = 12 * (scale / np.minimum(width, WIDE * scale)) ** 2
+    return np.asarray(pinvh(j.T @ j + np.diag(prior))), prior
+
+
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:
     """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
 
@@ -193,7 +219,7 @@ def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Ar
     that is WIDE scales, so that what has no influence is not taken for certain.
     """
     j = jacobian * scale
-    inverse = pinvh(j.T @ j + np.diag(12 * (scale / np.minimum(width, WIDE * scale)) ** 2))
+    inverse, _ = _inverse(j, scale, width)
     scores = np.array(
         [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
     )

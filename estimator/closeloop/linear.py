@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,13 @@ class Linearised:
         return near
 
 
+class Influence(NamedTuple):
+    """What a unit of a lever does to the states in each step, (N, n), and to the outputs, (N, n_y)."""
+
+    states: Array
+    outputs: Array
+
+
 def shows_its_state(problem: Problem, theta: Mapping[str, float], x: Array) -> bool:
     """Whether a restart from the states that the FMU shows, x (N, n), goes on as its free run did."""
     plant, run, start = problem.plant, problem.record.runs[0], problem.start(theta)
@@ -59,7 +67,7 @@ def linearise(
 ) -> Linearised:  # fmt: skip
     """Linearise steps between the samples `keep` of the first run, whose states are x (N, n).
 
-    levers: inputs and parameters; more: outputs beside those of the record.
+    levers: inputs; more: outputs beside those of the record.
     """
     record, run = problem.record, problem.record.runs[0]
     plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
@@ -98,20 +106,44 @@ def _size(problem: Problem, name: str, given: Mapping[str, float]) -> float:
     return -size if at_the_top else size
 
 
+def influences(
+    problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp], levers: Sequence[str]
+) -> tuple[Linearised, dict[str, Influence]]:
+    """The FMU linearised, and what each lever, an input or a parameter, does between the samples `keep`.
+
+    What a parameter does goes with the motion, which may be faster than the linearisations lie apart: it
+    comes from a free run with the parameter changed.
+    """
+    plant = problem.plant
+    inputs = [name for name in levers if name in plant.fmu.description.inputs]
+    local = linearise(problem, theta, x, keep, inputs)
+    near = local.near(len(keep))
+    found = {name: Influence(local.B[near, :, i], local.D[near, :, i]) for i, name in enumerate(inputs)}
+    run, start = problem.record.runs[0].part(0, keep[-1] + 1), problem.start(theta)
+    n_y, a, c = len(plant.outputs), local.A[near[:-1]], local.C[near]
+    before = plant.simulate(run, start, plant.states)[keep]
+    for name in (n for n in levers if n not in found):
+        h = NUDGE * _size(problem, name, start)
+        after = plant.simulate(run, {**start, name: _value(problem, name, start) + h}, plant.states)[keep]
+        dy, dx = np.split((after - before) / h, (n_y,), axis=1)
+        steps = dx[1:] - np.einsum("kmn,kn->km", a, dx[:-1])
+        steps[0] = dx[1]  # what moves at the start is no step
+        found[name] = Influence(np.vstack([steps, steps[-1:]]), dy - np.einsum("kyn,kn->ky", c, dx))
+    return local, found
+
+
 def responses(
-    local: Linearised, levers: Sequence[str], moved: Sequence[Mapping[str, Array]], samples: int
+    local: Linearised, levers: Mapping[str, Influence], moved: Sequence[Mapping[str, Array]], samples: int
 ) -> Array:
     """Change of the outputs (samples, n_y, k) by each of k sets of changes (samples,) of levers."""
     near = local.near(samples)
     n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
-    place = {name: i for i, name in enumerate(levers)}
     force, direct = np.zeros((samples, n, k)), np.zeros((samples, n_y, k))
     for j, changes in enumerate(moved):
         for name, change in changes.items():
-            w, i = change[:samples, None], place[name]
-            acting = np.vstack([(w[1:] + w[:-1]) / 2, w[-1:]])
-            force[:, :, j] += local.B[near, :, i] * acting
-            direct[:, :, j] += local.D[near, :, i] * w
+            w = change[:samples, None]
+            force[:, :, j] += levers[name].states * np.vstack([(w[1:] + w[:-1]) / 2, w[-1:]])
+            direct[:, :, j] += levers[name].outputs * w
     x, states = np.zeros((n, k)), np.empty((samples, n, k))
     for s in range(samples):
         states[s] = x

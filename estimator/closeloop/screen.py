@@ -18,7 +18,7 @@ from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import group_size, grouped, grouped_fit
 from estimator.closeloop.levers import Course, names_of, shifts
-from estimator.closeloop.linear import Linearised, linearise, responses, shows_its_state
+from estimator.closeloop.linear import Influence, Linearised, influences, responses, shows_its_state
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import faulty
@@ -89,7 +89,7 @@ class Screening:
         self.group = group_size(problem, self._shown[0])
         self.fit = grouped_fit(base, len(size), self.group)
         self._made: dict[str, Around] = {}
-        self._local: tuple[list[str], Linearised] | None = None
+        self._local: tuple[Linearised, dict[str, Influence]] | None = None
 
     def changes(self, candidates: Sequence[Candidate]) -> list[Array]:
         """Change of the residual of `fit` by each candidate's amplitudes at their scales, (m, k) each."""
@@ -154,7 +154,7 @@ class Screening:
             return []
         if self._states is None:
             return [self._simulated(change) for change in moved]
-        levers, local = self._linearised(names_of(moved), self._states)
+        local, levers = self._linearised(names_of(moved), self._states)
         fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size[:, None]
         found: list[Array] = []
         for i in range(0, len(moved), TOGETHER):
@@ -162,9 +162,9 @@ class Screening:
             found += list((y * scale).reshape(-1, y.shape[2]).T)
         return found
 
-    def _linearised(self, levers: list[str], x: Array) -> tuple[list[str], Linearised]:
-        if self._local is None or not set(levers) <= set(self._local[0]):
-            self._local = levers, linearise(self.problem, self.theta, x, self._at, levers)
+    def _linearised(self, levers: list[str], x: Array) -> tuple[Linearised, dict[str, Influence]]:
+        if self._local is None or not set(levers) <= set(self._local[1]):
+            self._local = influences(self.problem, self.theta, x, self._at, levers)
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:

@@ -1,7 +1,9 @@
 """From fitted hypotheses to a verdict: what may be said, and what would tell the rest apart."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Literal
 
@@ -50,6 +52,11 @@ class Judgement:
     members: tuple[Hypothesis, ...]
     reason: str
     next_experiment: str = ""
+
+    def of(self, found: Sequence[Hypothesis]) -> Judgement:
+        """The same of hypotheses as they were fitted."""
+        fitted = {h.key: h for h in found}
+        return replace(self, members=tuple(fitted[m.key] for m in self.members))
 
 
 def gap_closed(before: Array, after: Array, noise: Array) -> Array:

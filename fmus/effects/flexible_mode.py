@@ -58,4 +58,5 @@ class FlexibleMode(ForceLaw):
         highest = min(PER_SAMPLE / float(np.median(np.diff(t))), HIGHEST)
         grid = np.geomspace(LOWEST, highest, int(np.log(highest / LOWEST) / np.log(APART)) + 1)
         found = [f for f in frequencies(t, v, force) if LOWEST < f < highest]
-        return [{"f": float(f), "v_0": float(v[0])} for f in (*found, *grid)]
+        more = {"D": cls.D.start, "v_0": float(v[0])}
+        return [{"f": float(f), **more} for f in (*found, *grid)]

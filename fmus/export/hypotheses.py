@@ -46,8 +46,9 @@ class ModelBuilder:
 
     @property
     def offers(self) -> Effects:
-        """Every effect at every location where it makes sense."""
-        return offers(_bare(self.model))
+        """Every effect at every location where it makes sense, and where another form would be none."""
+        model = model_class(self.model)
+        return tuple(e for e in offers(_bare(self.model)) if e[1] not in {*model.form, *model.form_alike})
 
     @property
     def ports(self) -> tuple[PortNames, ...]:

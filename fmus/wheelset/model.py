@@ -67,6 +67,7 @@ class Wheelset(Model):
     name = "Wheelset"
     step_size = 1e-3
     form = MappingProxyType({"k_b": (0.6, 2.6), "k_spin": (0.2, 1.2)})
+    form_alike = ("k_a", "G", "nu")
     form_error = 0.05
     method = rk4_within_stability
 
