@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -165,6 +166,32 @@ def test_what_a_bound_holds_back_is_no_more_free():
     assert left.jacobian.shape == (300, 1)
     assert left.theta == {"free": 3.0}
     assert loose(at_a_bound(0.5)).theta == at_a_bound(0.5).theta
+
+
+@dataclass
+class Summed:
+    """An output that shows the sum of two unknowns, a + 2 b, and how often it was simulated."""
+
+    a: float
+    b: float
+    record, free_states = SimpleNamespace(floor_known=True), ()
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        t = np.linspace(0.0, 1.0, 400)
+        noise = np.random.default_rng(3).standard_normal(400)
+        return (0.01 * noise + (self.a + 2 * self.b - theta["a"] - 2 * theta["b"]) * t)[:, None]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(1.0, 3.0), st.floats(0.0, 8.0), st.floats(1.0, 3.0))
+def test_of_two_that_tell_their_sum_the_bounded_one_ends_in_the_middle(true_b, begin_a, begin_b):
+    unknowns = Unknown("a", begin_a, -np.inf, np.inf, 1.0), Unknown("b", begin_b, 1.0, 3.0, 0.2)
+    found = fit(Summed(5.0, true_b), unknowns, np.array([0.01]))
+    assert found.theta["b"] == pytest.approx(2.0, abs=0.02)
+    assert found.theta["a"] + 2 * found.theta["b"] == pytest.approx(5.0 + 2 * true_b, abs=0.01)
+    assert found.std["b"] == pytest.approx(2 / np.sqrt(12), rel=0.02)
+    assert abs(found.theta["a"] - 5.0) < 1.8 * found.std["a"]  # of a uniform distribution all of it
+    assert found.residual @ found.residual < 1.2 * 400
 
 
 @given(st.floats(0.0, 50.0))

@@ -148,6 +148,26 @@ def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(for
     assert only.candidates[0].kind == stays
 
 
+def test_where_the_motion_does_not_show_the_curve_what_lies_between_stays():
+    """At one speed constant, Coulomb and viscous are alike; Coulomb friction becomes viscous damping."""
+    found = [law(kind, extra, 0.0) for kind, extra in (("coulomb_friction", 1), ("viscous_damping", 0))]
+    assert [h.label for h in equivalent(asked(), found[0], found, NOISE)] == ["viscous_damping@wheel"]
+    more = [law("stribeck_friction", 3, 0.0), *found, law("constant_force", 0, 0.0)]
+    kinds = {h.candidates[0].kind for h in equivalent(asked(), more[0], more, NOISE)}
+    assert kinds == {"coulomb_friction", "viscous_damping", "constant_force"}
+
+
+def test_a_group_of_parameters_stands_for_one_of_them():
+    one, other = law("parameter_step", 0, 0.0), law("parameter_step", 0, 0.0)
+    names = [f"parameter_step_friction_condition_delta_{n}" for n in ("mu0", "k_A")]
+    members = tuple(Unknown(n, 0.0, -1.0, 1.0, 0.1) for n in names)
+    group = replace(one, candidates=(Candidate("parameter_step", "friction_condition", members),))
+    inside = replace(one, candidates=(replace(one.candidates[0], location="k_A"),))
+    outside = replace(other, candidates=(replace(one.candidates[0], location="F_n"),))
+    for best in (group, inside):
+        assert equivalent(asked(), best, [group, inside, outside], NOISE)[-2:] == [group, outside]
+
+
 @pytest.mark.parametrize("kind", sorted(EFFECTS))
 def test_laws_do_not_become_one_another(kind):
     for other in limits(kind):

@@ -1,4 +1,4 @@
-"""How close-loop finds its way: smoothing, moments, twins, lookalikes, onsets, inputs between samples."""
+"""How close-loop finds its way: inputs, linear answers, smoothing, moments, twins, lookalikes, onsets."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import group_size, grouped
-from estimator.closeloop.linear import Linearised, shows_its_state
+from estimator.closeloop.linear import Linearised, influences, responses, shows_its_state
 from estimator.closeloop.lookalikes import lookalikes
 from estimator.closeloop.moments import at_their_moments, moment, set_in
 from estimator.closeloop.onset import BLOCKS, onset
@@ -26,6 +26,8 @@ from estimator.closeloop.twins import twins, with_twins
 from estimator.closeloop.verdict import becomes
 from estimator.plant import between
 from estimator.record import Record, Run
+from fmus.export.hypotheses import ModelBuilder
+from fmus.models import MODELS
 from tests.native import native
 
 FREE = (-np.inf, np.inf)
@@ -72,6 +74,42 @@ def test_an_fmu_between_coarse_samples_shows_its_state(hidden):
     if hidden:
         x[:, 3] *= 1.01
     assert shows_its_state(problem, {}, x) is not hidden
+
+
+# ---- linear answers
+
+
+@pytest.mark.parametrize("lever", ["h_b2_fr", "h_k2_fr", "h_b1_rl", "m2"])
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_what_a_parameter_changes_is_what_a_simulation_says(lever, share):
+    """On a track as short-waved as axle boxes feel, much faster than the linearisations lie apart."""
+    t = np.arange(0.0, 20.0, 0.005)
+    inputs, columns = [], []
+    for i, corner in enumerate(("fl", "fr", "rl", "rr")):
+        w, phase = 2 * np.pi * np.array([0.9, 4.3, 7.9]), np.array([0.3, 1.1, 2.7]) * (i + 1)
+        inputs += [f"u_{corner}", f"u_{corner}_dot"]
+        columns += [1e-3 * np.sin(np.outer(t, w) + phase).sum(1)]
+        columns += [1e-3 * (w * np.cos(np.outer(t, w) + phase)).sum(1)]
+    outputs, every = ("z1_ddot", "z2_ddot", "phi_x2_dot"), np.ones(len(t), bool)
+    run = Run(t, np.column_stack(columns), np.zeros((len(t), 3)), every, ~every)
+    record = Record((run,), tuple(inputs), outputs, np.ones(3))
+    problem = Problem(lambda _: native("vehicle7dof"), record, {}, {})
+    plant, k = problem.plant, int(share * len(t))
+    states = problem.simulate({}, plant.states)[0][:, 3:]
+    local, found = influences(problem, {}, states, np.arange(len(t)), [lever])
+    linear = responses(local, found, [{lever: 1.0 * (np.arange(len(t)) >= k)}], len(t))[k:, :, 0]
+    h, start, rest = 1e-4, dict(zip(plant.states, states[k], strict=True)), run.part(k, len(t))
+    value = plant.fmu.description.variables[lever].start
+    moved = plant.simulate(rest, {**start, lever: value * (1 - h)})
+    exact = (plant.simulate(rest, start) - moved) / (h * value)
+    assert np.linalg.norm(linear - exact) < 0.03 * np.linalg.norm(exact)
+
+
+def test_another_form_of_a_law_is_no_effect_that_is_looked_for():
+    for name, model in MODELS.items():
+        form = {*model.form, *model.form_alike}
+        assert form <= model().variables.keys()
+        assert not form & {location for _, location in ModelBuilder(name, Path()).offers}
 
 
 # ---- the smoother

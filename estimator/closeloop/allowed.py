@@ -20,6 +20,7 @@ from fmus.host.fmu import FmuError
 CHANCE = 3.0  # standard deviations of the sum of squares of white noise
 APART = 20.0  # log score between them, from which the held-out part tells what the other does not
 MOST = 8  # laws that are looked at
+REACH = 3.0  # standard errors, that a value may be moved by
 STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
 
 
@@ -68,7 +69,10 @@ def _as_errors_allow(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis
         return np.column_stack([(misfit(z + d) - at) / NUDGE for d in NUDGE * np.eye(len(z))])
 
     low, high = (np.array([getattr(u, side) for u in unknowns]) for side in ("low", "high"))
-    inside = np.minimum((low - best) / error, -NUDGE), np.maximum((high - best) / error, NUDGE)
+    inside = (
+        np.clip((low - best) / error, -REACH, -NUDGE),
+        np.clip((high - best) / error, NUDGE, REACH),
+    )
     try:
         z = least_squares(misfit, np.zeros(len(best)), slopes, inside, max_nfev=STEPS).x
         return replace(h, residuals=tuple(residuals(z)))

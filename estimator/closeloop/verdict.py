@@ -117,7 +117,7 @@ def equivalent(
     Where the FMU's form leaves something open, what the best one leaves is no measure of a small difference.
     A simpler law that it becomes at a limit of its shape is told from it only where every further unknown is
     worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
-    simpler one stays.
+    simpler one stays; of a group of parameters and one of them the group.
     """
     members, alike = [best], SAME * -float(best.scores(problem, size).sum())
     if problem.form_error > 0:
@@ -132,7 +132,31 @@ def equivalent(
         close = mean < max(price, alike) and (problem.form_error > 0 or not worse)
         if close or not (worse or beats(problem, best, h, size)):
             members.append(h)
-    return [h for h in members if not any(becomes(h, other) for other in members)]
+    members = [h for h in members if not any(_replaces(other, h, members) for other in members)]
+    return [h for h in members if not any(_includes(other, h) for other in members)]
+
+
+def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
+    """Whether a simpler law of the class that h becomes takes its place.
+
+    Not where one at that place does as well that h does not become (constant force, and viscous damping,
+    which Coulomb friction becomes): then the motion does not show the curve, and h may lie between them.
+    """
+    if not becomes(h, other):
+        return False
+    places = [c.location for c in h.candidates]
+    rivals = [m for m in members if m is not h and [c.location for c in m.candidates] == places]
+    between = any(not becomes(h, m) and not becomes(m, h) for m in rivals)
+    return not between or any(becomes(other, m) for m in members)
+
+
+def _includes(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether one says of a group of parameters what the other says of one of them, so that both are true."""
+    if len(h.candidates) != 1 or len(other.candidates) != 1 or h is other:
+        return False
+    (group,), (c,) = h.candidates, other.candidates
+    names = [u.name.removeprefix(group.prefix).partition("_")[2] for u in group.amplitudes]
+    return group.kind == c.kind and c.location in names
 
 
 def becomes(h: Hypothesis, other: Hypothesis) -> bool:
