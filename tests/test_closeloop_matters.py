@@ -155,6 +155,9 @@ def test_where_the_motion_does_not_show_the_curve_what_lies_between_stays():
     more = [law("stribeck_friction", 3, 0.0), *found, law("constant_force", 0, 0.0)]
     kinds = {h.candidates[0].kind for h in equivalent(asked(), more[0], more, NOISE)}
     assert kinds == {"coulomb_friction", "viscous_damping", "constant_force"}
+    curved = [h for h in more if h.candidates[0].kind != "viscous_damping"]
+    kinds = {h.candidates[0].kind for h in equivalent(asked(), curved[0], curved, NOISE)}
+    assert kinds == {"coulomb_friction", "constant_force"}  # Stribeck's is Coulomb's there
 
 
 def test_a_group_of_parameters_stands_for_one_of_them():

@@ -139,15 +139,17 @@ def equivalent(
 def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
     """Whether a simpler law of the class that h becomes takes its place.
 
-    Not where one at that place does as well that h does not become (constant force, and viscous damping,
-    which Coulomb friction becomes): then the motion does not show the curve, and h may lie between them.
+    Not where a law does as well that h alone is in a motion which keeps its sign: at one speed constant force
+    and viscous damping are alike, and Coulomb friction, which becomes viscous damping, lies between them.
     """
-    if not becomes(h, other):
-        return False
-    places = [c.location for c in h.candidates]
-    rivals = [m for m in members if m is not h and [c.location for c in m.candidates] == places]
-    between = any(not becomes(h, m) and not becomes(m, h) for m in rivals)
-    return not between or any(becomes(other, m) for m in members)
+    lost = _one_way(h) - _one_way(other)
+    alike = {(c.kind, c.location) for m in members for c in m.candidates}
+    return becomes(h, other) and not lost & alike
+
+
+def _one_way(h: Hypothesis) -> set[tuple[str, str]]:
+    """Kind and location of what its laws are in a motion that keeps its sign."""
+    return {(kind, c.location) for c in h.candidates if c.kind in EFFECTS for kind in EFFECTS[c.kind].one_way}
 
 
 def _includes(h: Hypothesis, other: Hypothesis) -> bool:

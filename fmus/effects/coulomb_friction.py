@@ -20,6 +20,7 @@ class CoulombFriction(ForceLaw):
     source = "Olsson et al., European Journal of Control 4 (1998), 176-195; the step rounded by tanh"
     amplitudes = ("F_c",)
     becomes = ("viscous_damping",)  # where it is all rounded
+    one_way = ("constant_force",)
     F_c = Parameter("{F}", min=0.0, doc="friction force")
     v_s = Parameter("{q}/s", 1e-3, min=1e-6, doc="velocity at which friction is nearly full")
 

@@ -22,7 +22,8 @@ class Effect(ABC):
     amplitudes: parameters that switch it on, the others give its shape; complete: the value of an
     amplitude that a true effect of this kind has, fixed in the end; told: parameters that a record
     tells and no fit has to find; asks: what it must know beside the motion, "clock" or "way";
-    becomes: simpler kinds that it turns into at a limit of its shape; of_run: parameters that another run
+    becomes: simpler kinds that it turns into at a limit of its shape; one_way: kinds that it is in a motion
+    which keeps its sign; of_run: parameters that another run
     of the same machine does not share, "phase" where it is that of a sine and a cosine; over: of the motion
     what the force alone depends on, "velocity" or "displacement", of laws that are one curve of it.
     """
@@ -34,6 +35,7 @@ class Effect(ABC):
     told: ClassVar[tuple[str, ...]] = ()
     asks: ClassVar[tuple[str, ...]] = ()
     becomes: ClassVar[tuple[str, ...]] = ()
+    one_way: ClassVar[tuple[str, ...]] = ()
     of_run: ClassVar[tuple[str, ...]] = ()
     over: ClassVar[str] = ""
     acts_on: ClassVar[str]  # port, component, parameter or input

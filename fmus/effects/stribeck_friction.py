@@ -21,6 +21,7 @@ class StribeckFriction(ForceLaw):
     source = "Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30 (1994), 1083-1138; exponent 2"
     amplitudes = ("F_c", "F_b")
     becomes = ("coulomb_friction", "viscous_damping")
+    one_way = ("constant_force",)
     F_c = Parameter("{F}", min=0.0, doc="friction force when sliding fast")
     F_b = Parameter("{F}", min=0.0, doc="what friction has more when sliding slowly")
     v_b = Parameter("{q}/s", 0.1, min=1e-5, doc="Stribeck velocity: friction has fallen to a third of F_b")
