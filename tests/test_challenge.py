@@ -197,6 +197,14 @@ def test_what_acts_where_the_record_is_held_out_is_drawn_again(tmp_path):
     assert truth.items[0].parameters["t0"] == 30.0
 
 
+def test_a_fault_that_a_sensor_cannot_show_is_drawn_at_the_next_one(tmp_path):
+    gains = iter([1e-9] * ATTEMPTS + [0.1])
+    usual = plan("single", "constant_force", "wheel").entries[0][0]
+    gain = replace(usual, kind="sensor_gain", sizes=lambda rng: {"gain": next(gains)})
+    truth = make(Plan(5, "sensor", "rig", ((gain, "omega_r"),)), 3, tmp_path / "r", tmp_path / "t")
+    assert truth.items == (Item("sensor_gain", "omega_w", {"gain": 0.1}),)
+
+
 def test_a_plan_that_never_works_is_refused(tmp_path):
     with pytest.raises(
         ValueError,

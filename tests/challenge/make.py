@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from tests.challenge.bench import NO_MORE, Bench, Outputs, bench
 from tests.challenge.draw import Plan
+from tests.challenge.menu import OUTPUTS
 from tests.challenge.truth import Item, Truth
 from tests.truth.more import More, made
 from tests.truth.rig import measured
@@ -31,14 +33,16 @@ def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
 
     Sizes under which the system leaves what its model can say (a wheel locks, a flange climbs) are drawn
     again, faults of a sensor alone that drown in its noise, and what acts first where the record is held out.
+    A sensor that moves too little for any fault of the kind is left for the system's next one.
     Raises ValueError where that does not help.
     """
     told = truths / f"{plan.name}.json"
     if told.exists():
         return Truth.read(told)
-    for attempt in range(ATTEMPTS):
+    draws = (here for here in (plan, *elsewhere(plan)) for _ in range(ATTEMPTS))
+    for attempt, here in enumerate(draws):
         try:
-            truth, text, columns = tried(plan, np.random.default_rng([seed, plan.index, attempt]))
+            truth, text, columns = tried(here, np.random.default_rng([seed, plan.index, attempt]))
         except ValueError as error:
             why = error
             continue
@@ -47,6 +51,16 @@ def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
         return truth
     kinds = " and ".join(f"{e.kind}@{location}" for e, location in plan.entries)
     raise ValueError(f"{plan.name}: {ATTEMPTS} draws of {kinds} failed, the last: {why}")
+
+
+def elsewhere(plan: Plan) -> list[Plan]:
+    """The same fault at the system's other sensors, in order from its own; none where it is no sensor's."""
+    if plan.group != "sensor":
+        return []
+    ((fault, at),) = plan.entries
+    outputs = OUTPUTS[plan.system]
+    own = outputs.index(at)
+    return [replace(plan, entries=((fault, o),)) for o in (*outputs[own + 1 :], *outputs[:own])]
 
 
 def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
