@@ -252,7 +252,7 @@ def _fitted(s: Screened, tell: Progress, jobs: int) -> tuple[list[Hypothesis], l
         tell("pairs", "trying pairs of effects")
         alone = singles
         pairs, freed = stages.done(
-            "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, jobs)
+            "pairs", lambda: try_pairs(problem, base, s.screening, alone, single, s.noise, jobs)
         )
         singles = best_by_label([*singles, *freed])
     tell("simpler", "asking whether a simpler law would do, or one that looks like it")

@@ -6,10 +6,11 @@ from itertools import combinations
 
 import numpy as np
 
-from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.candidates import Candidate, physical_candidates
 from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished, hypotheses
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import grouped_fit
+from estimator.closeloop.missing_force import missing_forces
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise, Screening, built, distinct, label, screen
 from estimator.record import Array
@@ -32,11 +33,11 @@ def idle(h: Hypothesis) -> list[Candidate]:
 
 def try_pairs(
     problem: Problem, base: Hypothesis, screening: Screening, singles: Sequence[Hypothesis], change: Changes,
-    jobs: int,
+    noise: Array, jobs: int,
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
     """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
 
-    screening, change: of the base and the single candidates.
+    screening, change: of the base and the single candidates; noise: (n_y,) of the outputs.
 
     Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
     """
@@ -45,7 +46,7 @@ def try_pairs(
     alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
     promises = _from_base(screening.fit, physical)
     if alone:
-        promises += _partners(problem, screening, list(alone.values())[:LEADING], physical)
+        promises += _partners(problem, screening, list(alone.values())[:LEADING], physical, noise)
     found = hypotheses(problem, base, promises, size, jobs, FINALISTS)
     reached = min((cost(h) for h in singles), default=cost(base))
     doubtful = [h for h in found if idle(h) and cost(h) < reached]
@@ -95,25 +96,48 @@ def _from_base(base: Fit, physical: Changes) -> list[Promise]:
 
 
 def _partners(
-    problem: Problem, screening: Screening, leading: Sequence[Hypothesis], change: Changes
+    problem: Problem,
+    screening: Screening,
+    leading: Sequence[Hypothesis],
+    change: Changes,
+    noise: Array,
 ) -> list[Promise]:
     """Pairs of the leading single effects and what could explain most of what each leaves.
 
     Those first that would leave least: a right partner of a single effect that is not the best one counts.
-    The best one is screened anew, with its effect in the FMU, and so are the others where that is quick.
+    The best one is screened anew, with its effect in the FMU and partners in the shapes that its missing force
+    suggests (the frequency of a second effect does not show beside a first one ten times its size); the others
+    are too, in the shapes that they have, where that is quick.
     """
     quick = len(change) * len(screening.fit.residual) < QUICK
     found = []
     for i, h in enumerate(leading):
-        if i == 0 or quick:
+        others = [c for c, _ in change if c.label != h.label]
+        if i == 0:
+            fit, seen = _beside(problem, h, others, screening.size, noise)
+        elif quick:
             here = Screening(built(problem, h.candidates), h.fit, screening.size)
-            others = [c for c, _ in change if c.label != h.label]
             fit, seen = here.fit, list(zip(others, here.changes(others), strict=True))
         else:
             fit, seen = grouped_fit(h.fit, len(screening.size), screening.group), list(change)
         found += [(cost(h) - p.gain, p) for p in _with(h, fit, seen)]
     found.sort(key=lambda pair: pair[0])
     return distinct([p for _, p in found])[:PROMISES]
+
+
+def _beside(
+    problem: Problem, h: Hypothesis, others: Sequence[Candidate], size: Array, noise: Array
+) -> tuple[Fit, Changes]:
+    """The fit of a hypothesis as it is screened with its effect in the FMU, and the changes by all others.
+
+    These are in the shapes that what it leaves suggests.
+    """
+    here, builder, labels = built(problem, h.candidates), problem.builder, {c.label for c in others}
+    forces = missing_forces(here, h.theta, noise)
+    offered = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
+    partners = [c for c in offered if c.label in labels]
+    screening = Screening(here, h.fit, size, forces)
+    return screening.fit, list(zip(partners, screening.changes(partners), strict=True))
 
 
 def _with(h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
