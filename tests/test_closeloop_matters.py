@@ -84,13 +84,16 @@ def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
         asked(form),
         replace(left(*after), candidates=(law("constant_force", 0, 0.0).candidates[0],)),
     )
-    assert tuple(reached(problem, one, left(*before), NOISE).tolist()) == found
+    assert tuple(reached(problem, one, left(*before), NOISE, NOISE).tolist()) == found
 
 
 @pytest.mark.parametrize(("after", "found"), [((2.0, 1.2), False), ((1.25, 1.1), True)])
 def test_several_effects_account_for_more_of_what_could_be_form(after, found):
     two = tuple(law(kind, 0, 0.0).candidates[0] for kind in ("constant_force", "viscous_damping"))
-    assert reached(asked(FORM), replace(left(*after), candidates=two), left(3.0, 1.3), NOISE).all() == found
+    assert (
+        reached(asked(FORM), replace(left(*after), candidates=two), left(3.0, 1.3), NOISE, NOISE).all()
+        == found
+    )
 
 
 @pytest.mark.parametrize(("early", "late"), [(1.0, True), (1.2, False)])

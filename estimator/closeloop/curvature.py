@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from estimator.closeloop.candidates import physical_candidates
 from estimator.closeloop.compare import Hypothesis, cost
-from estimator.closeloop.freeform import FREE_FORMS
+from estimator.closeloop.freeform import FREE_FORMS, offered
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Screening, built, screen
@@ -14,7 +14,8 @@ from fmus.effects import EFFECTS
 
 SEEN = 0.05  # of the sum of squares of noise: where much is known, so much shows a law that only comes near
 OPEN_LEFT = 0.05  # where the FMU's form leaves something open, of what the law leaves beyond noise, and
-OPEN_MISSED = 2.5e-3  # of what it explains: right laws leave a curve of half of it at most
+OPEN_MISSED = 2.5e-3  # of what it explains; right laws leave a curve of that size at most
+NO_LESS = 0.99  # of what a curve over another motion explains: one port may have two names
 
 
 def confirmed(
@@ -28,33 +29,41 @@ def confirmed(
     if not best or len(best[0].candidates) > 1 or not problem.record.floor_known:
         return judgement
     [h] = best
-    more, open_form = curvature(problem, h, forces, size), problem.form_error > 0
-    return no_law(h) if another(h, base, more, open_form) else judgement
+    own, elsewhere = curvature(problem, h, forces, size)
+    return no_law(h) if another(h, base, own, elsewhere, problem.form_error > 0) else judgement
 
 
-def another(h: Hypothesis, base: Hypothesis, more: float, open_form: bool) -> bool:
-    """Whether a curve that explains so much `more` than a hypothesis' law is another one.
+def another(h: Hypothesis, base: Hypothesis, own: float, elsewhere: float, open_form: bool) -> bool:
+    """Whether the law of a hypothesis is not the curve of its force; own, elsewhere: see `curvature`.
 
-    Where it is most of what the law leaves, and plain; or much of what the law explains. Where the FMU's form
-    leaves something open, right laws leave some curve too: there it has to be much of both.
+    It is not where a curve is most of what the law leaves, and plain; or much of what the law explains. Where
+    the FMU's form leaves something open, right laws leave some curve too: there it has to be much of both,
+    and no less than a curve over any other motion, as another form looks like one everywhere.
     """
     plain, left = max(CURVE, SEEN * len(h.fit.residual)), h.fit.beyond_noise
     if open_form:
-        return more > max(plain, OPEN_LEFT * left, OPEN_MISSED * (cost(base) - cost(h)))
-    return more > max(plain, SECOND * left) or more > noticed(h, base)
+        least = max(plain, OPEN_LEFT * left, OPEN_MISSED * (cost(base) - cost(h)))
+        return own > least and own > NO_LESS * elsewhere
+    return own > max(plain, SECOND * left) or own > noticed(h, base)
 
 
-def curvature(problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array) -> float:
+def curvature(
+    problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array
+) -> tuple[float, float]:
     """Fall of the sum of squares that a free curve beside a hypothesis' law would bring, by regression.
 
-    Zero for an effect that is no curve over velocity or displacement.
+    Of a curve over the law's own motion; and, where the FMU's form leaves something open, the most of one
+    over another velocity or displacement, at this port or another. Zero for an effect that is no such curve.
     """
     [c] = h.candidates
     over = EFFECTS[c.kind].over if c.kind in EFFECTS else ""
-    offers = [(kind, c.location) for kind, law in FREE_FORMS.items() if law.against == over]
+    mine = [(kind, c.location) for kind, law in FREE_FORMS.items() if law.against == over]
+    offers = offered(problem, forces) if mine and problem.form_error > 0 else mine
     curves = physical_candidates(offers, problem.builder.outside(), problem.record, forces)
-    if not curves:
-        return 0.0
     screening = Screening(built(problem, h.candidates), h.fit, size)
     change = screening.changes(curves)
-    return screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)])[0].gain
+    gains = {False: 0.0, True: 0.0}
+    for p in screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)]):
+        own = any((k.kind, k.location) in mine for k in p.candidates)
+        gains[own] = max(gains[own], p.gain)
+    return gains[True], gains[False]

@@ -122,18 +122,24 @@ def dependences(problem: Problem, forces: Sequence[MissingForce]) -> list[Depend
     return sorted(best.values(), key=lambda d: -d.share)
 
 
-def _dependences(problem: Problem, forces: Sequence[MissingForce]) -> Iterator[Dependence]:
+def offered(problem: Problem, forces: Sequence[MissingForce]) -> list[tuple[str, str]]:
+    """(kind, port) of every force of free form that makes sense at the port."""
     model = problem.builder.outside().model
     known = model.ports() if model else {}
-    for m in forces:
-        at = m.port.name
-        for kind, law in FREE_FORMS.items():
-            if at in known and not law.fits(known[at]):
-                continue
-            for shape in law.guesses(m.t - m.t[0], m.displacement, m.velocity, m.force):
-                weight = 1 / np.maximum(m.std, LEAST * np.median(m.std) + 1e-300)
-                splines = law.splines(shape, m.displacement, m.velocity) * weight[:, None]
-                yield Dependence(kind, at, law.against, left_out(splines, m.force * weight), shape)
+    ports = [m.port.name for m in forces]
+    return [
+        (k, at) for at in ports for k, law in FREE_FORMS.items() if at not in known or law.fits(known[at])
+    ]
+
+
+def _dependences(problem: Problem, forces: Sequence[MissingForce]) -> Iterator[Dependence]:
+    at_port = {m.port.name: m for m in forces}
+    for kind, at in offered(problem, forces):
+        law, m = FREE_FORMS[kind], at_port[at]
+        for shape in law.guesses(m.t - m.t[0], m.displacement, m.velocity, m.force):
+            weight = 1 / np.maximum(m.std, LEAST * np.median(m.std) + 1e-300)
+            splines = law.splines(shape, m.displacement, m.velocity) * weight[:, None]
+            yield Dependence(kind, at, law.against, left_out(splines, m.force * weight), shape)
 
 
 def left_out(columns: Array, y: Array) -> float:

@@ -105,9 +105,9 @@ def _partners(
     """Pairs of the leading single effects and what could explain most of what each leaves.
 
     Those first that would leave least: a right partner of a single effect that is not the best one counts.
-    The best one is screened anew, with its effect in the FMU and partners in the shapes that its missing force
-    suggests (the frequency of a second effect does not show beside a first one ten times its size); the others
-    are too, in the shapes that they have, where that is quick.
+    The best one is screened anew, with its effect in the FMU and partners in the shapes that its missing
+    force suggests (the frequency of a second effect does not show beside a first one ten times its size); the
+    others are too, in the shapes that they have, where that is quick.
     """
     quick = len(change) * len(screening.fit.residual) < QUICK
     found = []

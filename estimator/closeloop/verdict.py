@@ -79,34 +79,40 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
         for x in (h, base)
     ]
     enough = squares[0] <= (1 - EXPLAINED) * squares[1] if (~declared).any() else True
-    return bool(np.all(reached(problem, h, base, noise)[declared]) and enough)
+    return bool(np.all(reached(problem, h, base, noise, size)[declared]) and enough)
 
 
-def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array) -> BoolArray:
+def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> BoolArray:
     """Whether a hypothesis brings each output (n_y,) down to its noise, or to what the FMU's form leaves."""
     before, after = base.rms(problem), h.rms(problem)
     scatter = SCATTER / np.sqrt(2 * len(h.held_out(problem)))
     found: BoolArray = (after < (CLEAN + scatter) * noise) | (gap_closed(before, after, noise) >= GAP)
     if problem.form_error > 0:
-        found |= _reached_in_form(problem, before, after, noise, len(h.candidates))
+        found |= _reached_in_form(problem, h, base, noise, size)
     return found
 
 
-def _reached_in_form(problem: Problem, before: Array, after: Array, noise: Array, effects: int) -> BoolArray:
+def _reached_in_form(
+    problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array
+) -> BoolArray:
     """The same (n_y,) where the FMU's form leaves a share of each output open.
 
     What was large beyond noise comes within that share, what was small does not grow. Where all was small, so
     that it could be form too, one effect explains at least half of what was beyond noise in all outputs
-    together; several, which could come near to any form, nearly all of it.
+    together; several, which could come near to any form, nearly all of it. So it is with the whole record,
+    and with the held-out part unless hardly anything is left in all: an effect may act in one part alone.
     """
+    before, after = base.rms(problem), h.rms(problem)
     left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
     share = (problem.form_error * signal_size(problem) / noise) ** 2
     large = was >= share
     if large.any():
         gone = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
         return gone | np.where(large, left < share, after <= CLEAN * before)
-    most = HALF if effects == 1 else 1 - FORM_EXPLAINED
-    return np.full(len(noise), np.sum(left) <= most * np.sum(was))
+    most = HALF if len(h.candidates) == 1 else 1 - FORM_EXPLAINED
+    of_all = beyond_noise_of_all(problem, h, size) / max(beyond_noise_of_all(problem, base, size), 1e-300)
+    held_out = np.sum(left) <= most * np.sum(was)
+    return np.full(len(noise), of_all <= most and (held_out or of_all <= most * HALF))
 
 
 def equivalent(
@@ -114,23 +120,27 @@ def equivalent(
 ) -> list[Hypothesis]:
     """The class of the best hypothesis: those that the held-out data do not tell from it, nor the others.
 
-    Where the FMU's form leaves something open, what the best one leaves is no measure of a small difference.
+    Where the FMU's form leaves something open, the whole record tells, as forms differ from one part to the
+    next, and what the best one leaves is no measure of a small difference.
     A simpler law that it becomes at a limit of its shape is told from it only where every further unknown is
     worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
     simpler one stays; of a group of parameters and one of them the group.
     """
     members, alike = [best], SAME * -float(best.scores(problem, size).sum())
     if problem.form_error > 0:
-        alike = max(alike, FORM * beyond_noise(problem, best, size) / 2)
+        alike = max(alike, FORM * beyond_noise_of_all(problem, best, size) / 2)
     for h in others:
         if h is best:
             continue
         mean, _ = lead(problem, best, h, size)
         price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
         behind = cost(h) - cost(best)
-        worse = problem.record.floor_known and h.fit.converged and behind > max(CURVE, SAME * cost(best))
-        close = mean < max(price, alike) and (problem.form_error > 0 or not worse)
-        if close or not (worse or beats(problem, best, h, size)):
+        if problem.form_error > 0:
+            told = mean + behind / 2 >= max(price, alike)
+        else:
+            worse = problem.record.floor_known and h.fit.converged and behind > max(CURVE, SAME * cost(best))
+            told = worse or (mean >= max(price, alike) and beats(problem, best, h, size))
+        if not told:
             members.append(h)
     members = [h for h in members if not any(_replaces(other, h, members) for other in members)]
     return [h for h in members if not any(_includes(other, h) for other in members)]
@@ -259,6 +269,11 @@ def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Arra
 def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
     """What the sum of squares of the held-out part has more than noise would."""
     return float(np.sum((h.held_out(problem) / size) ** 2 - 1))
+
+
+def beyond_noise_of_all(problem: Problem, h: Hypothesis, size: Array) -> float:
+    """The same of both parts."""
+    return h.fit.beyond_noise + beyond_noise(problem, h, size)
 
 
 def outgrown(m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:

@@ -70,7 +70,7 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """What a hypothesis leaves of the residual, where that is too much."""
     over, declared = h.rms(problem) / found.noise, ~np.isnan(problem.record.noise_std)
-    short = np.flatnonzero(declared & ~reached(problem, h, found.base, found.noise))
+    short = np.flatnonzero(declared & ~reached(problem, h, found.base, found.noise, found.size))
     if short.size:
         j = short[np.argmax(over[short])]
         yield f"leaves {number(over[j], 2)} times the noise in {problem.record.outputs[j]}"
