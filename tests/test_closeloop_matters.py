@@ -87,6 +87,26 @@ def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
     assert tuple(reached(problem, one, left(*before), NOISE, NOISE).tolist()) == found
 
 
+@pytest.mark.parametrize(
+    ("early", "late", "found"),
+    [
+        (3.0, 2.8, False),  # hardly anything of it in either part
+        (4.5, 1.5, False),  # what makes up for form in the held-out part alone
+        (1.2, 2.8, True),  # an effect that acts in the part to identify
+        (2.2, 2.8, False),
+        (1.7, 1.7, True),
+    ],
+)
+def test_where_the_form_is_open_an_effect_may_act_in_one_part(early, late, found):
+    def hypothesis(identify: float, held_out: float) -> Hypothesis:
+        h = left(held_out, 1.0)
+        return replace(h, fit=replace(h.fit, residual=identify * h.fit.residual))
+
+    base, one = hypothesis(5.0, 3.0), hypothesis(early, late)
+    one = replace(one, candidates=law("constant_force", 0, 0.0).candidates)
+    assert reached(asked(FORM), one, base, NOISE, NOISE).all() == found
+
+
 @pytest.mark.parametrize(("after", "found"), [((2.0, 1.2), False), ((1.25, 1.1), True)])
 def test_several_effects_account_for_more_of_what_could_be_form(after, found):
     two = tuple(law(kind, 0, 0.0).candidates[0] for kind in ("constant_force", "viscous_damping"))
@@ -142,10 +162,20 @@ def test_further_unknowns_have_to_be_worth_their_price(gain, stays):
     assert only.candidates[0].kind == stays
 
 
-@pytest.mark.parametrize(("form", "stays"), [(0.0, "stribeck_friction"), (0.05, "coulomb_friction")])
-def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(form, stays):
+@pytest.mark.parametrize(
+    ("form", "left", "stays"),
+    [
+        (0.0, 1.0, "stribeck_friction"),
+        (0.0, 3.0, "stribeck_friction"),
+        (0.05, 1.0, "stribeck_friction"),
+        (0.05, 3.0, "coulomb_friction"),  # the difference is little of what the form leaves anyhow
+    ],
+)
+def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(form, left, stays):
     complex_one, simple = law("stribeck_friction", 2, 0.5), law("coulomb_friction", 0, 0.0)
-    denied = replace(simple, fit=replace(simple.fit, residual=1.5 * simple.fit.residual))
+    one = simple.fit.residual
+    complex_one = replace(complex_one, fit=replace(complex_one.fit, residual=left * one))
+    denied = replace(simple, fit=replace(simple.fit, residual=np.sqrt(left**2 + 1.25) * one))
     assert cost(denied) - cost(complex_one) > CURVE
     [only] = equivalent(asked(form), complex_one, [complex_one, denied], NOISE)
     assert only.candidates[0].kind == stays

@@ -58,7 +58,9 @@ def curvature(
     [c] = h.candidates
     over = EFFECTS[c.kind].over if c.kind in EFFECTS else ""
     mine = [(kind, c.location) for kind, law in FREE_FORMS.items() if law.against == over]
-    offers = offered(problem, forces) if mine and problem.form_error > 0 else mine
+    if not mine:
+        return 0.0, 0.0
+    offers = offered(problem, forces) if problem.form_error > 0 else mine
     curves = physical_candidates(offers, problem.builder.outside(), problem.record, forces)
     screening = Screening(built(problem, h.candidates), h.fit, size)
     change = screening.changes(curves)
