@@ -11,15 +11,18 @@ from hypothesis import strategies as st
 
 from estimator.closeloop import allowed as allowing
 from estimator.closeloop import compare, dating, pairs, progress
-from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.candidates import Candidate, physical_candidates
+from estimator.closeloop.compare import Hypothesis, cost
 from estimator.closeloop.fit import Fit, fit
 from estimator.closeloop.onset import grown
-from estimator.closeloop.pairs import beside
+from estimator.closeloop.pairs import beside, try_pairs
 from estimator.closeloop.problem import Unknown
+from estimator.closeloop.screen import Screening
 from estimator.closeloop.verdict import CURVE, one_curve, outgrown
 from estimator.record import Run
 from fmus.effects import EFFECTS
+from fmus.export.hypotheses import ModelBuilder
+from tests.carriage import looked_at, problem, record, to_and_fro
 
 # ---- what sets in
 
@@ -134,6 +137,27 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch,
     assert all(p.candidates[0] is best for p in fitted)
 
 
+def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_suggests(tmp_path):
+    """A harmonic force at 2.3 Hz that does not show beside a spring of ten times its size."""
+
+    def truth(t: float, q: float, v: float) -> float:
+        return 2e3 * q**3 + 30.0 * float(np.sin(2 * np.pi * 2.3 * t))
+
+    asked = problem(ModelBuilder("drive", tmp_path), record(to_and_fro(2.0), truth, 1))
+    o = looked_at("spring", asked, ("cubic_stiffness",)).found
+    offers = [(kind, "carriage") for kind in ("cubic_stiffness", "harmonic_excitation")]
+    candidates = physical_candidates(offers, asked.builder.outside(), asked.record, o.forces)
+    screening = Screening(asked, o.base.fit, o.size, o.forces)
+    change = list(zip(candidates, screening.changes(candidates), strict=True))
+    found, _ = try_pairs(asked, o.base, screening, o.singles, change, o.noise, 1)
+    both = min(found, key=cost)
+    assert both.theta["harmonic_excitation_carriage_f"] == pytest.approx(2.3, abs=0.01)
+    assert both.theta["cubic_stiffness_carriage_k_3"] == pytest.approx(2e3, rel=0.02)
+    assert both.fit.beyond_noise < 5 * np.sqrt(2 * len(both.fit.residual))
+    before = [c.shape[0].start for c in candidates if c.kind == "harmonic_excitation"]
+    assert min(abs(f - 2.3) for f in before) > 0.1
+
+
 # ---- dating
 
 
@@ -189,6 +213,7 @@ class Saturating:
         noise = 0.1 * rng.standard_normal(len(t))
         self.run = Run(t, t[:, None], (3.0 + 2.0 * self.late + noise)[:, None], fit, ~fit)
         self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
+        self.form_error = 0.0
 
     def residuals(self, theta: Mapping[str, float]) -> list[np.ndarray]:
         return [self.run.y - (theta["F"] + theta["c"] * self.late)[:, None]]

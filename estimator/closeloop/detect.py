@@ -53,18 +53,19 @@ def detect(
     """
     runs = problem.record.runs
     fit_mask, test_mask = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "test"))
-    residual = np.concatenate(base.residuals) / noise
+    held_out = np.concatenate(base.residuals)[test_mask] / noise
     slopes = _sensitivities(problem, base, noise)
     g = _directions(screened.jacobian, regressors) if regressors else None
-    observed = _figures(residual, test_mask)
+    observed = _figures(held_out)
     n = slopes.shape[2]
-    back = np.linalg.pinv(slopes[fit_mask].reshape(fit_mask.sum() * len(noise), n)) if n else np.zeros((0, 1))
-    copies = []
+    # noise in the part to identify moves the unknowns by root @ white noise
+    root = np.linalg.pinv(np.linalg.qr(slopes[fit_mask].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
+    late, copies = slopes[test_mask], []
     for _ in range(REPLICATES):
-        e = rng.standard_normal(residual.shape)
+        e = rng.standard_normal(held_out.shape)
         if n:
-            e -= slopes @ (back @ e[fit_mask].ravel())
-        copies.append(_figures(e, test_mask))
+            e -= late @ (root @ rng.standard_normal(root.shape[1]))
+        copies.append(_figures(e))
     references = {name: np.array([c[name] for c in copies]) for name in observed}
     if g is not None:
         observed[LIKENESS] = float(np.max((g.T @ screened.residual) ** 2))
@@ -135,8 +136,7 @@ def _likeness_of_noise(g: Array, rng: np.random.Generator) -> Array:
     return np.asarray(np.max(drawn**2, axis=1))
 
 
-def _figures(residual: Array, test: Array) -> dict[str, float]:
-    held_out = residual[test]
+def _figures(held_out: Array) -> dict[str, float]:
     means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(held_out, SLOW_BLOCKS)])
     return {
         "size of the held-out residual": float(np.max(np.mean(held_out**2, axis=0))),

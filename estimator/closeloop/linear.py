@@ -138,15 +138,16 @@ def responses(
     """Change of the outputs (samples, n_y, k) by each of k sets of changes (samples,) of levers."""
     near = local.near(samples)
     n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
-    force, direct = np.zeros((samples, n, k)), np.zeros((samples, n_y, k))
-    for j, changes in enumerate(moved):
+    force, direct = np.zeros((k, samples, n)), np.zeros((k, samples, n_y))
+    for f, d, changes in zip(force, direct, moved, strict=True):
         for name, change in changes.items():
             w = change[:samples, None]
-            force[:, :, j] += levers[name].states * np.vstack([(w[1:] + w[:-1]) / 2, w[-1:]])
-            direct[:, :, j] += levers[name].outputs * w
+            f += levers[name].states * np.vstack([(w[1:] + w[:-1]) / 2, w[-1:]])
+            d += levers[name].outputs * w
+    steps = np.ascontiguousarray(np.moveaxis(force, 0, 2))
     x, states = np.zeros((n, k)), np.empty((samples, n, k))
     for s in range(samples):
         states[s] = x
-        x = local.A[near[s]] @ x + force[s]
-    found: Array = np.einsum("syn,snk->syk", local.C[near], states) + direct
+        x = local.A[near[s]] @ x + steps[s]
+    found: Array = local.C[near] @ states + np.moveaxis(direct, 0, 2)
     return found
