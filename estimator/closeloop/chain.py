@@ -24,6 +24,7 @@ from estimator.closeloop.detect import LEVEL, ONE_EFFECT, Detection, detect
 from estimator.closeloop.fit import Fit, loose
 from estimator.closeloop.freeform import free_form
 from estimator.closeloop.honesty import Honesty, honesty
+from estimator.closeloop.likelihood import profiled
 from estimator.closeloop.lookalikes import lookalikes
 from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.moments import at_their_moments, moment
@@ -189,11 +190,18 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     judged = stages.done("allowed", lambda: allowed(problem, singles, size))
     judgement = judge(problem, base, judged, pairs, noise, size, screened.began).of([*singles, *pairs])
     judgement = stages.done("verdict", lambda: confirmed(problem, base, judgement, forces, size))
+    tell("intervals", "asking how far its parameters may be from there")
+    judgement = stages.done("intervals", lambda: _profiled(problem, judgement, size))
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
         owed = replace(owed, free_form=curve)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
+
+
+def _profiled(problem: Problem, judgement: Judgement, size: Array) -> Judgement:
+    """The judgement with the errors of its members as the sum of squares says."""
+    return replace(judgement, members=tuple(profiled(problem, h, size) for h in judgement.members))
 
 
 def _screened(

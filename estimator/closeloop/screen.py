@@ -30,6 +30,7 @@ NOTHING = 1e-9  # of a regressor left after projection: it says nothing new
 ALIKE = 1e-2  # of a regressor's length: of two that differ by less each gets half
 TRUSTED = 5.0  # scales from which a linear answer is not trusted further
 TOGETHER = 128  # changes whose responses are worked out at once
+RUNAWAY = 1e9  # times what counts as one: no answer of a linear picture that holds
 
 
 @dataclass(frozen=True)
@@ -158,8 +159,13 @@ class Screening:
         fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size[:, None]
         found: list[Array] = []
         for i in range(0, len(moved), TOGETHER):
-            y = responses(local, levers, moved[i : i + TOGETHER], len(self._at))[fit]
-            found += list((y * scale).reshape(-1, y.shape[2]).T)
+            some = moved[i : i + TOGETHER]
+            with np.errstate(over="ignore", invalid="ignore"):
+                y = responses(local, levers, some, len(self._at))[fit]
+                columns = (y * scale).reshape(-1, y.shape[2]).T
+                sound = np.all(np.abs(columns) < RUNAWAY, axis=1)
+            # what sticks and slips has no linear picture: it runs away
+            found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
         return found
 
     def _linearised(self, levers: list[str], x: Array) -> tuple[Linearised, dict[str, Influence]]:
