@@ -10,9 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from estimator.closeloop import likelihood
+from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit, fit, loose, sandwich
 from estimator.closeloop.problem import Unknown
 from estimator.closeloop.slopes import FADED, FINE, PARTS, Slopes
+from estimator.record import Run
 
 # ---- derivatives along secants
 
@@ -217,3 +221,54 @@ def test_a_fit_extended_by_another_has_the_unknowns_of_both():
     assert_allclose(found.jacobian[:, 2], whole.jacobian[:, 1])
     assert found.covariance.shape == (3, 3)
     assert found.std["free"] == whole.std["free"]
+
+
+# ---- errors where the sum of squares is a bent valley
+
+
+class Playing:
+    """A spring with play, over a motion some times wider: its stiffness and its play make up for each other."""
+
+    free_states = ()
+
+    def __init__(self, seed: int) -> None:
+        t = np.arange(400) * 0.01
+        self.q = np.sin(2 * np.pi * t) + 0.4 * np.sin(2 * np.pi * 2.7 * t)
+        y = np.clip(self.q, -0.2, 0.2) + 0.2 * np.random.default_rng(seed).standard_normal(len(t))
+        every = np.ones(len(t), bool)
+        run = Run(t, t[:, None], y[:, None], every, ~every)
+        self.record = SimpleNamespace(runs=(run,), floor_known=True, outputs=("y",))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        return run.y - (theta["k"] * np.clip(self.q, -theta["gap"], theta["gap"]))[:, None]
+
+
+def played(seed: int) -> tuple[Playing, Hypothesis]:
+    asked = Playing(seed)
+    k, gap = Unknown("k", 0.0, 0.0, np.inf, 1.0), Unknown("gap", 0.2, 0.0, np.inf, 0.02)
+    found = fit(asked, (k, gap), np.array([0.2]), {"k": 0.8, "gap": 0.25})
+    return asked, Hypothesis((Candidate("free_play", "spring", (k,), (gap,)),), found, ())
+
+
+def test_errors_reach_as_far_as_the_valley_does(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    true, held, wider = {"k": 1.0, "gap": 0.2}, [], []
+    for seed in range(40):
+        asked, h = played(seed)
+        found = likelihood.profiled(asked, h, np.array([0.2])).fit
+        assert found.theta == h.fit.theta
+        held += [abs(found.theta[n] - v) < 1.96 * found.std[n] for n, v in true.items()]
+        wider += [found.std[n] / h.fit.std[n] for n in true]
+    assert np.mean(held) > 0.9
+    assert min(wider) > 1 - 1e-9
+    assert max(wider) > 1.3
+
+
+def test_errors_of_a_linear_law_and_without_declared_noise_stay(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    asked, h = played(1)
+    linear = replace(h, candidates=(Candidate("constant_force", "spring", h.candidates[0].amplitudes),))
+    assert_allclose(likelihood.profiled(asked, linear, np.array([0.2])).fit.covariance, h.fit.covariance)
+    asked.record.floor_known = False
+    assert likelihood.profiled(asked, h, np.array([0.2])) is h
