@@ -227,7 +227,7 @@ def test_a_fit_extended_by_another_has_the_unknowns_of_both():
 
 
 class Playing:
-    """A spring with play, over a motion some times wider: its stiffness and its play make up for each other."""
+    """A spring with play, over a motion some times wider: stiffness and play make up for each other."""
 
     free_states = ()
 
