@@ -10,28 +10,39 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, cost
-from estimator.closeloop.fit import fit, sandwich
+from estimator.closeloop.compare import Hypothesis, cost, finished
+from estimator.closeloop.fit import Fit, fit, sandwich
 from estimator.closeloop.problem import Problem, Unknown
-from estimator.closeloop.screen import built
+from estimator.closeloop.screen import Promise, built
 from estimator.record import Array
 
 WIDTH = 1.96  # standard errors: 95 %
-TRIES = 4  # places on each side
+TRIES = 3  # places on each side
 FURTHER = 2.0  # times as far at most, from one to the next
 EVALUATIONS = 6  # of the fit of all others at each
+DEEPER = 4.0  # by how much the sum of squares has to be lower somewhere, to go there
+ROUNDS = 2  # of going on from a lower place
 
 
 def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     """The hypothesis with the standard errors of its laws widened to where the sum of squares says no.
 
-    Of each parameter the wider side counts. Laws that are linear in their parameters stay as they are, and
-    so do moments, in which the sum of squares is rugged.
+    Of each parameter the wider side counts. Where the valley turns out to be deeper elsewhere, the hypothesis
+    is fitted again from there. Laws that are linear in their parameters stay as they are, and so do moments,
+    in which the sum of squares is rugged.
     """
     if not problem.record.floor_known:
         return h
-    own = [u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_moment]
-    wider = {u.name: max(_half(problem, h, u, size, side) for side in (-1.0, 1.0)) / WIDTH for u in own}
+    for _ in range(ROUNDS):
+        wider, deeper = _profiles(problem, h, size)
+        if not deeper:
+            break
+        own = {u.name for c in h.candidates for u in c.unknowns}
+        rest = [u for u in h.fit.unknowns if u.name not in own]
+        again = finished(problem, rest, [Promise(h.candidates, 0.0, {**h.theta, **deeper})], size, 1)
+        if not again or cost(again[0]) >= cost(h):
+            break
+        h = replace(again[0], worth=h.worth)
     factors = np.array([max(1.0, wider.get(n, 0.0) / s) if s > 0 else 1.0 for n, s in h.fit.std.items()])
     return replace(h, fit=replace(h.fit, covariance=h.fit.covariance * np.outer(factors, factors)))
 
@@ -42,24 +53,44 @@ def bends(c: Candidate) -> bool:
     return any(u.name in free for u in c.amplitudes) and any(not u.is_moment for u in c.shape)
 
 
-def _half(problem: Problem, h: Hypothesis, u: Unknown, size: Array, side: float) -> float:
-    """How far on a side of its value the parameter may be in 95 of 100 cases, as far as is looked."""
+def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, float], dict[str, float]]:
+    """Standard errors by name; and values where the sum of squares is lower, where it is found to be."""
+    wider: dict[str, float] = {}
+    for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_moment):
+        for side in (-1.0, 1.0):
+            half, deeper = _half(problem, h, u, size, side)
+            wider[u.name] = max(wider.get(u.name, 0.0), half / WIDTH)
+            if deeper:
+                return wider, deeper
+    return wider, {}
+
+
+def _half(
+    problem: Problem, h: Hypothesis, u: Unknown, size: Array, side: float
+) -> tuple[float, dict[str, float]]:
+    """How far on a side of its value the parameter may be in 95 of 100 cases, as far as is looked.
+
+    And the values of a lower place, where one is met.
+    """
     i = [x.name for x in h.fit.unknowns].index(u.name)
-    error = h.fit.std[u.name]
+    best, error = float(h.fit.values[i]), h.fit.std[u.name]
     if error == 0:
-        return 0.0
-    white, away = _white(h)[i], side * WIDTH * error
-    usual = max(error / white, 1.0) ** 2  # as residuals are not white
+        return 0.0, {}
+    away = side * WIDTH * error
+    usual = max(error / _white(h)[i], 1.0) ** 2  # as residuals are not white
     for _ in range(TRIES):
-        value = float(np.clip(h.fit.values[i] + away, u.low, u.high))
-        if value != h.fit.values[i] + away:
-            return abs(value - float(h.fit.values[i]))
-        rise = max((_at(problem, h, i, value, size) - cost(h)) / usual, 0.0)
+        value = float(np.clip(best + away, u.low, u.high))
+        if value != best + away:
+            return abs(value - best), {}
+        found = _at(problem, h, i, value, size)
+        rise = (float(found.residual @ found.residual) - cost(h)) / usual
+        if rise < -DEEPER:
+            return abs(away), {**found.theta, u.name: value}
         share = WIDTH / np.sqrt(max(rise, (WIDTH / FURTHER) ** 2))
         away *= share
         if share <= 1.0:
             break
-    return abs(away)
+    return abs(away), {}
 
 
 def _white(h: Hypothesis) -> Array:
@@ -70,8 +101,8 @@ def _white(h: Hypothesis) -> Array:
     return np.asarray(np.sqrt(np.diag(covariance)))
 
 
-def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> float:
-    """The sum of squares with one parameter held at a value, all others fitted again."""
+def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> Fit:
+    """All others fitted again with one parameter held at a value."""
     held = h.fit.unknowns[i].name
     here = built(problem, h.candidates)
     others = [u for u in h.fit.unknowns if u.name != held]
@@ -79,5 +110,4 @@ def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> f
     start = dict(zip((u.name for u in h.fit.unknowns), h.fit.values + along, strict=True))
     own = {u.name for c in h.candidates for u in c.unknowns}
     known = {n: column for n, column in h.fit.columns.items() if n not in own}
-    found = fit(here, others, size, start, {held: value}, EVALUATIONS, known)
-    return float(found.residual @ found.residual)
+    return fit(here, others, size, start, {held: value}, EVALUATIONS, known)
