@@ -196,6 +196,8 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
         tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
         owed = replace(owed, free_form=curve)
+    final = {h.key: h for h in judgement.members}
+    singles, pairs = ([final.get(h.key, h) for h in some] for some in (singles, pairs))
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
 
 
