@@ -272,3 +272,59 @@ def test_errors_of_a_linear_law_and_without_declared_noise_stay(monkeypatch):
     assert_allclose(likelihood.profiled(asked, linear, np.array([0.2])).fit.covariance, h.fit.covariance)
     asked.record.floor_known = False
     assert likelihood.profiled(asked, h, np.array([0.2])) is h
+
+
+class Beginning(Playing):
+    """A force in proportion to a motion that rests for a while, from a moment on."""
+
+    def __init__(self, moment: float, seed: int) -> None:
+        t = np.arange(800) * 0.01
+        self.q = np.where((t > 3.0) & (t < 3.3), 0.0, np.sin(2 * np.pi * 3.0 * t))
+        every = np.ones(len(t), bool)
+        self.record = SimpleNamespace(runs=(Run(t, t[:, None], t[:, None], every, ~every),), floor_known=True)
+        y = 0.1 * np.random.default_rng(seed).standard_normal((len(t), 1))
+        y -= self.identify_residual({"d": 1.0, "d_t0": moment}) - t[:, None]
+        self.record.runs = (Run(t, t[:, None], y, every, ~every),)
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        acts = (1 + np.tanh((run.t - theta["d_t0"]) / 0.02)) / 2
+        return run.y - (theta["d"] * acts * self.q)[:, None]
+
+
+def begun(moment: float, start: float, seed: int) -> tuple[Beginning, Hypothesis]:
+    asked = Beginning(moment, seed)
+    d, t0 = Unknown("d", 0.0, -np.inf, np.inf, 1.0), Unknown("d_t0", start, 0.0, 8.0, 0.05)
+    found = fit(asked, (d, t0), np.array([0.1]), {"d": 0.9, "d_t0": start})
+    return asked, Hypothesis((Candidate("damping_change", "spring", (d,), (t0,)),), found, ())
+
+
+def test_errors_of_a_moment_reach_over_a_rest(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    before, after = [], []
+    for seed in range(40):
+        true, start = np.random.default_rng(seed).uniform(3.05, 3.25, 2)
+        asked, h = begun(true, start, seed)
+        found = likelihood.profiled(asked, h, np.array([0.1])).fit
+        before.append(abs(h.fit.theta["d_t0"] - true) < 1.96 * h.fit.std["d_t0"])
+        after.append(abs(found.theta["d_t0"] - true) < 1.96 * found.std["d_t0"])
+        assert found.std["d_t0"] < 3.0
+    assert np.mean(before) < 0.8
+    assert np.mean(after) > 0.9
+
+
+def test_a_moment_a_swing_off_is_fitted_again(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    monkeypatch.setattr(
+        likelihood,
+        "finished",
+        lambda problem, rest, promises, size, jobs: [
+            Hypothesis(p.candidates, fit(problem, p.candidates[0].unknowns, size, p.start), ())
+            for p in promises
+        ],
+    )
+    asked, h = begun(5.0, 5.0, 0)
+    off = asked.identify_residual({"d": 1.0, "d_t0": 5.35}).ravel() / 0.1
+    stayed = replace(h, fit=replace(h.fit, values=np.array([1.0, 5.35]), residual=off))
+    found = likelihood.profiled(asked, stayed, np.array([0.1])).fit
+    assert found.theta["d_t0"] == pytest.approx(5.0, abs=0.03)

@@ -46,6 +46,27 @@ def test_what_chance_makes_of_noise_does_not_matter(rms, matter):
 
 
 @pytest.mark.parametrize(
+    ("early", "late", "clear", "matter"),
+    [
+        (5.0, 1.0, False, True),  # an actuator that saturates in the part to identify alone
+        (1.02, 1.0, False, False),
+        (1.06, 1.06, False, False),
+        (1.06, 1.06, True, True),  # little, but like an effect as noise never is
+        (1.06, 1.0, True, True),
+        (1.02, 1.02, True, False),
+    ],
+)
+def test_both_parts_matter_and_less_of_what_is_like_an_effect(early, late, clear, matter):
+    assert matters(asked(), in_parts(early, late), NOISE, clear=clear) is matter
+
+
+def in_parts(early: float, late: float) -> Hypothesis:
+    """What leaves residuals of these rms values in the part to identify and in the held-out part."""
+    h = left(1.0, 1.0)
+    return replace(h, residuals=(np.where(T < SAMPLES, early, late)[:, None] * h.residuals[0],))
+
+
+@pytest.mark.parametrize(
     ("rms", "likeness", "matter"),
     [
         ((1.3, 1.0), 0.05, False),  # what another form of contact leaves
@@ -116,15 +137,21 @@ def test_several_effects_account_for_more_of_what_could_be_form(after, found):
     )
 
 
-@pytest.mark.parametrize(("early", "late"), [(1.0, True), (1.2, False)])
-def test_what_begins_where_the_record_is_held_out_is_said_to_do_so(early, late):
-    nothing = left(5.0, 1.0)
-    [residual] = nothing.residuals
-    base = replace(nothing, residuals=(np.where(T[:, None] < SAMPLES, early * np.sign(residual), residual),))
+@pytest.mark.parametrize(
+    ("early", "late", "said"),
+    [
+        (1.0, 5.0, "begins in the held-out part"),
+        (5.0, 1.0, "ends before"),
+        (1.2, 5.0, "nearest was"),
+        (5.0, 1.2, "nearest was"),
+    ],
+)
+def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
+    base = in_parts(early, late)
     told = judge(asked(), base, [base], [], NOISE, NOISE)
     assert told.verdict == "unexplained"
-    assert ("begins in the held-out part" in told.reason) is late
-    assert bool(told.next_experiment) is late
+    assert said in told.reason
+    assert bool(told.next_experiment) == (said != "nearest was")
 
 
 @pytest.mark.parametrize(

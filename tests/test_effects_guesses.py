@@ -116,6 +116,11 @@ def test_the_limit_of_an_actuator_is_guessed(seed, share):
     assert min(max(g / limit, limit / g) for g in found) < 2
 
 
+def test_a_limit_is_guessed_where_an_input_stays_at_its_largest():
+    u = np.interp(T, [0.0, 0.3 * T[-1], 0.5 * T[-1]], [7.5, 7.5, 15.0])
+    assert any(14.2 < g["limit"] < 15.0 for g in EFFECTS["actuator_saturation"].guesses(T, u))
+
+
 @given(time=st.floats(0.02, 0.5))
 def test_lags_and_delays_are_guessed_within_their_decade_from_rest(time):
     for kind in ("actuator_lag", "input_delay"):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -15,6 +16,7 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
+Part = Literal["fit", "test"]  # of a record: to identify, held out
 BRIEF, LONG = 4, 20  # steps of a fit to rank it, and to finish it
 FINALISTS = 5
 GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
@@ -63,8 +65,12 @@ class Hypothesis:
 
     def held_out(self, problem: Problem) -> Array:
         """Residual on the held-out part, (m, n_y)."""
+        return self.of(problem, "test")
+
+    def of(self, problem: Problem, part: Part) -> Array:
+        """Residual on a part of the record, (m, n_y)."""
         runs = zip(self.residuals, problem.record.runs, strict=True)
-        return np.concatenate([r[run.test] for r, run in runs])
+        return np.concatenate([r[getattr(run, part)] for r, run in runs])
 
     def scores(self, problem: Problem, size: Array) -> Array:
         """Log score of each block of the held-out part, up to a constant, (BLOCKS,)."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.compare import Hypothesis, Part
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.slopes import STEP
@@ -22,6 +22,8 @@ SLOW_BLOCKS = 40  # pieces of the held-out part whose means show slow residuals
 SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
 BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
+SLIGHT = 0.2  # times its noise: the same of what is like an effect
+CLEAR = 20.0  # times the bootstrap's 95 % point: a likeness from which on it is; noise comes to twice
 CHANCE = 3.0  # standard deviations of the mean square of white noise
 NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter,
 ONE_EFFECT = 0.2  # unless one effect could explain this share of it; other forms are like no effect
@@ -76,28 +78,41 @@ def detect(
         p_values.append((1 + np.sum(reference >= value)) / (REPLICATES + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
     p_value = min(1.0, len(p_values) * float(min(p_values)))
-    return Detection(p_value, figures, matters(problem, base, noise, likeness, sets_in))
+    clear = figures.get(LIKENESS, 0.0) >= CLEAR
+    return Detection(p_value, figures, matters(problem, base, noise, likeness, sets_in, clear))
 
 
 def matters(
-    problem: Problem, base: Hypothesis, noise: Array, likeness: float = 1.0, sets_in: bool = False
+    problem: Problem,
+    base: Hypothesis,
+    noise: Array,
+    likeness: float = 1.0,
+    sets_in: bool = False,
+    clear: bool = False,
 ) -> bool:
-    """Whether a held-out residual is too large to be left alone, in any output.
+    """Whether a residual is too large to be left alone, in any output and either part of the record.
 
     Compared with the signal is what it has beyond noise, beyond what chance makes of that too. Where the
-    FMU's form leaves something open, less than that matters only if one effect could explain much of it, or
-    if it sets in during the record, as no form does.
-    likeness: share of what is beyond noise that one effect could explain, by linear regression.
+    FMU's form leaves something open, the held-out part alone counts, and less than form leaves matters only
+    if one effect could explain much of it, or if it sets in during the record, as no form does.
+    likeness: share of what is beyond noise that one effect could explain, by linear regression; clear:
+    whether it is so much like one that noise never is.
     """
     signal, rms = signal_size(problem), base.rms(problem)
-    samples = sum(int(run.test.sum()) for run in problem.record.runs)
-    chance = 1 + CHANCE * np.sqrt(2 / max(samples, 1))
-    beyond = np.sqrt(np.maximum(rms**2 - chance * noise**2, 0.0))
-    large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
-    telling = (beyond >= SHARE * signal) | (beyond >= BEYOND * noise)
+    beyond = _beyond(problem, base, noise, "test")
     if problem.form_error > 0:
+        large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
+        telling = (beyond >= SHARE * signal) | (beyond >= BEYOND * noise)
         return bool(np.any(large) or (np.any(telling) and (sets_in or likeness >= ONE_EFFECT)))
-    return bool(np.any(telling))
+    beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
+    return bool(np.any((beyond >= SHARE * signal) | (beyond >= (SLIGHT if clear else BEYOND) * noise)))
+
+
+def _beyond(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> Array:
+    """Root mean square (n_y,) of what a part of the record has beyond noise and what chance makes of it."""
+    residual = base.of(problem, part)
+    chance = 1 + CHANCE * np.sqrt(2 / max(len(residual), 1))
+    return np.asarray(np.sqrt(np.maximum(np.mean(residual**2, axis=0) - chance * noise**2, 0.0)))
 
 
 def signal_size(problem: Problem) -> Array:

@@ -11,7 +11,8 @@ import numpy as np
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, cost, finished
-from estimator.closeloop.fit import Fit, fit, sandwich
+from estimator.closeloop.dating import REACH
+from estimator.closeloop.fit import Fit, fit, sandwich, weighted
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built
 from estimator.record import Array
@@ -21,6 +22,7 @@ TRIES = 3  # places on each side
 FURTHER = 2.0  # times as far at most, from one to the next
 EVALUATIONS = 6  # of the fit of all others at each
 DEEPER = 4.0  # by how much the sum of squares has to be lower somewhere, to go there
+MOMENTS = 51  # at which a law is tried that sets in, as far as those that `dating` tries
 ROUNDS = 2  # of going on from a lower place
 
 
@@ -28,8 +30,8 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     """The hypothesis with the standard errors of its laws widened to where the sum of squares says no.
 
     Of each parameter the wider side counts. Where the valley turns out to be deeper elsewhere, the hypothesis
-    is fitted again from there. Laws that are linear in their parameters stay as they are, and so do moments,
-    in which the sum of squares is rugged.
+    is fitted again from there. Laws that are linear in their parameters stay as they are. Moments are tried
+    one after the other, as the sum of squares is rugged in them.
     """
     if not problem.record.floor_known:
         return h
@@ -56,6 +58,11 @@ def bends(c: Candidate) -> bool:
 def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, float], dict[str, float]]:
     """Standard errors by name; and values where the sum of squares is lower, where it is found to be."""
     wider: dict[str, float] = {}
+    for u in (u for c in h.candidates for u in c.shape if u.is_moment):
+        half, deeper = _when(problem, h, u, size)
+        wider[u.name] = half / WIDTH
+        if deeper:
+            return wider, deeper
     for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_moment):
         for side in (-1.0, 1.0):
             half, deeper = _half(problem, h, u, size, side)
@@ -91,6 +98,29 @@ def _half(
         if share <= 1.0:
             break
     return abs(away), {}
+
+
+def _when(problem: Problem, h: Hypothesis, u: Unknown, size: Array) -> tuple[float, dict[str, float]]:
+    """How far from its value a moment may be in 95 of 100 cases, of those that are tried.
+
+    And the values of a lower place, where one is met. All others follow as far as the jacobian tells.
+    """
+    names = [x.name for x in h.fit.unknowns]
+    if u.name not in names or h.fit.std[u.name] == 0:
+        return 0.0, {}
+    i, now, length = names.index(u.name), h.fit.theta[u.name], problem.record.runs[0].fit_time(1.0)
+    others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
+    here, usual = built(problem, h.candidates), max(h.fit.std[u.name] / _white(h)[i], 1.0) ** 2
+
+    def squares(t: float) -> float:
+        r = weighted(here, {**h.theta, u.name: t}, size)
+        return float(np.sum((r - others @ (others.T @ r)) ** 2))
+
+    tried = np.clip(now + REACH * length * np.linspace(-1.0, 1.0, MOMENTS), 0.0, length)
+    rises = np.array([squares(float(t)) for t in tried]) / usual - squares(now) / usual
+    if rises.min() < -DEEPER:
+        return 0.0, {u.name: float(tried[np.argmin(rises)])}
+    return float(np.max(np.abs(tried - now)[rises < WIDTH**2], initial=0.0)), {}
 
 
 def _white(h: Hypothesis) -> Array:

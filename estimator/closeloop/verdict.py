@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, beats, cost, lead
+from estimator.closeloop.compare import Hypothesis, Part, beats, cost, lead
 from estimator.closeloop.detect import Detection, matters, signal_size
 from estimator.closeloop.moments import moment
 from estimator.closeloop.pairs import idle
@@ -228,14 +228,17 @@ def judge(
         if more:
             return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
         return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
-    if not matters(problem, base, noise, 0.0, began):
+    if problem.form_error > 0 and not matters(problem, base, noise, 0.0, began):
         reason = (
             "the residual is within what another form of the FMU leaves, and no effect explains most of it"
         )
         return Judgement("no_discrepancy", (), reason)
-    if _begins_late(problem, base, noise):
+    if _noise_alone(problem, base, noise, "fit"):
         reason = "the part to identify shows no more than noise: what there is begins in the held-out part"
         return Judgement("unexplained", (), reason, "a split with some of it in the part to identify")
+    if _noise_alone(problem, base, noise, "test"):
+        reason = "the held-out part shows no more than noise: what there is ends before, unconfirmed"
+        return Judgement("unexplained", (), reason, "a split with some of it in the held-out part")
     nearest = singles[0].label if singles else "none"
     return Judgement(
         "unexplained", (), f"no effect of the library accounts for the residual; nearest was {nearest}"
@@ -291,12 +294,11 @@ def noticed(h: Hypothesis, base: Hypothesis) -> float:
     return max(CURVE, MISSED * (cost(base) - cost(h)))
 
 
-def _begins_late(problem: Problem, base: Hypothesis, noise: Array) -> bool:
-    """Whether the part to identify is matched as well as noise lets it be."""
-    runs = zip(base.residuals, problem.record.runs, strict=True)
-    fitted = np.concatenate([r[run.fit] for r, run in runs])
-    scatter = SCATTER / np.sqrt(2 * len(fitted))
-    return bool(np.all(np.sqrt(np.mean(fitted**2, axis=0)) < (1 + scatter) * noise))
+def _noise_alone(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> bool:
+    """Whether a part of the record is matched as well as noise lets it be."""
+    residual = base.of(problem, part)
+    scatter = SCATTER / np.sqrt(2 * len(residual))
+    return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * noise))
 
 
 def one_curve(h: Hypothesis) -> bool:

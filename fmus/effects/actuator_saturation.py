@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fmus.effects.input_effect import WHOLE, InputEffect
 from fmus.variables import Expr, Parameter
 
-QUANTILES = (0.5, 0.7, 0.85, 0.95)  # of |u|, at which a limit is looked for
+QUANTILES = (0.5, 0.7, 0.85, 0.95)  # of the values of |u|, at which a limit is looked for
 
 
 class ActuatorSaturation(InputEffect):
@@ -33,6 +33,6 @@ class ActuatorSaturation(InputEffect):
 
     @classmethod
     def guesses(cls, t: NDArray[np.float64], u: NDArray[np.float64]) -> list[dict[str, float]]:
-        """See InputEffect.guesses: limits that the input exceeds at times."""
-        limits = np.unique(np.quantile(np.abs(u), QUANTILES))
+        """See InputEffect.guesses: limits exceeded at times, however long the input stays at its largest."""
+        limits = np.unique(np.quantile(np.unique(np.abs(u)), QUANTILES))
         return [{"limit": float(limit)} for limit in limits if 0 < limit < np.abs(u).max()]
