@@ -116,3 +116,22 @@ def test_an_open_form_may_leave_a_curve_that_is_little_of_it(left, own, elsewher
         for squares in (3e4, 1000 + left)
     )
     assert [another(h, base, own, elsewhere, form) for form in (False, True)] == [closed, opened]
+
+
+def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
+    """What is left of a class of these laws, best first, on a record with a resistance."""
+    here = problem(builder, record(to_and_fro(2.0), resistance, 3))
+    o = looked_at("one", here, kinds).found
+    fitted = {h.candidates[0].kind: h for h in o.singles}
+    told = Judgement("ambiguous", tuple(fitted[k] for k in kinds), "this record cannot tell them apart")
+    return confirmed(here, o.base, told, o.forces, o.size)
+
+
+def test_of_a_class_the_law_stays_that_no_curve_denies(builder):
+    told = among(builder, viscous(200.0), "quadratic_damping", "viscous_damping")
+    assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])
+
+
+def test_of_a_class_no_law_stays_where_curves_deny_all_over_that_motion(builder):
+    told = among(builder, root(200.0, 60.0), "quadratic_damping", "viscous_damping", "cubic_stiffness")
+    assert (told.verdict, told.members) == ("unexplained", ())

@@ -8,7 +8,7 @@ from estimator.closeloop.freeform import FREE_FORMS, offered
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Screening, built, screen
-from estimator.closeloop.verdict import CURVE, SECOND, Judgement, no_law, noticed
+from estimator.closeloop.verdict import CURVE, SECOND, Judgement, named, no_law, noticed
 from estimator.record import Array
 from fmus.effects import EFFECTS
 
@@ -21,16 +21,30 @@ NO_LESS = 0.99  # of what a curve over another motion explains: one port may hav
 def confirmed(
     problem: Problem, base: Hypothesis, judgement: Judgement, forces: Sequence[MissingForce], size: Array
 ) -> Judgement:
-    """The judgement, or `unexplained` where its best single law is not the curve that the force follows.
+    """The judgement, or one without its best single law where that is not the curve that the force follows.
 
-    Asked where noise is declared: else what is left is no measure.
+    Then those of its class stay that are not denied so, if one of them is a curve over the same motion; else
+    it is `unexplained`. Asked where noise is declared: else what is left is no measure.
     """
     best = judgement.members[:1]
     if not best or len(best[0].candidates) > 1 or not problem.record.floor_known:
         return judgement
+
+    def denied(h: Hypothesis) -> bool:
+        own, elsewhere = curvature(problem, h, forces, size)
+        return another(h, base, own, elsewhere, problem.form_error > 0)
+
     [h] = best
-    own, elsewhere = curvature(problem, h, forces, size)
-    return no_law(h) if another(h, base, own, elsewhere, problem.form_error > 0) else judgement
+    if not denied(h):
+        return judgement
+    rest = [m for m in judgement.members[1:] if not denied(m)]
+    return named(rest, "traced") if any(motion(m) == motion(h) for m in rest) else no_law(h)
+
+
+def motion(h: Hypothesis) -> tuple[str, str]:
+    """Where a single law acts, and over what: velocity or displacement."""
+    [c] = h.candidates
+    return c.location, EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
 def another(h: Hypothesis, base: Hypothesis, own: float, elsewhere: float, open_form: bool) -> bool:
@@ -55,9 +69,8 @@ def curvature(
     Of a curve over the law's own motion; and, where the FMU's form leaves something open, the most of one
     over another velocity or displacement, at this port or another. Zero for an effect that is no such curve.
     """
-    [c] = h.candidates
-    over = EFFECTS[c.kind].over if c.kind in EFFECTS else ""
-    mine = [(kind, c.location) for kind, law in FREE_FORMS.items() if law.against == over]
+    location, over = motion(h)
+    mine = [(kind, location) for kind, law in FREE_FORMS.items() if law.against == over]
     if not mine:
         return 0.0, 0.0
     offers = offered(problem, forces) if problem.form_error > 0 else mine

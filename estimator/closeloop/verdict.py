@@ -220,14 +220,14 @@ def judge(
     ]
     if better and (not good or completes(problem, better[0], good[0], size)):
         members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
-        return _named(members, "several") if members else no_law(better[0])
+        return named(members, "several") if members else no_law(better[0])
     if good:
         members = equivalent(problem, good[0], good, size)
         best = members[0]
         more = [h for h in (*good, *pairs) if problem.form_error == 0 and outgrown(best, h, base)]
         if more:
             return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
-        return _named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
+        return named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
     if problem.form_error > 0 and not matters(problem, base, noise, 0.0, began):
         reason = (
             "the residual is within what another form of the FMU leaves, and no effect explains most of it"
@@ -326,7 +326,8 @@ def _not_all(m: Hypothesis, h: Hypothesis) -> Judgement:
     return Judgement("unexplained", (), reason)
 
 
-def _named(members: Sequence[Hypothesis], verdict: Verdict) -> Judgement:
+def named(members: Sequence[Hypothesis], verdict: Verdict) -> Judgement:
+    """The verdict where one hypothesis accounts for the residual; `ambiguous` where several do."""
     if len(members) == 1:
         return Judgement(verdict, tuple(members), f"{members[0].label} accounts for the residual")
     names = ", ".join(m.label for m in members)
