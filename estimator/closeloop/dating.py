@@ -38,12 +38,17 @@ def begins(h: Hypothesis) -> list[str]:
     return [u.name for c in h.candidates for u in c.shape if u.is_moment]
 
 
+def moments_near(now: float, length: float) -> list[float]:
+    """Moments within reach of one, in order, none outside of the length that is fitted, s."""
+    grid = now + REACH * length * np.arange(-STEPS, STEPS + 1) / STEPS
+    return [float(t) for t in np.unique(np.clip(grid, 0.0, length))]
+
+
 def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:
     """A moment with which, all else as it is, the identify part is matched better, or None."""
     [name, *_] = begins(h)
     here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
-    grid = now + REACH * length * np.arange(-STEPS, STEPS + 1) / STEPS
-    inside = [float(t) for t in grid if 0.0 < t < length and t != now]
+    inside = [t for t in moments_near(now, length) if 0.0 < t < length and t != now]
     squares = [float(np.sum(weighted(here, {**h.theta, name: t}, size) ** 2)) for t in inside]
     best = int(np.argmin(squares)) if squares else 0
     return inside[best] if squares and squares[best] < cost(h) else None

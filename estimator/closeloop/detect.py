@@ -23,7 +23,7 @@ SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
 BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
 SLIGHT = 0.2  # times its noise: the same of what is like an effect
-CLEAR = 20.0  # times the bootstrap's 95 % point: a likeness from which on it is; noise comes to twice
+CLEAR = 20.0  # times the bootstrap's 95 % point: from this likeness on it is; records without any come to 6
 CHANCE = 3.0  # standard deviations of the mean square of white noise
 NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter,
 ONE_EFFECT = 0.2  # unless one effect could explain this share of it; other forms are like no effect
@@ -98,14 +98,16 @@ def matters(
     likeness: share of what is beyond noise that one effect could explain, by linear regression; clear:
     whether it is so much like one that noise never is.
     """
-    signal, rms = signal_size(problem), base.rms(problem)
+    signal, rms, form_open = signal_size(problem), base.rms(problem), problem.form_error > 0
     beyond = _beyond(problem, base, noise, "test")
-    if problem.form_error > 0:
-        large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
-        telling = (beyond >= SHARE * signal) | (beyond >= BEYOND * noise)
-        return bool(np.any(large) or (np.any(telling) and (sets_in or likeness >= ONE_EFFECT)))
-    beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
-    return bool(np.any((beyond >= SHARE * signal) | (beyond >= (SLIGHT if clear else BEYOND) * noise)))
+    if not form_open:
+        beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
+    least = SLIGHT if clear and not form_open else BEYOND
+    telling = bool(np.any((beyond >= SHARE * signal) | (beyond >= least * noise)))
+    if not form_open:
+        return telling
+    large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
+    return bool(np.any(large)) or (telling and (sets_in or likeness >= ONE_EFFECT))
 
 
 def _beyond(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, cost, finished
-from estimator.closeloop.dating import REACH
+from estimator.closeloop.dating import begins, moments_near
 from estimator.closeloop.fit import Fit, fit, sandwich, weighted
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built
@@ -22,7 +22,6 @@ TRIES = 3  # places on each side
 FURTHER = 2.0  # times as far at most, from one to the next
 EVALUATIONS = 6  # of the fit of all others at each
 DEEPER = 4.0  # by how much the sum of squares has to be lower somewhere, to go there
-MOMENTS = 51  # at which a law is tried that sets in, as far as those that `dating` tries
 ROUNDS = 2  # of going on from a lower place
 
 
@@ -39,7 +38,7 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
         wider, deeper = _profiles(problem, h, size)
         if not deeper:
             break
-        own = {u.name for c in h.candidates for u in c.unknowns}
+        own = _own(h)
         rest = [u for u in h.fit.unknowns if u.name not in own]
         again = finished(problem, rest, [Promise(h.candidates, 0.0, {**h.theta, **deeper})], size, 1)
         if not again or cost(again[0]) >= cost(h):
@@ -58,9 +57,9 @@ def bends(c: Candidate) -> bool:
 def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, float], dict[str, float]]:
     """Standard errors by name; and values where the sum of squares is lower, where it is found to be."""
     wider: dict[str, float] = {}
-    for u in (u for c in h.candidates for u in c.shape if u.is_moment):
-        half, deeper = _when(problem, h, u, size)
-        wider[u.name] = half / WIDTH
+    for name in begins(h):
+        half, deeper = _when(problem, h, name, size)
+        wider[name] = half / WIDTH
         if deeper:
             return wider, deeper
     for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_moment):
@@ -84,7 +83,7 @@ def _half(
     if error == 0:
         return 0.0, {}
     away = side * WIDTH * error
-    usual = max(error / _white(h)[i], 1.0) ** 2  # as residuals are not white
+    usual = _usual(h, i)
     for _ in range(TRIES):
         value = float(np.clip(best + away, u.low, u.high))
         if value != best + away:
@@ -100,27 +99,37 @@ def _half(
     return abs(away), {}
 
 
-def _when(problem: Problem, h: Hypothesis, u: Unknown, size: Array) -> tuple[float, dict[str, float]]:
+def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[float, dict[str, float]]:
     """How far from its value a moment may be in 95 of 100 cases, of those that are tried.
 
     And the values of a lower place, where one is met. All others follow as far as the jacobian tells.
     """
     names = [x.name for x in h.fit.unknowns]
-    if u.name not in names or h.fit.std[u.name] == 0:
+    if name not in names or h.fit.std[name] == 0:
         return 0.0, {}
-    i, now, length = names.index(u.name), h.fit.theta[u.name], problem.record.runs[0].fit_time(1.0)
+    i, now, length = names.index(name), h.fit.theta[name], problem.record.runs[0].fit_time(1.0)
     others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
-    here, usual = built(problem, h.candidates), max(h.fit.std[u.name] / _white(h)[i], 1.0) ** 2
+    here = built(problem, h.candidates)
 
     def squares(t: float) -> float:
-        r = weighted(here, {**h.theta, u.name: t}, size)
+        r = weighted(here, {**h.theta, name: t}, size)
         return float(np.sum((r - others @ (others.T @ r)) ** 2))
 
-    tried = np.clip(now + REACH * length * np.linspace(-1.0, 1.0, MOMENTS), 0.0, length)
-    rises = np.array([squares(float(t)) for t in tried]) / usual - squares(now) / usual
+    tried = np.array(moments_near(now, length))
+    rises = (np.array([squares(t) for t in tried]) - squares(now)) / _usual(h, i)
     if rises.min() < -DEEPER:
-        return 0.0, {u.name: float(tried[np.argmin(rises)])}
+        return 0.0, {name: float(tried[np.argmin(rises)])}
     return float(np.max(np.abs(tried - now)[rises < WIDTH**2], initial=0.0)), {}
+
+
+def _usual(h: Hypothesis, i: int) -> float:
+    """What a rise of the sum of squares is divided by for the i-th unknown, as residuals are not white."""
+    return float(max(np.sqrt(h.fit.covariance[i, i]) / _white(h)[i], 1.0) ** 2)
+
+
+def _own(h: Hypothesis) -> set[str]:
+    """Names of the unknowns of its candidates."""
+    return {u.name for c in h.candidates for u in c.unknowns}
 
 
 def _white(h: Hypothesis) -> Array:
@@ -138,6 +147,6 @@ def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> F
     others = [u for u in h.fit.unknowns if u.name != held]
     along = h.fit.covariance[:, i] / h.fit.covariance[i, i] * (value - h.fit.values[i])
     start = dict(zip((u.name for u in h.fit.unknowns), h.fit.values + along, strict=True))
-    own = {u.name for c in h.candidates for u in c.unknowns}
+    own = _own(h)
     known = {n: column for n, column in h.fit.columns.items() if n not in own}
     return fit(here, others, size, start, {held: value}, EVALUATIONS, known)
