@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.compare import CURVE, Hypothesis
 from estimator.closeloop.curvature import another, confirmed, curvature
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.transfer import Traced
-from estimator.closeloop.verdict import CURVE, Judgement
+from estimator.closeloop.verdict import Judgement
 from fmus.export.hypotheses import ModelBuilder
 from tests.carriage import Force, coulomb, looked_at, problem, record, to_and_fro, viscous
 

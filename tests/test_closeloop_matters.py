@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimator.closeloop.ambiguity import becomes, equivalent
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, cost
+from estimator.closeloop.compare import CURVE, Hypothesis, cost
 from estimator.closeloop.detect import ONE_EFFECT, matters
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.simpler import limits
-from estimator.closeloop.verdict import CURVE, becomes, completes, equivalent, judge, reached, whole
+from estimator.closeloop.verdict import completes, judge, reached, whole
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.result import effects_of

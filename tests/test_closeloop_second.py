@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from estimator.closeloop import allowed as allowing
 from estimator.closeloop import compare, dating, pairs, progress
 from estimator.closeloop.candidates import Candidate, physical_candidates
-from estimator.closeloop.compare import Hypothesis, cost
+from estimator.closeloop.compare import CURVE, Hypothesis, cost
 from estimator.closeloop.fit import Fit, fit
 from estimator.closeloop.onset import grown
 from estimator.closeloop.pairs import beside, try_pairs
 from estimator.closeloop.problem import Unknown
 from estimator.closeloop.screen import Screening
-from estimator.closeloop.verdict import CURVE, one_curve, outgrown
+from estimator.closeloop.verdict import one_curve, outgrown
 from estimator.record import Run
 from fmus.effects import EFFECTS
 from fmus.export.hypotheses import ModelBuilder

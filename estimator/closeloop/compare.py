@@ -26,6 +26,7 @@ LEADERS = 2  # of the finalists that are fitted to the end before the others, an
 RIVAL = 4.0  # times the best sum of squares, up to which others are fitted to the end
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
+CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
 
 
@@ -263,3 +264,13 @@ def beats(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array) -> bool:
     """Whether a is better than b by more than TELLING standard errors."""
     mean, error = lead(problem, a, b, size)
     return mean > TELLING * error
+
+
+def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
+    """What the sum of squares of the held-out part has more than noise would."""
+    return float(np.sum((h.held_out(problem) / size) ** 2 - 1))
+
+
+def beyond_noise_of_all(problem: Problem, h: Hypothesis, size: Array) -> float:
+    """The same of both parts."""
+    return h.fit.beyond_noise + beyond_noise(problem, h, size)

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 from estimator.closeloop.candidates import physical_candidates
-from estimator.closeloop.compare import Hypothesis, cost
+from estimator.closeloop.compare import CURVE, Hypothesis, cost
 from estimator.closeloop.freeform import FREE_FORMS, offered
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Screening, built, screen
-from estimator.closeloop.verdict import CURVE, SECOND, Judgement, named, no_law, noticed
+from estimator.closeloop.verdict import SECOND, Judgement, named, no_law, noticed
 from estimator.record import Array
 from fmus.effects import EFFECTS
 

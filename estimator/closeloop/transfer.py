@@ -10,6 +10,7 @@ from typing import Literal
 
 from joblib import Parallel, delayed
 
+from estimator.closeloop.ambiguity import SAME
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.chain import Outcome
 from estimator.closeloop.chart import chart
@@ -19,7 +20,7 @@ from estimator.closeloop.joint import fit_together
 from estimator.closeloop.part import Part
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise
-from estimator.closeloop.verdict import SAME, explains
+from estimator.closeloop.verdict import explains
 from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
 from typing import Literal
 
 import numpy as np
 
-from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.compare import Hypothesis, Part, beats, cost, lead
+from estimator.closeloop.ambiguity import becomes, equivalent, splitting
+from estimator.closeloop.compare import (
+    CURVE,
+    Hypothesis,
+    Part,
+    beats,
+    beyond_noise,
+    beyond_noise_of_all,
+    cost,
+    lead,
+)
 from estimator.closeloop.detect import Detection, matters, signal_size
 from estimator.closeloop.moments import moment
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
-from estimator.closeloop.simpler import limits
 from estimator.record import Array, BoolArray
 from fmus.effects import EFFECTS
 
@@ -35,13 +42,9 @@ CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residu
 FORM_EXPLAINED = 0.9  # share of the variance beyond the noise, where the FMU's form leaves something open
 HALF = 0.5  # the same for one effect, where all of it is within what the form leaves
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
-UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
 LITTLE = 0.1  # of what a second effect explains: two right ones leave less than that
 SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
-CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 MISSED = 1e-3  # of what a law explains: right ones leave less than a tenth of it to a curve
-FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
-SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
 
 @dataclass(frozen=True)
@@ -113,76 +116,6 @@ def _reached_in_form(
     of_all = beyond_noise_of_all(problem, h, size) / max(beyond_noise_of_all(problem, base, size), 1e-300)
     held_out = np.sum(left) <= most * np.sum(was)
     return np.full(len(noise), of_all <= most and (held_out or of_all <= most * HALF))
-
-
-def equivalent(
-    problem: Problem, best: Hypothesis, others: Sequence[Hypothesis], size: Array
-) -> list[Hypothesis]:
-    """The class of the best hypothesis: those that the held-out data do not tell from it, nor the others.
-
-    Where the FMU's form leaves something open, the whole record tells, as forms differ from one part to the
-    next, and what the best one leaves is no measure of a small difference.
-    A simpler law that it becomes at a limit of its shape is told from it only where every further unknown is
-    worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
-    simpler one stays; of a group of parameters and one of them the group.
-    """
-    members, alike = [best], SAME * -float(best.scores(problem, size).sum())
-    if problem.form_error > 0:
-        alike = max(alike, FORM * beyond_noise_of_all(problem, best, size) / 2)
-    for h in others:
-        if h is best:
-            continue
-        mean, _ = lead(problem, best, h, size)
-        price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
-        behind = cost(h) - cost(best)
-        if problem.form_error > 0:
-            told = mean + behind / 2 >= max(price, alike)
-        else:
-            worse = problem.record.floor_known and h.fit.converged and behind > max(CURVE, SAME * cost(best))
-            told = worse or (mean >= max(price, alike) and beats(problem, best, h, size))
-        if not told:
-            members.append(h)
-    members = [h for h in members if not any(_replaces(other, h, members) for other in members)]
-    return [h for h in members if not any(_includes(other, h) for other in members)]
-
-
-def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
-    """Whether a simpler law of the class that h becomes takes its place.
-
-    Not where a law does as well that h alone is in a motion which keeps its sign: at one speed constant force
-    and viscous damping are alike, and Coulomb friction, which becomes viscous damping, lies between them.
-    """
-    lost = _one_way(h) - _one_way(other)
-    alike = {(c.kind, c.location) for m in members for c in m.candidates}
-    return becomes(h, other) and not lost & alike
-
-
-def _one_way(h: Hypothesis) -> set[tuple[str, str]]:
-    """Kind and location of what its laws are in a motion that keeps its sign."""
-    return {(kind, c.location) for c in h.candidates if c.kind in EFFECTS for kind in EFFECTS[c.kind].one_way}
-
-
-def _includes(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether one says of a group of parameters what the other says of one of them, so that both are true."""
-    if len(h.candidates) != 1 or len(other.candidates) != 1 or h is other:
-        return False
-    (group,), (c,) = h.candidates, other.candidates
-    names = [u.name.removeprefix(group.prefix).partition("_")[2] for u in group.amplitudes]
-    return group.kind == c.kind and c.location in names
-
-
-def becomes(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a hypothesis turns into another one, which is simpler, at a limit of its shape."""
-    if h is other or len(h.candidates) != len(other.candidates):
-        return False
-    return any(_member_by_member(h.candidates, order) for order in permutations(other.candidates))
-
-
-def _member_by_member(candidates: Sequence[Candidate], others: Sequence[Candidate]) -> bool:
-    pairs = list(zip(candidates, others, strict=True))
-    same = [a.label == b.label for a, b in pairs]
-    simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
-    return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))
 
 
 def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:
@@ -269,16 +202,6 @@ def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Arra
     return beats(problem, pair, single, size) and 2 * lead(problem, pair, single, size)[0] >= least
 
 
-def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
-    """What the sum of squares of the held-out part has more than noise would."""
-    return float(np.sum((h.held_out(problem) / size) ** 2 - 1))
-
-
-def beyond_noise_of_all(problem: Problem, h: Hypothesis, size: Array) -> float:
-    """The same of both parts."""
-    return h.fit.beyond_noise + beyond_noise(problem, h, size)
-
-
 def outgrown(m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:
     """Whether m, which held-out data do not tell from h, leaves what h could explain of the identify part.
 
@@ -334,22 +257,3 @@ def named(members: Sequence[Hypothesis], verdict: Verdict) -> Judgement:
     return Judgement(
         "ambiguous", tuple(members), f"this record cannot tell apart {names}", splitting(members)
     )
-
-
-def splitting(members: Sequence[Hypothesis]) -> str:
-    """The experiment that would tell the members of a class apart."""
-    kinds = {c.kind for m in members for c in m.candidates}
-    places = {c.location for m in members for c in m.candidates}
-    where = " and ".join(sorted(places))
-    advice = []
-    if {"constant_force", "coulomb_friction"} <= kinds:
-        advice.append(f"a run in which the velocity at {where} changes its sign")
-    if kinds & {"viscous_damping", "quadratic_damping"} and len(kinds) > 1:
-        advice.append(f"runs at two or more clearly different speeds of {where}")
-    if any(k.startswith("sensor_") for k in kinds):
-        advice.append("a second sensor for the same quantity, or a calibration of this one at rest")
-    if len(places) > 1:
-        advice.append(
-            f"a run that excites {where} by different amounts, for example at another load or torque"
-        )
-    return "; ".join(advice) or f"a run with a wider range of speed and displacement at {where}"
