@@ -132,6 +132,29 @@ def test_of_a_class_the_law_stays_that_no_curve_denies(builder):
     assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])
 
 
+def test_friction_rounded_all_over_the_motion_is_no_friction(builder):
+    told = among(builder, viscous(200.0), "coulomb_friction", "viscous_damping")
+    assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])
+    assert among(builder, root(90.0, 90.0), "stribeck_friction").verdict == "unexplained"
+    assert among(builder, coulomb(40.0), "coulomb_friction").verdict == "ambiguous"  # as it was
+
+
+def test_of_several_laws_each_is_what_its_name_says(builder):
+    here = problem(builder, record(to_and_fro(2.0), viscous(200.0), 3))
+    o = looked_at("one", here, ("coulomb_friction",)).found
+    [h] = o.singles
+    both = replace(
+        h, candidates=(replace(h.candidates[0], kind="parameter_offset", location="m"), *h.candidates)
+    )
+    told = confirmed(here, o.base, Judgement("several", (both,), "both"), o.forces, o.size)
+    assert told.verdict == "unexplained"
+    assert "over the velocity at carriage" in told.reason
+    rounded = {n: v / 1e3 if n.endswith("v_s") else v for n, v in h.fit.theta.items()}
+    sharp = replace(both, fit=replace(h.fit, values=np.array([rounded[u.name] for u in h.fit.unknowns])))
+    told = Judgement("several", (sharp,), "both")
+    assert confirmed(here, o.base, told, o.forces, o.size) is told
+
+
 def test_of_a_class_no_law_stays_where_curves_deny_all_over_that_motion(builder):
     told = among(builder, root(200.0, 60.0), "quadratic_damping", "viscous_damping", "cubic_stiffness")
     assert (told.verdict, told.members) == ("unexplained", ())

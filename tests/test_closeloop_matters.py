@@ -97,6 +97,7 @@ def test_less_matters_where_the_form_is_open(a, b, likeness):
         (FORM, (20.0, 1.5), (5.0, 1.5), (True, True)),  # within what the form leaves, and no worse
         (FORM, (20.0, 1.5), (5.0, 1.7), (True, False)),
         (FORM, (20.0, 1.5), (7.0, 1.5), (False, True)),
+        (FORM, (7.0, 1.5), (5.5, 1.5), (False, False)),  # within it, but hardly anything of it gone
         (FORM, (3.0, 1.3), (2.6, 1.2), (False, False)),  # all was small: half of it has to go
         (FORM, (3.0, 1.3), (2.0, 1.2), (True, True)),
     ],
@@ -107,6 +108,21 @@ def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
         replace(left(*after), candidates=(law("constant_force", 0, 0.0).candidates[0],)),
     )
     assert tuple(reached(problem, one, left(*before), NOISE, NOISE).tolist()) == found
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "at", "found"),
+    [
+        ((1.9, 1.3), (1.9, 1.0), "b", True),  # form is left in the other one
+        ((1.9, 1.3), (1.9, 1.0), "a", False),
+        ((1.9, 1.3), (1.9, 1.15), "b", False),  # a gain that makes up for half of the form there
+        ((1.9, 1.3), (2.1, 1.0), "b", False),
+        ((1.9, 1.1), (1.9, 1.0), "b", False),  # as little as that is form
+    ],
+)
+def test_a_fault_of_a_sensor_takes_nearly_all_from_its_own_output(before, after, at, found):
+    fault = replace(left(*after), candidates=(Candidate("sensor_gain", at, ()),))
+    assert reached(asked(FORM), fault, left(*before), NOISE, NOISE).all() == found
 
 
 @pytest.mark.parametrize(
@@ -129,13 +145,19 @@ def test_where_the_form_is_open_an_effect_may_act_in_one_part(early, late, found
     assert reached(asked(FORM), one, base, NOISE, NOISE).all() == found
 
 
-@pytest.mark.parametrize(("after", "found"), [((2.0, 1.2), False), ((1.25, 1.1), True)])
-def test_several_effects_account_for_more_of_what_could_be_form(after, found):
+@pytest.mark.parametrize(
+    ("before", "after", "found"),
+    [
+        ((3.0, 1.3), (2.0, 1.2), False),
+        ((3.0, 1.3), (1.25, 1.1), True),
+        ((7.0, 1.3), (4.5, 1.3), False),  # more than form was there
+        ((7.0, 1.3), (3.2, 1.3), True),
+    ],
+)
+def test_several_effects_account_for_more_of_what_could_be_form(before, after, found):
     two = tuple(law(kind, 0, 0.0).candidates[0] for kind in ("constant_force", "viscous_damping"))
-    assert (
-        reached(asked(FORM), replace(left(*after), candidates=two), left(3.0, 1.3), NOISE, NOISE).all()
-        == found
-    )
+    several = replace(left(*after), candidates=two)
+    assert reached(asked(FORM), several, left(*before), NOISE, NOISE).all() == found
 
 
 @pytest.mark.parametrize(

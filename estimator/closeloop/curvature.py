@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from estimator.closeloop.candidates import physical_candidates
+from estimator.closeloop.candidates import Candidate, physical_candidates
 from estimator.closeloop.compare import CURVE, Hypothesis, cost
 from estimator.closeloop.freeform import FREE_FORMS, offered
 from estimator.closeloop.missing_force import MissingForce
@@ -11,6 +11,7 @@ from estimator.closeloop.screen import Screening, built, screen
 from estimator.closeloop.verdict import SECOND, Judgement, named, no_law, noticed
 from estimator.record import Array
 from fmus.effects import EFFECTS
+from fmus.effects.force_law import ForceLaw
 
 SEEN = 0.05  # of the sum of squares of noise: where much is known, so much shows a law that only comes near
 OPEN_LEFT = 0.05  # where the FMU's form leaves something open, of what the law leaves beyond noise, and
@@ -24,21 +25,42 @@ def confirmed(
     """The judgement, or one without its best single law where that is not the curve that the force follows.
 
     Then those of its class stay that are not denied so, if one of them is a curve over the same motion; else
-    it is `unexplained`. Asked where noise is declared: else what is left is no measure.
+    it is `unexplained`. So it is with several laws, one of which is not what its name says.
+    Asked where noise is declared: else what is left is no measure.
     """
     best = judgement.members[:1]
-    if not best or len(best[0].candidates) > 1 or not problem.record.floor_known:
+    if not best or not problem.record.floor_known:
         return judgement
-
-    def denied(h: Hypothesis) -> bool:
-        own, elsewhere = curvature(problem, h, forces, size)
-        return another(h, base, own, elsewhere, problem.form_error > 0)
-
     [h] = best
+    if len(h.candidates) > 1:
+        rest = [m for m in judgement.members if not misnamed(m, forces)]
+        if h in rest:
+            return judgement
+        return named(rest, "several") if rest else no_law(h, misnamed(h, forces)[0])
+
+    def denied(m: Hypothesis) -> bool:
+        if misnamed(m, forces):
+            return True
+        own, elsewhere = curvature(problem, m, forces, size)
+        return another(m, base, own, elsewhere, problem.form_error > 0)
+
     if not denied(h):
         return judgement
     rest = [m for m in judgement.members[1:] if not denied(m)]
     return named(rest, "traced") if any(motion(m) == motion(h) for m in rest) else no_law(h)
+
+
+def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
+    """Laws that with its values, in the motion at their port, are not what their names say."""
+    at = {missing.port.name: missing.velocity for missing in forces}
+    found = []
+    for c in h.candidates:
+        law = EFFECTS.get(c.kind)
+        if law and issubclass(law, ForceLaw) and c.location in at:
+            values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
+            if not law.true_to_name(values, at[c.location]):
+                found.append(c)
+    return found
 
 
 def motion(h: Hypothesis) -> tuple[str, str]:

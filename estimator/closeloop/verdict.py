@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.ambiguity import becomes, equivalent, splitting
+from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import (
     CURVE,
     Hypothesis,
@@ -19,7 +20,7 @@ from estimator.closeloop.compare import (
     cost,
     lead,
 )
-from estimator.closeloop.detect import Detection, matters, signal_size
+from estimator.closeloop.detect import BEYOND, NOISES, Detection, matters, signal_size
 from estimator.closeloop.moments import moment
 from estimator.closeloop.pairs import idle
 from estimator.closeloop.problem import Problem
@@ -40,7 +41,7 @@ GAP = 0.95  # share of the gap to the noise that an effect must close where nois
 WON = 10.0  # log score over the FMU without the effect, on held-out data
 CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residual that is noise
 FORM_EXPLAINED = 0.9  # share of the variance beyond the noise, where the FMU's form leaves something open
-HALF = 0.5  # the same for one effect, where all of it is within what the form leaves
+HALF = 0.5  # the same that one effect has to explain of all outputs together
 EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
 LITTLE = 0.1  # of what a second effect explains: two right ones leave less than that
 SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
@@ -100,22 +101,34 @@ def _reached_in_form(
 ) -> BoolArray:
     """The same (n_y,) where the FMU's form leaves a share of each output open.
 
-    What was large beyond noise comes within that share, what was small does not grow. Where all was small, so
-    that it could be form too, one effect explains at least half of what was beyond noise in all outputs
-    together; several, which could come near to any form, nearly all of it. So it is with the whole record,
-    and with the held-out part unless hardly anything is left in all: an effect may act in one part alone.
+    One effect explains at least half of what was beyond noise in all outputs together; several, which could
+    come near to any form, more. So it is with the whole record, and with the held-out part unless hardly
+    anything is left in all: an effect may act in one part alone. What was large beyond noise comes within the
+    share, what was small does not grow; where all was small, so that it could be form too, several explain
+    nearly all. A fault of a sensor may also leave the others as they are, if nearly all goes from its own.
     """
     before, after = base.rms(problem), h.rms(problem)
     left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
+    gone = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
+    if np.any(_faulty(problem, h) & gone & (was >= BEYOND**2)):
+        return np.asarray(gone | (after <= CLEAN * before))
     share = (problem.form_error * signal_size(problem) / noise) ** 2
-    large = was >= share
-    if large.any():
-        gone = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
-        return gone | np.where(large, left < share, after <= CLEAN * before)
-    most = HALF if len(h.candidates) == 1 else 1 - FORM_EXPLAINED
+    large = (was >= share) & (before >= NOISES * noise)
+    several = HALF**2 if large.any() else 1 - FORM_EXPLAINED
+    most = HALF if len(h.candidates) == 1 else several
     of_all = beyond_noise_of_all(problem, h, size) / max(beyond_noise_of_all(problem, base, size), 1e-300)
     held_out = np.sum(left) <= most * np.sum(was)
-    return np.full(len(noise), of_all <= most and (held_out or of_all <= most * HALF))
+    if of_all > most or not (held_out or of_all <= most * HALF):
+        return np.zeros(len(noise), dtype=bool)
+    if not large.any():
+        return np.ones(len(noise), dtype=bool)
+    return np.asarray(gone | np.where(large, left < share, after <= CLEAN * before))
+
+
+def _faulty(problem: Problem, h: Hypothesis) -> BoolArray:
+    """The output (n_y,) whose sensor's fault a hypothesis is, if it is one and nothing else."""
+    faults = [c.location for c in h.candidates if c.is_fault and len(h.candidates) == 1]
+    return np.array([y in faults for y in problem.record.outputs])
 
 
 def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:
@@ -232,9 +245,12 @@ def one_curve(h: Hypothesis) -> bool:
     return len(set(laws)) < len(laws)
 
 
-def no_law(h: Hypothesis) -> Judgement:
-    """The verdict where a force keeps to a curve, but not to that of the law which comes nearest."""
-    c = next(c for c in h.candidates if c.kind in EFFECTS)
+def no_law(h: Hypothesis, law: Candidate | None = None) -> Judgement:
+    """The verdict where a force keeps to a curve, but not to that of the law which comes nearest.
+
+    law: of those of the hypothesis, where it is not the first.
+    """
+    c = law or next(c for c in h.candidates if c.kind in EFFECTS)
     over = EFFECTS[c.kind].over or "motion"
     reason = (
         f"a force over the {over} at {c.location} that follows no law of the library; nearest was {h.label}"

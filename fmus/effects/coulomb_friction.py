@@ -3,6 +3,8 @@
 In data: a residual of one height that turns its sign with the velocity, flat tops at reversals.
 """
 
+from collections.abc import Mapping
+
 import casadi as cs
 import numpy as np
 
@@ -27,6 +29,11 @@ class CoulombFriction(ForceLaw):
     def force(self, q: Expr, v: Expr) -> Expr:
         """See ForceLaw.force."""
         return -self.F_c * cs.tanh(v / self.v_s)
+
+    @classmethod
+    def true_to_name(cls, values: Mapping[str, float], v: Array) -> bool:
+        """See ForceLaw.true_to_name: dry friction is nearly full for most of the time."""
+        return values["v_s"] < float(np.median(np.abs(v)))
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:

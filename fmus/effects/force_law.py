@@ -67,6 +67,14 @@ class ForceLaw(Effect):
         return [shapes[i] for i in np.argsort(left, kind="stable")[:HANDFUL]]
 
     @classmethod
+    def true_to_name(cls, values: Mapping[str, float], v: Array) -> bool:
+        """Whether a law with these values, in a motion with velocities v (N,), is what its name says.
+
+        values: parameters by name. At the limits of its shape a law turns into another one.
+        """
+        return True
+
+    @classmethod
     def along(cls, values: Mapping[str, float], t: Array, q: Array, v: Array) -> Array:
         """Force (N,) along a motion (N,) at times t, s, with a memory at rest at t[0].
 

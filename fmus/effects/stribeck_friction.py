@@ -3,6 +3,8 @@
 In data: a residual that turns its sign with the velocity and is largest just after each reversal.
 """
 
+from collections.abc import Mapping
+
 import casadi as cs
 import numpy as np
 
@@ -30,6 +32,11 @@ class StribeckFriction(ForceLaw):
     def force(self, q: Expr, v: Expr) -> Expr:
         """See ForceLaw.force."""
         return -(self.F_c + self.F_b * cs.exp(-((v / self.v_b) ** 2))) * cs.tanh(v / self.v_s)
+
+    @classmethod
+    def true_to_name(cls, values: Mapping[str, float], v: Array) -> bool:
+        """See ForceLaw.true_to_name: dry friction that, once it is full, falls with the speed."""
+        return values["v_s"] < min(float(np.median(np.abs(v))), values["v_b"])
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
