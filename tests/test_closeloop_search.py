@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from estimator.closeloop.ambiguity import becomes
 from estimator.closeloop.candidates import Candidate
+from estimator.closeloop.chain import NEXT, overlooked
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import group_size, grouped
@@ -23,7 +25,6 @@ from estimator.closeloop.regressors import Calibration
 from estimator.closeloop.screen import Promise, screen
 from estimator.closeloop.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.twins import twins, with_twins
-from estimator.closeloop.verdict import becomes
 from estimator.plant import between
 from estimator.record import Record, Run
 from fmus.export.hypotheses import ModelBuilder
@@ -43,6 +44,26 @@ def candidate(kind, location, shape=(), amplitude="F_0"):
     return Candidate(
         kind, location, unknowns, tuple(Unknown(prefix + n, v, 0.0, np.inf, 1.0) for n, v in shape)
     )
+
+
+# ---- what is fitted besides where nothing explains
+
+
+def test_constant_changes_that_calibration_may_hide_are_tried_too():
+    def promise(kind, location, gain):
+        return Promise((candidate(kind, location),), gain, {})
+
+    tried = [promise("viscous_damping", "contact", 900.0)]
+    others = [promise("hysteresis", f"place_{i}", 800.0 - i) for i in range(NEXT + 3)]
+    hidden = [promise("parameter_offset", "m_w", 90.0), promise("actuator_gain", "V", 70.0)]
+    rest = [
+        promise("parameter_offset", "m_w", 60.0),  # another shape of one that is there
+        promise("parameter_offset", "mu0", 65.0),  # calibrated
+        promise("sensor_gain", "y", 80.0),
+        promise("parameter_offset", "A", 1.0),  # noise makes as much
+    ]
+    found = overlooked([*tried, *others, *hidden, *rest], tried, {"mu0"})
+    assert found == [*hidden, *others[:NEXT]]
 
 
 # ---- inputs between samples

@@ -211,6 +211,30 @@ def test_a_step_is_off_before_its_time_on_after_it_and_half_way_at_it(t0, since)
     assert float(begun(cs.DM(max(t0 + since, 0.0)), cs.DM(0.0))) == 1.0  # no time given: always
 
 
+@pytest.mark.parametrize(
+    ("kind", "values", "so"),
+    [
+        ("coulomb_friction", {"v_s": 1e-3}, True),
+        ("coulomb_friction", {"v_s": 0.1}, False),  # a smooth damper over all of the motion
+        ("stribeck_friction", {"v_s": 1e-3, "v_b": 0.02}, True),
+        ("stribeck_friction", {"v_s": 0.02, "v_b": 0.01}, False),  # what falls is rounded away
+        ("stribeck_friction", {"v_s": 0.1, "v_b": 0.2}, False),
+        ("flexible_mode", {"f": 2.0, "D": 0.1}, True),
+        ("flexible_mode", {"f": 0.2, "D": 0.1}, False),  # its mass stays where it is
+        ("viscous_damping", {"c": 1.0}, True),
+    ],
+)
+@pytest.mark.parametrize("turns", [0.0, 20.0])
+def test_a_law_at_a_limit_of_its_shape_is_another_one(kind, values, so, turns):
+    t = np.arange(0.0, 20.0, 0.01)
+    q, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    law = EFFECTS[kind]
+    assert issubclass(law, ForceLaw)
+    assert law.true_to_name(values, q, v) is so
+    if turns and kind == "flexible_mode":  # a shaft that goes round, of which the angle tells no frequency
+        assert law.true_to_name(values, q + turns * t, v + turns)
+
+
 def test_the_laws_are_those_of_the_text_books():
     at = {"q": 0.2, "v": -3.0}
     assert force(EFFECTS["viscous_damping"], {"c": 2.0}, **at) == 6.0

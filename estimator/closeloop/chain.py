@@ -1,6 +1,6 @@
 """The chain: calibrate, detect, nominate, fit jointly, compare on held-out data, judge."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -10,6 +10,7 @@ from estimator.closeloop.allowed import allowed
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
 from estimator.closeloop.compare import (
+    CURVE,
     Hypothesis,
     best_by_label,
     briefly,
@@ -48,6 +49,9 @@ SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside
 FAULTS = 4  # faults of sensors that are fitted
 LIKELY = 0.5  # of what is beyond noise: faults that could explain so much are fitted before all else
 RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain less are no rivals, but
+OVERLOOKED = 0.2  # of what is beyond noise, where the form is open: if all leave so much, more are tried
+CONSTANT = ("parameter_offset", "actuator_gain")  # kinds that act alike all the time
+NEXT = 6  # others, in the order of their promises
 PLACEBOS = 3  # of them, so that there is a best wrong one
 
 
@@ -244,6 +248,11 @@ def _fitted(s: Screened, tell: Progress, jobs: int) -> tuple[list[Hypothesis], l
     )
     brief = stages.done("brief", lambda: briefly(problem, base, rest, size, jobs))
     brief = best_by_label([*faults, *brief])
+    if problem.form_error > 0 and brief and brief[0].fit.beyond_noise > OVERLOOKED * s.beyond_noise:
+        further = overlooked(promises, rest, problem.calibrate)
+        tell("overlooked", f"fitting {len(further)} more, which calibration may have hidden")
+        more = stages.done("overlooked", lambda: briefly(problem, base, further, size, jobs))
+        brief = best_by_label([*more, *brief])
     sudden: list[Promise] = []
     if not faults and (s.open_to_form or any(sets_in(h) for h in brief[:LEADING])):
         tell("onset", "looking for what set in during the record")
@@ -313,6 +322,21 @@ def _sudden(
         return [], []
     promises = since(s.problem, s.came, candidates, s.size, jobs)
     return promises, briefly(s.problem, s.base, promises[:SUDDEN], s.size, jobs, known=False)
+
+
+def overlooked(
+    promises: Sequence[Promise], tried: Sequence[Promise], calibrated: Container[str]
+) -> list[Promise]:
+    """What is fitted besides where nothing explains: constant changes of parameters and inputs, and the next.
+
+    A constant change that has pushed calibrated parameters against their bounds hardly shows in the linear
+    picture there. What is calibrated is not changed beyond its bounds.
+    """
+    labels = {p.label for p in tried}
+    left = [p for p in distinct(promises) if p.label not in labels and not p.candidates[0].is_fault]
+    constant = [p for p in left if p.gain > CURVE and p.candidates[0].kind in CONSTANT]
+    further = [p for p in left if p not in constant][:NEXT]
+    return [p for p in (*constant, *further) if p.candidates[0].location not in calibrated]
 
 
 def sets_in(h: Hypothesis) -> bool:

@@ -52,13 +52,13 @@ def confirmed(
 
 def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
     """Laws that with its values, in the motion at their port, are not what their names say."""
-    at = {missing.port.name: missing.velocity for missing in forces}
+    at = {missing.port.name: (missing.displacement, missing.velocity) for missing in forces}
     found = []
     for c in h.candidates:
         law = EFFECTS.get(c.kind)
         if law and issubclass(law, ForceLaw) and c.location in at:
             values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
-            if not law.true_to_name(values, at[c.location]):
+            if not law.true_to_name(values, *at[c.location]):
                 found.append(c)
     return found
 

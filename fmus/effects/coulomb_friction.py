@@ -31,7 +31,7 @@ class CoulombFriction(ForceLaw):
         return -self.F_c * cs.tanh(v / self.v_s)
 
     @classmethod
-    def true_to_name(cls, values: Mapping[str, float], v: Array) -> bool:
+    def true_to_name(cls, values: Mapping[str, float], q: Array, v: Array) -> bool:
         """See ForceLaw.true_to_name: dry friction is nearly full for most of the time."""
         return values["v_s"] < float(np.median(np.abs(v)))
 

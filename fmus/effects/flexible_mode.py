@@ -3,6 +3,8 @@
 In data: a resonance that the model lacks, and more inertia below it.
 """
 
+from collections.abc import Mapping
+
 import casadi as cs
 import numpy as np
 
@@ -13,6 +15,7 @@ from fmus.variables import Expr, Parameter, State
 LOWEST, HIGHEST = 0.3, 100.0  # Hz, of modes that are looked for; above the last no model's step follows
 PER_SAMPLE = 0.3  # cycles, the most that a record can show
 APART = 1.2  # ratio of the frequencies that are tried
+SLOW = 1 / 3  # of the motion's frequency: the mass of a mode below it moves an eighth of its base at most
 
 
 class FlexibleMode(ForceLaw):
@@ -51,6 +54,12 @@ class FlexibleMode(ForceLaw):
     def rates_of_deflection(self, v: Expr) -> Expr:
         """Modal mass times the mass's velocity over its base."""
         return self.P - self.m * (v - self.v_0)
+
+    @classmethod
+    def true_to_name(cls, values: Mapping[str, float], q: Array, v: Array) -> bool:
+        """See ForceLaw.true_to_name: far slower than the motion, a mass stays where it is."""
+        motion = float(np.std(v)) / (2 * np.pi * float(np.std(q)) + 1e-300)
+        return values["f"] > SLOW * motion
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:

@@ -67,8 +67,8 @@ class ForceLaw(Effect):
         return [shapes[i] for i in np.argsort(left, kind="stable")[:HANDFUL]]
 
     @classmethod
-    def true_to_name(cls, values: Mapping[str, float], v: Array) -> bool:
-        """Whether a law with these values, in a motion with velocities v (N,), is what its name says.
+    def true_to_name(cls, values: Mapping[str, float], q: Array, v: Array) -> bool:
+        """Whether a law with these values, in a motion q, v (N,), is what its name says.
 
         values: parameters by name. At the limits of its shape a law turns into another one.
         """

@@ -34,7 +34,7 @@ class StribeckFriction(ForceLaw):
         return -(self.F_c + self.F_b * cs.exp(-((v / self.v_b) ** 2))) * cs.tanh(v / self.v_s)
 
     @classmethod
-    def true_to_name(cls, values: Mapping[str, float], v: Array) -> bool:
+    def true_to_name(cls, values: Mapping[str, float], q: Array, v: Array) -> bool:
         """See ForceLaw.true_to_name: dry friction that, once it is full, falls with the speed."""
         return values["v_s"] < min(float(np.median(np.abs(v))), values["v_b"])
 
