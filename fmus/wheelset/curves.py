@@ -21,7 +21,9 @@ E = 2 * G * (1 + NU)
 SPACING = 5e-5  # m between tabulated shifts
 CUBIC = 3
 EVEN = {"lookup_mode": ["exact"]}  # of evenly spaced knots: the place is computed, not searched
-FIELDS = ("growth", "delta", "lift", "a_hertz", "b_hertz", "a_virtual", "b_virtual", "lift_slope")
+USUAL = 3e-3  # m of shift, within which wheelsets run on straight track
+PATCH = ("a_hertz", "b_hertz", "a_virtual", "b_virtual")
+FIELDS = ("growth", "delta", "lift", *PATCH, "lift_slope", *(f"{name}_mean" for name in PATCH))
 
 
 @cache
@@ -30,8 +32,8 @@ def contact_curves(track: Track) -> cs.Function:
 
     growth: rolling radius less the nominal one, m; delta: contact angle, rad; lift: height, m, by which
     the wheel carries its side, and lift_slope its derivative; a, b: semi-axes, m, by Hertz and by virtual
-    penetration, for LOAD, G and NU. Cubic B-splines, twice continuously differentiable. Beyond the table
-    the last contact holds.
+    penetration, for LOAD, G and NU, and their geometric means over the USUAL shifts. Cubic B-splines, twice
+    continuously differentiable. Beyond the table the last contact holds.
     """
     curves = [_curves(track, search) for search in SEARCHES]
     return cs.Function.conditional("contact", curves[:-1], curves[-1])
@@ -50,7 +52,9 @@ def _curves(track: Track, search: str) -> cs.Function:
 
     lift = FIELDS.index("lift")
     slope = cs.jacobian(spline(rows[:, lift : lift + 1]), q)  # of it alone, not of all columns
-    return cs.Function(search, [q], [cs.vertcat(spline(rows), slope)], ["shift"], ["contact"])
+    usual = values[np.abs(shifts) <= USUAL, FIELDS.index(PATCH[0]) :]
+    means = cs.DM(np.exp(np.log(usual).mean(axis=0)))
+    return cs.Function(search, [q], [cs.vertcat(spline(rows), slope, means)], ["shift"], ["contact"])
 
 
 def _spline_coefficients(rows: Array) -> Array:

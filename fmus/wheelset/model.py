@@ -66,9 +66,9 @@ class Wheelset(Model):
 
     name = "Wheelset"
     step_size = 1e-3
-    form = MappingProxyType({"k_b": (0.6, 2.6), "k_spin": (0.2, 1.2)})
-    form_alike = ("k_a", "G", "nu")
-    form_error = 0.05
+    form = MappingProxyType({"k_a": (0.5, 1.6), "k_b": (0.6, 2.6), "k_c": (0.0, 1.5), "k_spin": (0.2, 1.2)})
+    form_alike = ("G", "nu")
+    form_error = 0.02
     method = rk4_within_stability
 
     y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)
@@ -111,6 +111,10 @@ class Wheelset(Model):
     k_b = Parameter(
         "1", 1.0, min=0.1, max=10.0, doc="semi-axes b of the contacts over the table's", source=FORM
     )
+    k_c = Parameter(
+        "1", 1.0, min=0.0, max=2.0, source=FORM,
+        doc="how far the contacts' semi-axes follow the shift: 1 as the table's, 0 their means",
+    )  # fmt: skip
     k_spin = Parameter("1", 1.0, min=0.0, max=10.0, doc="spin coefficients over Kalker's", source=FORM)
     f11 = Parameter("N", min=0.0, doc="longitudinal creep coefficient, 0: Kalker's", source=CHOICE)
     f22 = Parameter("N", min=0.0, doc="lateral creep coefficient, 0: Kalker's", source=CHOICE)
@@ -265,11 +269,7 @@ class Wheelset(Model):
         xi_x = (m.V * (1 - r / m.r0) - sign * m.s * m.psi_dot) / V
         xi_y = (m.y_dot + r * phi_dot - m.V * m.psi) / V
         xi_s = (m.psi_dot - sign * m.V / m.r0 * delta) / V
-        virtual = m.patch > 0.5
-        a, b = (
-            m._scale * k * cs.if_else(virtual, at[f"{x}_virtual"], at[f"{x}_hertz"])
-            for x, k in (("a", m.k_a), ("b", m.k_b))
-        )
+        a, b = m.k_a * m._semi_axis(at, "a"), m.k_b * m._semi_axis(at, "b")
         mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2 + S_MIN**2), m.mu0, m.A, m.B)
         c11, c22, c23, c33 = m._coefficients(a, b)
         F_x, F_y, M_z = m.call(
@@ -277,6 +277,14 @@ class Wheelset(Model):
             m.creep_law, a, b, m.F_n, mu, m.G, c11, c22, c23, c33, xi_x, xi_y, xi_s, m.k_A, m.k_S,
         )  # fmt: skip
         return Wheel(F_x, F_y, M_z, xi_x, xi_y, xi_s, r, delta, a, b)
+
+    def _semi_axis(m, at: dict[str, Expr], which: str) -> Expr:
+        """a or b as tabulated for the load, or between that and its mean over the usual shifts."""
+        own, mean = (
+            cs.if_else(m.patch > 0.5, at[f"{which}_virtual{of}"], at[f"{which}_hertz{of}"])
+            for of in ("", "_mean")
+        )
+        return m._scale * mean * (own / mean) ** m.k_c
 
     def _coefficients(m, a: Expr, b: Expr) -> list[Expr]:
         """Kalker's coefficients, or for the linear law those that are given."""
