@@ -200,6 +200,20 @@ def test_patches_grow_with_load_and_stiffness_as_hertz_says(search, patch):
         assert o[name] == pytest.approx(float(table[name].iloc[0]), rel=1e-3 if search == "rigid" else 1e-4)
 
 
+@pytest.mark.parametrize("patch", [0, 1])
+def test_patches_follow_the_shift_as_far_as_they_are_told_to(patch):
+    """All, half and nothing of the way in logarithms from the mean over usual shifts."""
+    names = ("a_left", "b_left", "a_right", "b_right")
+    at = {k_c: [outputs(y=y, patch=patch, k_c=k_c) for y in (-2e-3, 5e-4, 2e-3)] for k_c in (0.0, 0.5, 1.0)}
+    for i, whole in enumerate(at[1.0]):
+        for name in names:
+            mean, half = at[0.0][0][name], at[0.5][i][name]
+            assert at[0.0][i][name] == pytest.approx(mean, rel=1e-12)
+            assert half == pytest.approx(np.sqrt(mean * whole[name]), rel=1e-12)
+    assert at[0.0][0]["a_left"] == pytest.approx(at[0.0][0]["a_right"], rel=1e-12)
+    assert 0.6 < at[0.0][0]["b_left"] / np.mean([o["b_left"] for o in at[1.0]]) < 1.6
+
+
 def test_creep_coefficients_that_are_given_count_for_the_linear_law_only():
     f = {"f11": 8e6, "f22": 7e6, "f23": 1.6e4, "f33": 100.0}
     o = outputs(**GIVEN, **f, creep_law=0.0)

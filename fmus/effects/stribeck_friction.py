@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import casadi as cs
 import numpy as np
 
-from fmus.effects.coulomb_friction import roundings
+from fmus.effects.coulomb_friction import CoulombFriction, roundings
 from fmus.effects.force_law import Array, ForceLaw
 from fmus.variables import Expr, Parameter
 
@@ -36,7 +36,7 @@ class StribeckFriction(ForceLaw):
     @classmethod
     def true_to_name(cls, values: Mapping[str, float], q: Array, v: Array) -> bool:
         """See ForceLaw.true_to_name: dry friction that, once it is full, falls with the speed."""
-        return values["v_s"] < min(float(np.median(np.abs(v))), values["v_b"])
+        return values["v_s"] < values["v_b"] and CoulombFriction.true_to_name(values, q, v)
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
