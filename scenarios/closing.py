@@ -11,8 +11,9 @@ from pathlib import Path
 
 from joblib import cpu_count
 
-from estimator.closeloop.chain import Outcome, trace
+from estimator.closeloop.chain import trace
 from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.stages import Stages
 from estimator.plant import PLANTS

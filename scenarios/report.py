@@ -8,8 +8,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.freeform import curve_of
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.sensors import KINDS
 from fmus.host.archive import describe

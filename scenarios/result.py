@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis, lead
 from estimator.closeloop.freeform import curve_of
 from estimator.closeloop.honesty import Honesty
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.power import Visible
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.regressors import is_wave

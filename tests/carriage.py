@@ -7,11 +7,11 @@ import numpy as np
 
 from estimator.closeloop.calibrate import calibrate
 from estimator.closeloop.candidates import Candidate, physical_candidates
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import finished, ranked
 from estimator.closeloop.detect import Detection
 from estimator.closeloop.missing_force import missing_forces
 from estimator.closeloop.noise import noise_floor
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise
 from estimator.closeloop.transfer import Traced

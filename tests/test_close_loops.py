@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from estimator.closeloop import chain
-from estimator.closeloop.chain import Outcome
+from estimator.closeloop.outcome import Outcome
 from fmus.drive.model import Drive
 from fmus.errors import BadInput
 from fmus.export.pythonfmu import build_python

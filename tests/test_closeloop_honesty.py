@@ -15,7 +15,6 @@ from scipy.signal import lfilter
 
 from estimator.closeloop.blackbox import LARGEST, black_box
 from estimator.closeloop.candidates import Candidate, fault_candidates, physical_candidates
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.decoys import decoy, decoy_gain, leading, lines
 from estimator.closeloop.detect import Detection
@@ -23,6 +22,7 @@ from estimator.closeloop.fit import Fit
 from estimator.closeloop.freeform import curve_of, dependences, free_form, left_out, resolved
 from estimator.closeloop.honesty import honesty
 from estimator.closeloop.missing_force import missing_forces
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.power import Visible, power, threshold
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.regressors import Calibration, alike, lengths

@@ -12,13 +12,13 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.ambiguity import becomes
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.chain import NEXT, overlooked
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.fit import Fit
 from estimator.closeloop.grouped import group_size, grouped
 from estimator.closeloop.linear import Linearised, influences, responses, shows_its_state
 from estimator.closeloop.lookalikes import lookalikes
 from estimator.closeloop.moments import at_their_moments, moment, set_in
+from estimator.closeloop.nomination import NEXT, overlooked
 from estimator.closeloop.onset import BLOCKS, onset
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.regressors import Calibration

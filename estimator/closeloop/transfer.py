@@ -12,11 +12,11 @@ from joblib import Parallel, delayed
 
 from estimator.closeloop.ambiguity import SAME
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.chart import chart
 from estimator.closeloop.compare import Hypothesis, beats, finished, lead
 from estimator.closeloop.estimates import Difference, Estimates, difference, estimates
 from estimator.closeloop.joint import fit_together
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.part import Part
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import Promise

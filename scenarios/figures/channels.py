@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 from scipy.signal import welch
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.record import Array, Record
 from scenarios.figures.sheet import (

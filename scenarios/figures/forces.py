@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.axes import Axes
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.missing_force import MissingForce
+from estimator.closeloop.outcome import Outcome
 from estimator.record import Array
 from scenarios.figures.law import Law, law_at
 from scenarios.figures.sheet import AFTER, CLOUD, LAW, Plot, envelope, legend, name_axes, sheet, sheets

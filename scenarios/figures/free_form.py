@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.freeform import curve_of
 from estimator.closeloop.missing_force import MissingForce
+from estimator.closeloop.outcome import Outcome
 from estimator.record import Array
 from scenarios.figures.forces import averages
 from scenarios.figures.sheet import AFTER, CLOUD, LAW, Plot, legend, name_axes, sheet

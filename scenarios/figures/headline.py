@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from scenarios.figures.channels import draw_residual, series, time_label
 from scenarios.figures.forces import draw_law, laws_found

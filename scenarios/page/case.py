@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.honesty import Honesty
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from scenarios.page.glossary import Glossary
 from scenarios.result import Result

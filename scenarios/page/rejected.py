@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.closeloop.chain import Outcome
 from estimator.closeloop.compare import Hypothesis, lead
 from estimator.closeloop.detect import LEVEL, REPLICATES
 from estimator.closeloop.honesty import Honesty
+from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.pairs import SIGNIFICANT, idle
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.verdict import EXPLAINED, explains, reached
