@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from estimator.closeloop import chain
+from estimator.closeloop import chain, screened, search
 from estimator.closeloop.stages import Stages
 from scenarios.closing import STAGES
 from tests.carriage import coulomb, record, to_and_fro, write
@@ -61,13 +61,15 @@ def test_a_run_goes_on_where_it_stopped(carriage: Path, tmp_path: Path, capsys) 
     """What was found before the interruption is not sought again, and the result is that of one go."""
     out = tmp_path / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "to_the_end", interrupted)
+        patch.setattr(search, "to_the_end", interrupted)
         assert close(carriage, out) == 130
     assert "--resume" in capsys.readouterr().err
     assert not (out / "result.json").exists()
     with pytest.MonkeyPatch.context() as patch:
-        for done in ("calibrate", "missing_forces", "onset", "detect", "honesty", "briefly"):
+        for done in ("calibrate", "missing_forces", "detect", "honesty"):
             patch.setattr(chain, done, refused)
+        patch.setattr(screened, "onset", refused)
+        patch.setattr(search, "briefly", refused)
         assert close(carriage, out, "--resume") == 0
     assert not (out / STAGES).exists()
     assert close(carriage, tmp_path / "at once") == 0
