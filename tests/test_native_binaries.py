@@ -193,7 +193,7 @@ def test_two_models_can_be_linked_into_one_program(tmp_path):
     """
     made = [compiler(), *objects, "-x", "c", "-", "-lm", "-o", tmp_path / "program"]
     subprocess.run(made, input=program, text=True, check=True)
-    subprocess.run([tmp_path / "program"], check=True)
+    assert subprocess.run([tmp_path / "program"], check=False).returncode == 0
 
 
 @every_version

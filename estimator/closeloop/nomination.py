@@ -12,7 +12,7 @@ CONSTANT = ("parameter_offset", "actuator_gain")  # kinds that act alike all the
 NEXT = 6  # others, in the order of their promises
 
 
-def nominated(promises: Sequence[Promise], most: int = NOMINEES) -> list[Promise]:
+def nominated(promises: Sequence[Promise], most: int) -> list[Promise]:
     """The leading physical candidates, each in its best shapes, and the leading faults of sensors."""
     labels: dict[str, list[Promise]] = {}
     for p in promises:

@@ -82,6 +82,7 @@ def screened(
     tell: Progress,
     stages: Stages,
 ) -> Screened:
+    """Screen every candidate by its effect on the linearised FMU; size: (n_y,), see Outcome."""
     builder = problem.builder
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     candidates += fault_candidates(problem.record, noise)
