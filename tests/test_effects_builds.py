@@ -120,20 +120,20 @@ def test_an_effect_that_is_off_changes_no_run(text, drive, own):
 
 
 @pytest.mark.parametrize(
-    ("text", "order"),
+    ("text", "order", "step"),
     [
-        ("hysteresis@carriage", 2),
-        ("input_delay@F", 2),
-        ("step_force@carriage", 2),
-        ("viscous_damping@carriage", 1),
+        ("hysteresis@carriage", 2, 2e-3),
+        ("input_delay@F", 2, 1e-3),  # its fastest motion takes 11 ms
+        ("step_force@carriage", 2, 2e-3),
+        ("viscous_damping@carriage", 1, 2e-3),
     ],
 )
-def test_the_coupling_error_falls_by_its_order(text, order, drive, own, tmp_path, monkeypatch):
+def test_the_coupling_error_falls_by_its_order(text, order, step, drive, own, tmp_path, monkeypatch):
     expected, error = run(own(text), started(text)), []
-    for step in (2e-3, 1e-3):
-        monkeypatch.setattr(coupled, "COUPLING_STEP", step)
+    for dt in (step, step / 2):
+        monkeypatch.setattr(coupled, "COUPLING_STEP", dt)
         kind, location = text.split("@")
-        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{step}.fmu")
+        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{dt}.fmu")
         error.append(np.abs(run(made, started(text)) - expected).max())
     assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.2)
 

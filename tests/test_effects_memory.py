@@ -51,7 +51,7 @@ def test_a_lag_follows_a_step_by_its_exponential(share, lag, u_0):
     assert_allclose(found, 1.5 - share * (1.5 - u_0) * np.exp(-t / lag), atol=1e-6)
 
 
-@pytest.mark.parametrize(("phase", "error"), [(1.0, 1e-5), (2.5, 1e-3), (3.4, 0.01), (4.9, 0.1)])
+@pytest.mark.parametrize(("phase", "error"), [(1.0, 1e-5), (5.2, 1e-3), (6.5, 0.01), (8.3, 0.1)])
 def test_a_delay_delays_within_its_band(phase, error):
     delay = 0.1
     omega, t = phase / delay, np.linspace(1.5, 2.5, 101)  # after what the start has stirred up
@@ -90,7 +90,7 @@ def test_an_input_and_its_rate_stay_together(kind):
         (0, 1), np.zeros(len(states)), t_eval=t, rtol=1e-10, atol=1e-12,
     )  # fmt: skip
     gaps = [abs(float(gap(x, [u_of(s), u_dot(s)], given))) for s, x in zip(t, run.y.T, strict=True)]
-    assert len(own) in (2, 8)
+    assert len(own) in (2, 12)
     assert np.abs(run.y[[states.index(n) for n in own]]).max() > 0.1
     assert max(gaps) < 1e-6
 

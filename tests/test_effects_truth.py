@@ -41,7 +41,7 @@ TIMES = {"step_force": {"step_time": 8.0}, "parameter_step": {"mu0_step_time": 8
 WHERE = {"parameter_step": ["mu0"], **{k: ["T_P"] for k in PARAMETERS if k.startswith(("actuator", "input"))}}
 CASES = [(kind, at) for kind in PARAMETERS for at in WHERE.get(kind, FORCES)]
 # a delay by its approximation: what it leaves of the corners of a trapezium
-SEEN = {"input_delay": 0.25}
+SEEN = {"input_delay": 0.2}
 
 
 @pytest.mark.parametrize(("kind", "location"), CASES, ids=str)

@@ -11,8 +11,8 @@ from fmus.variables import Expr, Input, Parameter, State, rate
 class WheelDrive(Model):
     """omega_dot = K (omega_set(t - T) - omega) - b omega + F_ext, over an inertia that nothing here tells.
 
-    T is the dead time of bus and controller, by Padé's approximation [3/4] as in `fmus.effects.input_delay`;
-    s_1 is the set speed through its denominator, s_2 to s_4 the derivatives of s_1 by t/T.
+    T is the dead time of bus and controller, by Padé's approximation [5/6] as in `fmus.effects.input_delay`;
+    s_1 is the set speed through its denominator, s_2 to s_6 the derivatives of s_1 by t/T.
     """
 
     name = "WheelDrive"
@@ -24,6 +24,8 @@ class WheelDrive(Model):
     s_2 = State("rad/s", doc="its derivative by t/T", nominal=200.0)
     s_3 = State("rad/s", doc="its second derivative by t/T", nominal=1e3)
     s_4 = State("rad/s", doc="its third derivative by t/T", nominal=1e4)
+    s_5 = State("rad/s", doc="its fourth derivative by t/T", nominal=1e5)
+    s_6 = State("rad/s", doc="its fifth derivative by t/T", nominal=5e6)
     omega_set = Input("rad/s", doc="set speed")
     F_ext = Input("N.m", doc="port: torque on the motor, of 1 kg.m2", nominal=100.0)
     K = Parameter("1/s", 20.0, min=0.0, doc="gain of the controller over inertia")
@@ -33,7 +35,7 @@ class WheelDrive(Model):
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
-        way = [m.s_1, m.s_2, m.s_3, m.s_4]
+        way = [m.s_1, m.s_2, m.s_3, m.s_4, m.s_5, m.s_6]
         asked = sum(c * s for c, s in zip(OUT, way, strict=True))
         last = BACK[0] * m.omega_set - sum(c * s for c, s in zip(BACK, way, strict=True))
         late = {f"s_{i}": s / m.T for i, s in enumerate([*way[1:], last], 1)}

@@ -10,15 +10,16 @@ from fmus.effects.input_effect import WHOLE, InputEffect
 from fmus.variables import Expr, Parameter, State
 
 DELAYS = (0.03, 0.1, 0.3)  # s
-# exp(-s) = (1 - 3/7 s + 1/14 s2 - 1/210 s3) / (1 + 4/7 s + 1/7 s2 + 2/105 s3 + 1/840 s4)
-OUT = (1.0, -3 / 7, 1 / 14, -1 / 210)
-BACK = (840.0, 480.0, 120.0, 16.0)  # the denominator's, over that of s4
+# exp(-s) = (1 - 5/11 s + 1/11 s2 - 1/99 s3 + 1/1584 s4 - 1/55440 s5)
+#         / (1 + 6/11 s + 3/22 s2 + 2/99 s3 + 1/528 s4 + 1/9240 s5 + 1/332640 s6)
+OUT = (1.0, -5 / 11, 1 / 11, -1 / 99, 1 / 1584, -1 / 55440)
+BACK = (332640.0, 181440.0, 45360.0, 6720.0, 630.0, 36.0)  # the denominator's, over that of s6
 
 
 class InputDelay(InputEffect):
     """u + share (u(t - T) - u), u = u_0 before the start; share = 1 is a delay.
 
-    u(t - T) by Padé's approximation [3/4]: within 1 % up to omega T = 3.4, 10 % up to 4.9. The states are
+    u(t - T) by Padé's approximation [5/6]: within 1 % up to omega T = 6.5, 10 % up to 8.3. The states are
     share (u - u_0) through its denominator, and its derivatives by t/T.
     """
 
@@ -35,9 +36,11 @@ class InputDelay(InputEffect):
     T = Parameter("s", 0.1, min=0.02, doc="delay")
     u_0 = Parameter("{u}", doc="input before the start")
     x1 = State("{u}", doc="share of the input since the start, filtered", nominal=1.0)
-    x2 = State("{u}", doc="its derivative by t/T", nominal=7 / 3)
-    x3 = State("{u}", doc="its second derivative by t/T", nominal=14.0)
-    x4 = State("{u}", doc="its third derivative by t/T", nominal=210.0)
+    x2 = State("{u}", doc="its derivative by t/T", nominal=11 / 5)
+    x3 = State("{u}", doc="its second derivative by t/T", nominal=11.0)
+    x4 = State("{u}", doc="its third derivative by t/T", nominal=99.0)
+    x5 = State("{u}", doc="its fourth derivative by t/T", nominal=1584.0)
+    x6 = State("{u}", doc="its fifth derivative by t/T", nominal=55440.0)
 
     def passed(self, u: Expr) -> Expr:
         """See InputEffect.passed."""
@@ -51,7 +54,7 @@ class InputDelay(InputEffect):
         return {f"x{i}": rate / self.T for i, rate in enumerate([*x[1:], last], 1)}
 
     def _chain(self) -> list[Expr]:
-        return [self.x1, self.x2, self.x3, self.x4]
+        return [self.x1, self.x2, self.x3, self.x4, self.x5, self.x6]
 
     @classmethod
     def guesses(cls, t: NDArray[np.float64], u: NDArray[np.float64]) -> list[dict[str, float]]:
