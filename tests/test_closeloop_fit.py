@@ -323,6 +323,7 @@ def test_a_moment_a_swing_off_is_fitted_again(monkeypatch):
             for p in promises
         ],
     )
+    monkeypatch.setattr(likelihood, "settled", lambda problem, h, size: h)
     asked, h = begun(5.0, 5.0, 0)
     off = asked.identify_residual({"d": 1.0, "d_t0": 5.35}).ravel() / 0.1
     stayed = replace(h, fit=replace(h.fit, values=np.array([1.0, 5.35]), residual=off))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from estimator.closeloop.allowed import allowed
 from estimator.closeloop.calibrate import calibrate
@@ -71,7 +72,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     judgement = judge(problem, base, judged, pairs, noise, size, shown.began).of([*singles, *pairs])
     judgement = stages.done("verdict", lambda: confirmed(problem, base, judgement, forces, size))
     tell("intervals", "asking how far its parameters may be from there")
-    judgement = stages.done("intervals", lambda: _profiled(problem, judgement, size))
+    judgement = stages.done("intervals", lambda: _profiled(problem, judgement, size, jobs))
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
@@ -81,6 +82,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
 
 
-def _profiled(problem: Problem, judgement: Judgement, size: Array) -> Judgement:
+def _profiled(problem: Problem, judgement: Judgement, size: Array, jobs: int) -> Judgement:
     """The judgement with the errors of its members as the sum of squares says."""
-    return replace(judgement, members=tuple(profiled(problem, h, size) for h in judgement.members))
+    tasks = (delayed(profiled)(problem, h, size) for h in judgement.members)
+    return replace(judgement, members=tuple(Parallel(min(jobs, len(judgement.members) or 1))(tasks)))

@@ -244,6 +244,11 @@ def cost(h: Hypothesis) -> float:
     return float(h.fit.residual @ h.fit.residual)
 
 
+def mean_square(h: Hypothesis) -> float:
+    """Of the residual on the part that was fitted."""
+    return cost(h) / len(h.fit.residual)
+
+
 def ranked(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
     """Best first, by log score on the held-out part.
 

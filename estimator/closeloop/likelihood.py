@@ -15,6 +15,7 @@ from estimator.closeloop.dating import begins, moments_near
 from estimator.closeloop.fit import Fit, fit, sandwich, weighted
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built
+from estimator.closeloop.settled import lower, others, own, settled
 from estimator.record import Array
 
 WIDTH = 1.96  # standard errors: 95 %
@@ -29,23 +30,37 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     """The hypothesis with the standard errors of its laws widened to where the sum of squares says no.
 
     Of each parameter the wider side counts. Where the valley turns out to be deeper elsewhere, the hypothesis
-    is fitted again from there. Laws that are linear in their parameters stay as they are. Moments are tried
-    one after the other, as the sum of squares is rugged in them.
+    is fitted again from there, and where it was before counts as a place like those that are tried. Laws that
+    are linear in their parameters stay as they are. Moments are tried one after the other, as the sum of
+    squares is rugged in them.
     """
     if not problem.record.floor_known:
         return h
+    before: list[Hypothesis] = []
     for _ in range(ROUNDS):
+        h = settled(problem, h, size)
         wider, deeper = _profiles(problem, h, size)
         if not deeper:
             break
-        own = _own(h)
-        rest = [u for u in h.fit.unknowns if u.name not in own]
-        again = finished(problem, rest, [Promise(h.candidates, 0.0, {**h.theta, **deeper})], size, 1)
-        if not again or cost(again[0]) >= cost(h):
+        there = Promise(h.candidates, 0.0, {**h.theta, **deeper})
+        now = lower(h, finished(problem, others(h), [there], size, 1))
+        if now is h:
             break
-        h = replace(again[0], worth=h.worth)
-    factors = np.array([max(1.0, wider.get(n, 0.0) / s) if s > 0 else 1.0 for n, s in h.fit.std.items()])
+        before, h = [*before, h], now
+    error = np.sqrt(np.diag(h.fit.covariance))
+    least = np.array([wider.get(u.name, 0.0) for u in h.fit.unknowns])
+    wide = np.max([error, least, *(reached(h, b) for b in before)], axis=0)
+    factors = np.divide(wide, error, out=np.ones_like(error), where=error > 0)
     return replace(h, fit=replace(h.fit, covariance=h.fit.covariance * np.outer(factors, factors)))
+
+
+def reached(h: Hypothesis, b: Hypothesis) -> Array:
+    """Standard errors (n,) of the laws' parameters that reach a place which the sum of squares allows."""
+    mine, found = own(h), np.zeros(len(h.fit.unknowns))
+    for i, u in enumerate(h.fit.unknowns):
+        if u.name in mine and cost(b) - cost(h) < WIDTH**2 * _usual(h, i):
+            found[i] = abs(b.fit.theta[u.name] - h.fit.values[i]) / WIDTH
+    return found
 
 
 def bends(c: Candidate) -> bool:
@@ -127,11 +142,6 @@ def _usual(h: Hypothesis, i: int) -> float:
     return float(max(np.sqrt(h.fit.covariance[i, i]) / _white(h)[i], 1.0) ** 2)
 
 
-def _own(h: Hypothesis) -> set[str]:
-    """Names of the unknowns of its candidates."""
-    return {u.name for c in h.candidates for u in c.unknowns}
-
-
 def _white(h: Hypothesis) -> Array:
     """Standard errors (n,) in white noise."""
     scale = np.array([u.scale for u in h.fit.unknowns])
@@ -144,9 +154,9 @@ def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> F
     """All others fitted again with one parameter held at a value."""
     held = h.fit.unknowns[i].name
     here = built(problem, h.candidates)
-    others = [u for u in h.fit.unknowns if u.name != held]
+    rest = [u for u in h.fit.unknowns if u.name != held]
     along = h.fit.covariance[:, i] / h.fit.covariance[i, i] * (value - h.fit.values[i])
     start = dict(zip((u.name for u in h.fit.unknowns), h.fit.values + along, strict=True))
-    own = _own(h)
-    known = {n: column for n, column in h.fit.columns.items() if n not in own}
-    return fit(here, others, size, start, {held: value}, EVALUATIONS, known)
+    mine = own(h)
+    known = {n: column for n, column in h.fit.columns.items() if n not in mine}
+    return fit(here, rest, size, start, {held: value}, EVALUATIONS, known)

@@ -12,7 +12,15 @@ from dataclasses import replace
 
 from joblib import Parallel, delayed
 
-from estimator.closeloop.compare import Hypothesis, best_by_label, cost, finished, hypothesis, together
+from estimator.closeloop.compare import (
+    Hypothesis,
+    best_by_label,
+    cost,
+    finished,
+    hypothesis,
+    mean_square,
+    together,
+)
 from estimator.closeloop.fit import NEAR, fit
 from estimator.closeloop.moments import moment
 from estimator.closeloop.problem import Problem, Unknown
@@ -79,11 +87,6 @@ def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
         return promises[:SHAPES]
     off = {u.name: 0.0 for u in best.candidates[0].amplitudes}
     return [replace(best, start={**best.start, **off})]
-
-
-def mean_square(h: Hypothesis) -> float:
-    """Of the residual on the part that was fitted."""
-    return cost(h) / len(h.fit.residual)
 
 
 def _begun(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array) -> Hypothesis | None:
