@@ -25,6 +25,6 @@ def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypot
     if laws:
         port = laws[0].missing.port.name
         draw_law(axes["law"], laws[0], words)
-        axes["law"].set_title(f"force missing at: {port}", loc="left", fontsize=9, fontweight="bold")
+        axes["law"].set_title(f"missing at {port}", loc="left", fontsize=9, fontweight="bold")
         caption += f" Right: the force that is missing at the port “{port}” (dots), and the law found (line)."
     return Plot("headline", figure, caption)
