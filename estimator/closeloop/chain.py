@@ -1,5 +1,6 @@
 """The chain: calibrate, detect, nominate, fit jointly, compare on held-out data, judge."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,17 +8,18 @@ from joblib import Parallel, delayed
 
 from estimator.closeloop.allowed import allowed
 from estimator.closeloop.calibrate import calibrate
+from estimator.closeloop.compare import Hypothesis
 from estimator.closeloop.curvature import confirmed
 from estimator.closeloop.detect import LEVEL, detect
 from estimator.closeloop.freeform import free_form
 from estimator.closeloop.honesty import honesty
 from estimator.closeloop.likelihood import profiled
-from estimator.closeloop.missing_force import missing_forces
+from estimator.closeloop.missing_force import MissingForce, missing_forces
 from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.progress import Progress, Tell
-from estimator.closeloop.screened import screened
+from estimator.closeloop.screened import Screened, screened
 from estimator.closeloop.search import Search
 from estimator.closeloop.stages import Stages
 from estimator.closeloop.verdict import Judgement, judge, without_fits
@@ -66,11 +68,12 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early, owed)
-    singles, pairs = Search(shown, tell, jobs).run()
-    tell("verdict", "asking whether it is the law's curve")
-    judged = stages.done("allowed", lambda: allowed(problem, singles, size))
-    judgement = judge(problem, base, judged, pairs, noise, size, shown.began).of([*singles, *pairs])
-    judgement = stages.done("verdict", lambda: confirmed(problem, base, judgement, forces, size))
+    search = Search(shown, tell, jobs)
+    singles, pairs = search.run()
+    leading, judgement = _judged(shown, forces, singles, pairs, tell)
+    if leading.members and not judgement.members and len(leading.members[0].candidates) == 1:
+        singles = search.instead(leading.members[0], singles)
+        _, judgement = _judged(shown, forces, singles, pairs, tell, again=True)
     tell("intervals", "asking how far its parameters may be from there")
     judgement = stages.done("intervals", lambda: _profiled(problem, judgement, size, jobs))
     if judgement.verdict == "unexplained":
@@ -80,6 +83,19 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     final = {h.key: h for h in judgement.members}
     singles, pairs = ([final.get(h.key, h) for h in some] for some in (singles, pairs))
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
+
+
+def _judged(
+    shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
+    pairs: Sequence[Hypothesis], tell: Progress, again: bool = False,
+) -> tuple[Judgement, Judgement]:  # fmt: skip
+    """What the comparison says, and what is left where each law is asked whether it is the force's curve."""
+    problem, base, size, done = shown.problem, shown.base, shown.size, shown.stages.done
+    tell("verdict", "asking whether it is the law's curve")
+    which = " again" if again else ""
+    judged = done(f"allowed{which}", lambda: allowed(problem, singles, size))
+    leading = judge(problem, base, judged, pairs, shown.noise, size, shown.began).of([*singles, *pairs])
+    return leading, done(f"verdict{which}", lambda: confirmed(problem, base, leading, forces, size))
 
 
 def _profiled(problem: Problem, judgement: Judgement, size: Array, jobs: int) -> Judgement:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from estimator.closeloop.allowed import leaves_noise
 from estimator.closeloop.candidates import Candidate, physical_candidates
 from estimator.closeloop.compare import CURVE, Hypothesis, cost
 from estimator.closeloop.freeform import FREE_FORMS, offered
@@ -16,6 +17,8 @@ from fmus.effects.force_law import ForceLaw
 SEEN = 0.05  # of the sum of squares of noise: where much is known, so much shows a law that only comes near
 OPEN_LEFT = 0.05  # where the FMU's form leaves something open, of what the law leaves beyond noise, and
 OPEN_MISSED = 2.5e-3  # of what it explains; right laws leave a curve of that size at most
+NEAR = 1e-4  # of what a law explains: a smooth curve that passes for it comes no nearer, and for one of not
+PLAIN = 2  # more than so many unknowns, as rounded Coulomb friction, no nearer than OPEN_MISSED
 NO_LESS = 0.99  # of what a curve over another motion explains: one port may have two names
 
 
@@ -31,18 +34,23 @@ def confirmed(
     best = judgement.members[:1]
     if not best or not problem.record.floor_known:
         return judgement
-    [h] = best
+    [h], open_form = best, problem.form_error > 0
+
+    def doubted(m: Hypothesis) -> list[Candidate]:
+        wrong = misnamed(m, forces)
+        return wrong if open_form else [c for c in wrong if not told_apart(m, c, base)]
+
     if len(h.candidates) > 1:
-        rest = [m for m in judgement.members if not misnamed(m, forces)]
+        rest = [m for m in judgement.members if not doubted(m)]
         if h in rest:
             return judgement
-        return named(rest, "several") if rest else no_law(h, misnamed(h, forces)[0])
+        return named(rest, "several") if rest else no_law(h, doubted(h)[0])
 
     def denied(m: Hypothesis) -> bool:
-        if misnamed(m, forces):
+        if doubted(m):
             return True
         own, elsewhere = curvature(problem, m, forces, size)
-        return another(m, base, own, elsewhere, problem.form_error > 0)
+        return another(m, base, own, elsewhere, open_form)
 
     if not denied(h):
         return judgement
@@ -63,10 +71,25 @@ def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
     return found
 
 
+def told_apart(h: Hypothesis, c: Candidate, base: Hypothesis) -> bool:
+    """Whether a curve that passes for one of its laws would show in what is left, and noise alone is left."""
+    if not over_what(c) or not leaves_noise(h):
+        return False
+    alone = len(h.candidates) == 1
+    explained = cost(base) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
+    near = OPEN_MISSED if len(c.unknowns) <= PLAIN else NEAR
+    return near * explained > CURVE
+
+
 def motion(h: Hypothesis) -> tuple[str, str]:
     """Where a single law acts, and over what: velocity or displacement."""
     [c] = h.candidates
-    return c.location, EFFECTS[c.kind].over if c.kind in EFFECTS else ""
+    return c.location, over_what(c)
+
+
+def over_what(c: Candidate) -> str:
+    """What a law is a curve over, velocity or displacement; nothing for what is no such law."""
+    return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
 def another(h: Hypothesis, base: Hypothesis, own: float, elsewhere: float, open_form: bool) -> bool:

@@ -2,7 +2,8 @@
 
 Two such laws are two names of one motion, but from the calibrated FMU, which is far from it where an effect
 is strong, the fit of one may end where that of the other does not. Whether the record tells them apart is
-asked when both are there.
+asked when both are there. And where the force does not follow the curve of the law that was found, the others
+over the same motion, each from there too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ from scipy.optimize import lsq_linear
 
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, cost
+from estimator.closeloop.curvature import motion, over_what
 from estimator.closeloop.regressors import Calibration, Changes
 from estimator.closeloop.screen import Promise, Screening, distinct, key
 from estimator.record import Array
@@ -39,8 +41,7 @@ def lookalikes(
         if c.is_fault:
             continue
         fitted = _shaped(c, _shape(c, best.theta))
-        [own] = screening.changes([fitted])
-        response = calibration.without(own @ [best.theta[u.name] / u.scale for u in c.amplitudes])
+        response = _response(screening, calibration, fitted, best.theta)
         for other, g in _others(screening, fitted, change):
             laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
             if key(laws) in known:
@@ -50,6 +51,34 @@ def lookalikes(
                 promises.append(Promise(laws, -missed, {**best.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
     return distinct(promises)[:MOST]
+
+
+def over_the_same(
+    screening: Screening, calibration: Calibration, h: Hypothesis, change: Changes
+) -> list[Promise]:
+    """Promises of other laws over the motion of a single one, at its place, the most alike first.
+
+    Else as `lookalikes`. None for what is no law over a velocity or displacement.
+    """
+    [c], (location, over) = h.candidates, motion(h)
+    if not over:
+        return []
+    response = _response(screening, calibration, _shaped(c, _shape(c, h.theta)), h.theta)
+    promises = []
+    for other, g in change:
+        if other.location == location and other.kind != c.kind and over_what(other) == over:
+            missed, start = _nearest(other, calibration.without(g), response)
+            promises.append(Promise((other,), -missed, {**h.theta, **start}))
+    promises.sort(key=lambda p: -p.gain)
+    return distinct(promises)[:MOST]
+
+
+def _response(
+    screening: Screening, calibration: Calibration, c: Candidate, theta: Mapping[str, float]
+) -> Array:
+    """What a law does to the residual (m,) and calibration cannot take over."""
+    [own] = screening.changes([c])
+    return calibration.without(own @ [theta[u.name] / u.scale for u in c.amplitudes])
 
 
 def _others(screening: Screening, c: Candidate, change: Changes) -> list[tuple[Candidate, Array]]:

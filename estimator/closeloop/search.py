@@ -8,6 +8,7 @@ from estimator.closeloop.compare import (
     Hypothesis,
     best_by_label,
     briefly,
+    cost,
     finished,
     hypotheses,
     ranked,
@@ -15,7 +16,7 @@ from estimator.closeloop.compare import (
 )
 from estimator.closeloop.dating import dated
 from estimator.closeloop.detect import ONE_EFFECT
-from estimator.closeloop.lookalikes import lookalikes
+from estimator.closeloop.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.moments import at_their_moments, moment
 from estimator.closeloop.nomination import FAULTS, LEADING, NOMINEES, nominated, overlooked
 from estimator.closeloop.onset import since
@@ -54,6 +55,17 @@ class Search:
             pairs = [*pairs, *self._beside(ones[0])]
         twos = s.stages.done("simpler pairs", lambda: self._replaced(pairs))
         return ranked(s.problem, with_twins(ones, self._alike), s.size), twos
+
+    def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The single hypotheses with other laws over the motion of one, fitted from where it is."""
+        s = self.screened
+        self.tell("renamed", "fitting other laws over the same motion")
+        promises = over_the_same(s.screening, Calibration.of(s.fit), h, s.change)
+        found = s.stages.done(
+            "renamed", lambda: finished(s.problem, s.base.fit.unknowns, promises, s.size, self.jobs)
+        )
+        better = with_twins([f for f in found if cost(f) < cost(h)], self._alike)
+        return ranked(s.problem, best_by_label([*better, *singles]), s.size) if better else list(singles)
 
     @cached_property
     def _alike(self) -> Mapping[str, tuple[str, ...]]:
