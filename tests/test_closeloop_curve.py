@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from estimator.closeloop.compare import CURVE, Hypothesis
-from estimator.closeloop.curvature import another, confirmed, curvature
+from estimator.closeloop.curvature import FASTEST, another, confirmed, curvature, misnamed
 from estimator.closeloop.fit import Fit
+from estimator.closeloop.progress import Progress
+from estimator.closeloop.screened import screened
+from estimator.closeloop.search import Search
+from estimator.closeloop.stages import Stages
 from estimator.closeloop.transfer import Traced
 from estimator.closeloop.verdict import Judgement
 from fmus.export.hypotheses import ModelBuilder
@@ -158,3 +162,38 @@ def test_of_several_laws_each_is_what_its_name_says(builder):
 def test_of_a_class_no_law_stays_where_curves_deny_all_over_that_motion(builder):
     told = among(builder, root(200.0, 60.0), "quadratic_damping", "viscous_damping", "cubic_stiffness")
     assert (told.verdict, told.members) == ("unexplained", ())
+
+
+ROUNDED = 0.5  # m/s
+
+
+def rounded(size: float) -> Force:
+    """Dry friction that is full at the highest velocities alone."""
+    return lambda t, q, v: size * float(np.tanh(v / ROUNDED))
+
+
+def test_rounded_friction_is_named_where_any_other_curve_would_show(builder):
+    here = problem(builder, record(to_and_fro(2.0), rounded(60.0), 3))
+    traced = looked_at("one", here, ("coulomb_friction",))
+    o, [h] = traced.found, traced.found.singles[:1]
+    assert misnamed(h, o.forces)
+    assert not misnamed(h, o.forces, FASTEST)
+    assert h.theta["coulomb_friction_carriage_v_s"] == pytest.approx(ROUNDED, rel=0.05)
+    told = Judgement("traced", (h,), "it accounts for the residual")
+    assert confirmed(here, o.base, told, o.forces, o.size) is told
+    # where the form is open other curves may pass for it, and where it explains little
+    assert confirmed(replace(here, form_error=0.05), o.base, told, o.forces, o.size).members == ()
+    little = replace(o.base, fit=replace(o.base.fit, residual=h.fit.residual * 1.01))
+    assert confirmed(here, little, told, o.forces, o.size).members == ()
+
+
+def test_a_law_that_is_denied_gives_way_to_the_right_one(builder):
+    here = problem(builder, record(to_and_fro(2.0), lambda t, q, v: 300.0 * abs(v) * v, 3))
+    o = looked_at("one", here, ("viscous_damping",)).found
+    shown = screened(here, o.base, o.noise, o.size, o.forces, Progress(lambda _: None), Stages())
+    search = Search(shown, Progress(lambda _: None), 1)
+    singles = search.instead(o.singles[0], o.singles)
+    assert singles[0].label == "quadratic_damping@carriage"
+    assert singles[0].theta["quadratic_damping_carriage_c"] == pytest.approx(300.0, rel=0.02)
+    assert [h.label for h in singles].count("viscous_damping@carriage") == 1
+    assert search.instead(singles[0], singles) == singles  # of what is no better nothing is taken

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from estimator.closeloop.allowed import leaves_noise
 from estimator.closeloop.candidates import Candidate, physical_candidates
 from estimator.closeloop.compare import CURVE, Hypothesis, cost
@@ -19,6 +21,7 @@ OPEN_LEFT = 0.05  # where the FMU's form leaves something open, of what the law 
 OPEN_MISSED = 2.5e-3  # of what it explains; right laws leave a curve of that size at most
 NEAR = 1e-4  # of what a law explains: a smooth curve that passes for it comes no nearer, and for one of not
 PLAIN = 2  # more than so many unknowns, as rounded Coulomb friction, no nearer than OPEN_MISSED
+FASTEST = 0.1  # of the motion: friction rounded there too is none
 NO_LESS = 0.99  # of what a curve over another motion explains: one port may have two names
 
 
@@ -37,8 +40,8 @@ def confirmed(
     [h], open_form = best, problem.form_error > 0
 
     def doubted(m: Hypothesis) -> list[Candidate]:
-        wrong = misnamed(m, forces)
-        return wrong if open_form else [c for c in wrong if not told_apart(m, c, base)]
+        wrong, nowhere = misnamed(m, forces), misnamed(m, forces, FASTEST)
+        return [c for c in wrong if open_form or c in nowhere or not told_apart(m, c, base)]
 
     if len(h.candidates) > 1:
         rest = [m for m in judgement.members if not doubted(m)]
@@ -58,10 +61,16 @@ def confirmed(
     return named(rest, "traced") if any(motion(m) == motion(h) for m in rest) else no_law(h)
 
 
-def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
-    """Laws that with its values, in the motion at their port, are not what their names say."""
-    at = {missing.port.name: (missing.displacement, missing.velocity) for missing in forces}
-    found = []
+def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0) -> list[Candidate]:
+    """Laws that with its values, in the motion at their port, are not what their names say.
+
+    fastest: share of the motion in which that is asked, the one with the highest velocities.
+    """
+    at, found = {}, []
+    for missing in forces:
+        v = np.abs(missing.velocity)
+        fast = v >= np.quantile(v, 1 - fastest)
+        at[missing.port.name] = (missing.displacement[fast], missing.velocity[fast])
     for c in h.candidates:
         law = EFFECTS.get(c.kind)
         if law and issubclass(law, ForceLaw) and c.location in at:
