@@ -11,13 +11,12 @@ import numpy as np
 from scipy.linalg import pinvh
 from scipy.optimize import least_squares
 
-from estimator.closeloop.compare import Hypothesis, ranked
+from estimator.closeloop.compare import CHANCE, Hypothesis, leaves_noise, ranked
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.screen import built
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-CHANCE = 3.0  # standard deviations of the sum of squares of white noise
 APART = 20.0  # log score between them, from which the held-out part tells what the other does not
 MOST = 8  # laws that are looked at
 REACH = 3.0  # standard errors, that a value may be moved by
@@ -34,11 +33,6 @@ def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[
         return list(found)
     moved = {id(h): _as_errors_allow(problem, h, size) for h in alike}
     return ranked(problem, [moved.get(id(h), h) for h in found], size)
-
-
-def leaves_noise(h: Hypothesis) -> bool:
-    """Whether nothing but noise is left in the part to identify."""
-    return bool(h.fit.beyond_noise < CHANCE * np.sqrt(2 * len(h.fit.residual)))
 
 
 def _set_apart(problem: Problem, alike: Sequence[Hypothesis], size: Array) -> bool:

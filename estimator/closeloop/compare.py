@@ -27,6 +27,7 @@ RIVAL = 4.0  # times the best sum of squares, up to which others are fitted to t
 HOPELESS = 10.0  # times the best sum of squares after the brief fits
 WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
+CHANCE = 3.0  # standard deviations of the sum of squares of white noise
 TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
 
 
@@ -247,6 +248,11 @@ def cost(h: Hypothesis) -> float:
 def mean_square(h: Hypothesis) -> float:
     """Of the residual on the part that was fitted."""
     return cost(h) / len(h.fit.residual)
+
+
+def leaves_noise(h: Hypothesis) -> bool:
+    """Whether nothing but noise is left in the part to identify."""
+    return bool(h.fit.beyond_noise < CHANCE * np.sqrt(2 * len(h.fit.residual)))
 
 
 def ranked(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.closeloop.allowed import leaves_noise
 from estimator.closeloop.candidates import Candidate, physical_candidates
-from estimator.closeloop.compare import CURVE, Hypothesis, cost
+from estimator.closeloop.compare import CURVE, Hypothesis, cost, leaves_noise
 from estimator.closeloop.freeform import FREE_FORMS, offered
 from estimator.closeloop.missing_force import MissingForce
 from estimator.closeloop.problem import Problem

@@ -7,8 +7,7 @@ look past them, and the fit comes to rest beside the lowest; finer ones lead on 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from estimator.closeloop.allowed import leaves_noise
-from estimator.closeloop.compare import Hypothesis, cost, finished, mean_square
+from estimator.closeloop.compare import Hypothesis, cost, finished, leaves_noise, mean_square
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise
 from estimator.closeloop.slopes import FINE
