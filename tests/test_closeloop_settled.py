@@ -28,7 +28,6 @@ class Swinging:
     """A spring that has swung so often that a difference of the usual step is turns of it away."""
 
     free_states = ()
-    form_error = 0.0
 
     def __init__(self, k: float, seed: int, noise: float = 0.1) -> None:
         t = np.arange(4000) * 0.02

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from benchmarks.measured.benchmark import Benchmark, of_held
-from fmus.effects.input_delay import BACK, OUT
+from fmus.effects.input_delay import late, late_rates
 from fmus.model import Model
 from fmus.variables import Expr, Input, Parameter, State, rate
 
@@ -36,10 +36,8 @@ class WheelDrive(Model):
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
         way = [m.s_1, m.s_2, m.s_3, m.s_4, m.s_5, m.s_6]
-        asked = sum(c * s for c, s in zip(OUT, way, strict=True))
-        last = BACK[0] * m.omega_set - sum(c * s for c, s in zip(BACK, way, strict=True))
-        late = {f"s_{i}": s / m.T for i, s in enumerate([*way[1:], last], 1)}
-        return {"omega": m.K * (asked - m.omega) - m.b * m.omega + m.F_ext, "phi": m.omega, **late}
+        rates = {f"s_{i}": rate for i, rate in enumerate(late_rates(way, m.omega_set, m.T), 1)}
+        return {"omega": m.K * (late(way) - m.omega) - m.b * m.omega + m.F_ext, "phi": m.omega, **rates}
 
 
 BENCHMARK = Benchmark(

@@ -72,8 +72,10 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
     singles, pairs = search.run()
     leading, judgement = _judged(shown, forces, singles, pairs, tell)
     if leading.members and not judgement.members and len(leading.members[0].candidates) == 1:
-        singles = search.instead(leading.members[0], singles)
-        _, judgement = _judged(shown, forces, singles, pairs, tell, again=True)
+        more = search.instead(leading.members[0], singles)
+        if more != singles:
+            singles = more
+            _, judgement = _judged(shown, forces, singles, pairs, tell, again=True)
     tell("intervals", "asking how far its parameters may be from there")
     judgement = stages.done("intervals", lambda: _profiled(problem, judgement, size, jobs))
     if judgement.verdict == "unexplained":

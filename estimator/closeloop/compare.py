@@ -60,6 +60,17 @@ class Hypothesis:
         """The same whatever the order of its candidates."""
         return key(self.candidates)
 
+    @property
+    def own(self) -> set[str]:
+        """Names of the unknowns of its candidates."""
+        return {u.name for c in self.candidates for u in c.unknowns}
+
+    @property
+    def others(self) -> list[Unknown]:
+        """The unknowns beside those of its candidates."""
+        own = self.own
+        return [u for u in self.fit.unknowns if u.name not in own]
+
     def rms(self, problem: Problem) -> Array:
         """Root mean square of the residual on the held-out part, (n_y,)."""
         held_out: Array = np.sqrt(np.mean(self.held_out(problem) ** 2, axis=0))
@@ -184,10 +195,9 @@ def finished(
         short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < RIVAL * cost(found[0])]
         if not short:
             break
-        more = [Promise(h.candidates, 0.0, h.fit.theta) for h in short]
         before = sum(cost(h) for h in short)
         rest = [h for h in found if h not in short]
-        longer = fitted(problem, unknowns, more, size, LONG, jobs, step=step)
+        longer = fitted(problem, unknowns, from_there(short), size, LONG, jobs, step=step)
         found = best_by_label([*rest, *short, *longer])
         if sum(cost(h) for h in longer) > GAINS * before:
             break
@@ -229,6 +239,11 @@ def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
         group = next((g for g in groups if own <= set(g)), [])
         found.append(problem.with_effects(sorted({*problem.effects, *group})))
     return found
+
+
+def from_there(found: Sequence[Hypothesis]) -> list[Promise]:
+    """Promises that begin where hypotheses are."""
+    return [Promise(h.candidates, 0.0, h.fit.theta) for h in found]
 
 
 def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:

@@ -39,8 +39,11 @@ def confirmed(
     [h], open_form = best, problem.form_error > 0
 
     def doubted(m: Hypothesis) -> list[Candidate]:
-        wrong, nowhere = misnamed(m, forces), misnamed(m, forces, FASTEST)
-        return [c for c in wrong if open_form or c in nowhere or not told_apart(m, c, base)]
+        wrong = misnamed(m, forces)
+        if open_form or not wrong:
+            return wrong
+        nowhere = misnamed(m, forces, FASTEST)
+        return [c for c in wrong if c in nowhere or not told_apart(m, c, base)]
 
     if len(h.candidates) > 1:
         rest = [m for m in judgement.members if not doubted(m)]
@@ -65,16 +68,14 @@ def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0
 
     fastest: share of the motion in which that is asked, the one with the highest velocities.
     """
-    at, found = {}, []
-    for missing in forces:
-        v = np.abs(missing.velocity)
-        fast = v >= np.quantile(v, 1 - fastest)
-        at[missing.port.name] = (missing.displacement[fast], missing.velocity[fast])
+    at, found = {missing.port.name: missing for missing in forces}, []
     for c in h.candidates:
         law = EFFECTS.get(c.kind)
         if law and issubclass(law, ForceLaw) and c.location in at:
             values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
-            if not law.true_to_name(values, *at[c.location]):
+            q, v = at[c.location].displacement, at[c.location].velocity
+            fast = np.abs(v) >= np.quantile(np.abs(v), 1 - fastest)
+            if not law.true_to_name(values, q[fast], v[fast]):
                 found.append(c)
     return found
 

@@ -15,7 +15,7 @@ from estimator.closeloop.dating import begins, moments_near
 from estimator.closeloop.fit import Fit, fit, sandwich, weighted
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built
-from estimator.closeloop.settled import lower, others, own, settled
+from estimator.closeloop.settled import lower, settled
 from estimator.record import Array
 
 WIDTH = 1.96  # standard errors: 95 %
@@ -43,7 +43,7 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
         if not deeper:
             break
         there = Promise(h.candidates, 0.0, {**h.theta, **deeper})
-        now = lower(h, finished(problem, others(h), [there], size, 1))
+        now = lower(h, finished(problem, h.others, [there], size, 1))
         if now is h:
             break
         before, h = [*before, h], now
@@ -56,9 +56,9 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
 
 def reached(h: Hypothesis, b: Hypothesis) -> Array:
     """Standard errors (n,) of the laws' parameters that reach a place which the sum of squares allows."""
-    mine, found = own(h), np.zeros(len(h.fit.unknowns))
+    own, found = h.own, np.zeros(len(h.fit.unknowns))
     for i, u in enumerate(h.fit.unknowns):
-        if u.name in mine and cost(b) - cost(h) < WIDTH**2 * _usual(h, i):
+        if u.name in own and cost(b) - cost(h) < WIDTH**2 * _usual(h, i):
             found[i] = abs(b.fit.theta[u.name] - h.fit.values[i]) / WIDTH
     return found
 
@@ -157,6 +157,6 @@ def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> F
     rest = [u for u in h.fit.unknowns if u.name != held]
     along = h.fit.covariance[:, i] / h.fit.covariance[i, i] * (value - h.fit.values[i])
     start = dict(zip((u.name for u in h.fit.unknowns), h.fit.values + along, strict=True))
-    mine = own(h)
-    known = {n: column for n, column in h.fit.columns.items() if n not in mine}
+    own = h.own
+    known = {n: column for n, column in h.fit.columns.items() if n not in own}
     return fit(here, rest, size, start, {held: value}, EVALUATIONS, known)

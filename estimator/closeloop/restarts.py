@@ -17,6 +17,7 @@ from estimator.closeloop.compare import (
     best_by_label,
     cost,
     finished,
+    from_there,
     hypothesis,
     mean_square,
     together,
@@ -69,15 +70,10 @@ def from_the_beginning(
         if mean_square(h) < RIVAL * mean_square(alive[0][0])
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
-    again = finished(problem, unknowns, _from_there(grown[:LEADING]), size, jobs)
+    again = finished(problem, unknowns, from_there(grown[:LEADING]), size, jobs)
     best = best_by_label([*found, *grown, *again])
     rugged = [h for h in best[:REFINED] if mean_square(h) > NEAR and cost(h) < RIVAL * cost(best[0])]
-    return best_by_label([*best, *finished(problem, unknowns, _from_there(rugged), size, jobs, step=FINE)])
-
-
-def _from_there(found: Sequence[Hypothesis]) -> list[Promise]:
-    """Promises that begin where hypotheses are."""
-    return [Promise(h.candidates, 0.0, h.fit.theta) for h in found]
+    return best_by_label([*best, *finished(problem, unknowns, from_there(rugged), size, jobs, step=FINE)])
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:

@@ -59,8 +59,10 @@ class Search:
     def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The single hypotheses with other laws over the motion of one, fitted from where it is."""
         s = self.screened
-        self.tell("renamed", "fitting other laws over the same motion")
         promises = over_the_same(s.screening, Calibration.of(s.fit), h, s.change)
+        if not promises:
+            return list(singles)
+        self.tell("renamed", "fitting other laws over the same motion")
         found = s.stages.done(
             "renamed", lambda: finished(s.problem, s.base.fit.unknowns, promises, s.size, self.jobs)
         )

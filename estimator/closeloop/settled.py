@@ -7,31 +7,19 @@ look past them, and the fit comes to rest beside the lowest; finer ones lead on 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from estimator.closeloop.compare import Hypothesis, cost, finished, leaves_noise, mean_square
-from estimator.closeloop.problem import Problem, Unknown
-from estimator.closeloop.screen import Promise
+from estimator.closeloop.compare import Hypothesis, cost, finished, from_there, leaves_noise, mean_square
+from estimator.closeloop.problem import Problem
 from estimator.closeloop.slopes import FINE
 from estimator.record import Array
 
 RUGGED = 1.05  # mean square of a residual, in units of noise, from which finer differences are tried
 
 
-def own(h: Hypothesis) -> set[str]:
-    """Names of the unknowns of its candidates."""
-    return {u.name for c in h.candidates for u in c.unknowns}
-
-
-def others(h: Hypothesis) -> list[Unknown]:
-    """The unknowns beside those of its candidates."""
-    mine = own(h)
-    return [u for u in h.fit.unknowns if u.name not in mine]
-
-
 def settled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     """The hypothesis where finer differences lead it, if more than noise is left and that is lower."""
     if leaves_noise(h) or mean_square(h) < RUGGED:
         return h
-    return lower(h, finished(problem, others(h), [Promise(h.candidates, 0.0, h.theta)], size, 1, step=FINE))
+    return lower(h, finished(problem, h.others, from_there([h]), size, 1, step=FINE))
 
 
 def lower(h: Hypothesis, again: Sequence[Hypothesis]) -> Hypothesis:

@@ -19,6 +19,7 @@ from estimator.closeloop.compare import (
     beyond_noise_of_all,
     cost,
     lead,
+    leaves_noise,
 )
 from estimator.closeloop.detect import BEYOND, NOISES, Detection, matters, signal_size
 from estimator.closeloop.moments import moment
@@ -201,9 +202,8 @@ def whole(pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
 
     What is neither of two effects may be brought near to noise by both, one after the other.
     """
-    left, chance = pair.fit.beyond_noise, SCATTER * np.sqrt(2 * len(pair.fit.residual))
     gained = min((cost(s) for s in singles), default=np.inf) - cost(pair)
-    return bool(left < max(chance, LITTLE * gained))
+    return leaves_noise(pair) or bool(pair.fit.beyond_noise < LITTLE * gained)
 
 
 def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Array) -> bool:

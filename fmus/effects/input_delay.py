@@ -3,6 +3,8 @@
 In data: a residual in proportion to the input's rate; the outputs come late by a fixed time.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,17 @@ DELAYS = (0.03, 0.1, 0.3)  # s
 #         / (1 + 6/11 s + 3/22 s2 + 2/99 s3 + 1/528 s4 + 1/9240 s5 + 1/332640 s6)
 OUT = (1.0, -5 / 11, 1 / 11, -1 / 99, 1 / 1584, -1 / 55440)
 BACK = (332640.0, 181440.0, 45360.0, 6720.0, 630.0, 36.0)  # the denominator's, over that of s6
+
+
+def late(x: Sequence[Expr]) -> Expr:
+    """What arrives, from the states: the input through the denominator, and its derivatives by t/T."""
+    return sum(c * s for c, s in zip(OUT, x, strict=True))
+
+
+def late_rates(x: Sequence[Expr], u: Expr, T: Expr) -> list[Expr]:
+    """Derivatives by time of these states, where the input u goes in and arrives T later."""
+    last = BACK[0] * u - sum(c * s for c, s in zip(BACK, x, strict=True))
+    return [rate / T for rate in (*x[1:], last)]
 
 
 class InputDelay(InputEffect):
@@ -44,14 +57,12 @@ class InputDelay(InputEffect):
 
     def passed(self, u: Expr) -> Expr:
         """See InputEffect.passed."""
-        late = sum(c * x for c, x in zip(OUT, self._chain(), strict=True))
-        return u + late - self.share * (u - self.u_0)
+        return u + late(self._chain()) - self.share * (u - self.u_0)
 
     def rates(self, u: Expr) -> dict[str, Expr]:
         """See InputEffect.rates."""
-        x = self._chain()
-        last = BACK[0] * self.share * (u - self.u_0) - sum(c * x for c, x in zip(BACK, x, strict=True))
-        return {f"x{i}": rate / self.T for i, rate in enumerate([*x[1:], last], 1)}
+        rates = late_rates(self._chain(), self.share * (u - self.u_0), self.T)
+        return {f"x{i}": rate for i, rate in enumerate(rates, 1)}
 
     def _chain(self) -> list[Expr]:
         return [self.x1, self.x2, self.x3, self.x4, self.x5, self.x6]
