@@ -26,8 +26,14 @@ class Run:
     t: Array  # (N,) s, increasing, begins at the record's own time
     u: Array  # (N, n_u) inputs in the FMU's units
     y: Array  # (N, n_y) measured outputs in the FMU's units
-    fit: BoolArray  # (N,) samples used to identify
-    test: BoolArray  # (N,) samples held out
+    fit: BoolArray  # (N,) samples that effects are fitted on
+    choose: BoolArray  # (N,) samples on which an answer is chosen among the fitted ones
+    test: BoolArray  # (N,) samples that only the answer is held against
+
+    @property
+    def unseen(self) -> BoolArray:
+        """(N,) samples that no fit has seen: those to choose and those to test."""
+        return self.choose | self.test
 
     def fit_time(self, share: float) -> float:
         """From its first sample to the moment when such a share of the fitted samples has passed, s."""
@@ -42,14 +48,15 @@ class Run:
     def part(self, first: int, end: int) -> "Run":
         """The samples from `first` to before `end`."""
         some = slice(first, end)
-        return Run(self.t[some], self.u[some], self.y[some], self.fit[some], self.test[some])
+        t, u, y = self.t[some], self.u[some], self.y[some]
+        return Run(t, u, y, self.fit[some], self.choose[some], self.test[some])
 
 
 @dataclass(frozen=True)
 class Record:
     """All runs of an experiment.
 
-    One file gives one run with both masks; two files give run 0 (all fit) and run 1 (all test).
+    One file gives one run with all three masks; two files give run 0 (fit and choose) and run 1 (all test).
     """
 
     runs: tuple[Run, ...]

@@ -127,7 +127,7 @@ def carried(t: Transfer, target: Traced) -> Carried:
         return said
     problem, noise = target.problem, target.found.noise
     rms = {"before": target.found.base, "transferred": t.held, "own": t.own}
-    figures = {k: h.rms(problem) for k, h in rms.items()} | {"noise": noise}
+    figures = {k: h.rms(problem, "test") for k, h in rms.items()} | {"noise": noise}
     closed = gap_closed(figures["before"], figures["transferred"], noise)
     outputs = problem.record.outputs
     return Carried(

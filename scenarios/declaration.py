@@ -1,6 +1,7 @@
 """What an experiment.toml may say: one class a table, one field a key."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
@@ -41,23 +42,45 @@ class Table(BaseModel):
 
 
 class Split(Table):
-    """Which data identify and which are held out: two windows [s] of one file, or two files."""
+    """Which data effects are fitted on, chosen on and tested on: windows [s] of one file, or files.
+
+    `choose` may be left out: the last part of what identifies is then taken for it.
+    """
 
     identify: Interval | None = None
+    choose: Interval | None = None
     test: Interval | None = None
     identify_data: str | None = None
+    choose_data: str | None = None
     test_data: str | None = None
 
     @model_validator(mode="after")
     def _windows_or_files(self) -> Self:
-        given = self.model_fields_set
+        given = self.model_fields_set - {"choose", "choose_data"}
+        files = "identify_data" in given
         if given not in ({"identify", "test"}, {"identify_data", "test_data"}):
             raise ValueError("needs either 'identify' and 'test', or 'identify_data' and 'test_data'")
-        if self.identify and self.test:
-            first, second = sorted((self.identify, self.test))
+        if self.choose and files:
+            raise ValueError("'choose' is a window of one file; beside 'identify_data' write 'choose_data'")
+        if self.choose_data and not files:
+            raise ValueError("'choose_data' is a file; beside 'identify' write 'choose', a window in seconds")
+        windows = sorted((w, key) for key, w in self.windows.items())
+        for (first, one), (second, other) in pairwise(windows):
             if second[0] < first[1]:
-                raise ValueError(f"'identify' and 'test' overlap from {second[0]:g} s to {first[1]:g} s")
+                raise ValueError(f"'{one}' and '{other}' overlap from {second[0]:g} s to {first[1]:g} s")
         return self
+
+    @property
+    def windows(self) -> dict[str, tuple[float, float]]:
+        """The windows that are given, by key, s."""
+        given = {"identify": self.identify, "choose": self.choose, "test": self.test}
+        return {key: window for key, window in given.items() if window}
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The files that are given, by the part of the record that they hold."""
+        given = {"identify": self.identify_data, "choose": self.choose_data, "test": self.test_data}
+        return {part: file for part, file in given.items() if file}
 
 
 class Output(Table):
@@ -186,7 +209,7 @@ def _contradictions(d: Declaration) -> Iterator[str]:
         yield "needs exactly one of the keys 'model' and 'fmu'"
     if d.ports and d.model:
         yield "[[ports]] are for a foreign 'fmu' only; our own models have theirs"
-    files = {d.split.identify_data, d.split.test_data} - {None} if d.split else set()
+    files = set(d.split.files.values()) if d.split else set()
     if not files and d.data is None:
         yield "key 'data' is missing"
     if files and d.data is not None and d.data not in files:

@@ -32,9 +32,9 @@ class Experiment(Declaration):
 
     @property
     def data_files(self) -> tuple[Path, ...]:
-        """One file, or that to identify and that to test."""
-        if self.split and self.split.identify_data and self.split.test_data:
-            return self.data_dir / self.split.identify_data, self.data_dir / self.split.test_data
+        """One file, or one for each part of the split: to identify, to choose if it is given, to test."""
+        if self.split and self.split.files:
+            return tuple(self.data_dir / file for file in self.split.files.values())
         return (self.data_dir / (self.data or ""),)
 
 

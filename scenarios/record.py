@@ -1,5 +1,6 @@
 """Measured data: from the files of an experiment to a checked Record in the FMU's units."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from scenarios.experiment import Experiment, check_names
 from scenarios.readers import read_sheet
 from scenarios.readers.units import StatedUnits
 
+CHOOSE = 0.2  # of the samples that identify: on these an answer is chosen, if no others are given
+PIECES = 5  # in which they lie
+GRID = 15  # samples: pieces begin at multiples of it, so that screening may take 3 or 5 samples as one
 MIN_SAMPLES = 50  # in each part; fewer cannot show an error beyond its own scatter
 MIN_MEASURED = 2  # of an output in each file; fewer have no motion
 
@@ -20,7 +24,7 @@ MIN_MEASURED = 2  # of an output in each file; fewer have no motion
 def load_record(experiment: Experiment, description: FmuDescription, missing: bool = False) -> Record:
     """The measured inputs and outputs of an experiment in the FMU's units, checked.
 
-    Without [split] all samples are to identify and none is held out. missing: whether cells of outputs may
+    Without [split] all samples are fitted and none is held out. missing: whether cells of outputs may
     be empty; they become nan. Raises BadInput where names, units or data forbid the use; what is merely odd
     stands in the notes.
     """
@@ -64,8 +68,8 @@ def _run(
 ) -> tuple[Run, list[Note]]:
     """One file as a run with its notes, from its start to the last sample of the split."""
     data, stated = _read(e, file)
-    fit, test = _masks(e, part, file, data[e.time])
-    used = slice(int(np.flatnonzero(fit | test)[-1]) + 1)
+    fit, choose, test = _masks(e, part, file, data[e.time])
+    used = slice(int(np.flatnonzero(fit | choose | test)[-1]) + 1)
     data = {column: values[used] for column, values in data.items()}
     t = data[e.time]
     notes = _checked(e, file, data, missing)
@@ -76,7 +80,8 @@ def _run(
         u[:, j] = _input(e, fmu, name, data[channel], stated) if isinstance(channel, str) else channel
     outputs = np.column_stack([data[output.column] for output in e.outputs.values()])
     y = outputs * scale[:, 0] + scale[:, 1]
-    return Run(t=t, u=u, y=y, fit=fit[used], test=test[used]), [*notes, *stated.notes]
+    masks = {"fit": fit[used], "choose": choose[used], "test": test[used]}
+    return Run(t=t, u=u, y=y, **masks), [*notes, *stated.notes]
 
 
 def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated: StatedUnits) -> Array:
@@ -128,15 +133,47 @@ def _source(e: Experiment, column: str) -> tuple[str, int]:
     return column, times
 
 
-def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray]:
-    """Which samples identify and which are held out, t: (N,) s -> (N,), (N,)."""
+def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Which samples are fitted, which choose among the fits, and which test, t: (N,) s -> (N,) each."""
     every, none = np.ones(t.size, dtype=np.bool_), np.zeros(t.size, dtype=np.bool_)
-    if e.split is None or e.split.identify is None or e.split.test is None:
+    if e.split is None:
         _check_enough(e, f"file {file}", every)
-        return (every, none) if part == 0 else (none, every)
+        return every, none, none
+    if e.split.files:
+        _check_enough(e, f"file {file}", every)
+        whole = list(e.split.files)[part]
+        masks = {key: every if key == whole else none for key in ("identify", "choose", "test")}
+    else:
+        masks = {"choose": none} | _windows(e, e.split.windows, file, t)
+    if "choose" not in {**e.split.files, **e.split.windows}:
+        masks["choose"] = spread(masks["identify"])
+    return masks["identify"] & ~masks["choose"], masks["choose"], masks["test"]
+
+
+def spread(identify: BoolArray) -> BoolArray:
+    """The samples (N,) of the identify part that choose where none are given: the end of each of its pieces.
+
+    Spread over the record, since what sets in late must be seen both to be fitted and to be chosen, and in
+    few long pieces, so that neighbours in time do not tell one part of the other (hold-out of blocks:
+    J. Racine, Journal of Econometrics 99 (2000), 39-61).
+    """
+    index, found = np.flatnonzero(identify), np.zeros_like(identify)
+    whole = GRID if len(index) > 20 * PIECES * GRID else 1  # else rounding would change the share
+    for piece in range(PIECES):
+        first, last = (
+            round((piece + part) * len(index) / PIECES / whole) * whole for part in (1 - CHOOSE, 1)
+        )
+        found[index[first:last]] = True
+    return found
+
+
+def _windows(
+    e: Experiment, windows: Mapping[str, tuple[float, float]], file: Path, t: Array
+) -> dict[str, BoolArray]:
+    """The samples (N,) in each window of one file; a sample on the edge of two belongs to the first."""
     step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
-    masks: list[BoolArray] = []
-    for key, window in (("identify", e.split.identify), ("test", e.split.test)):
+    masks: dict[str, BoolArray] = {}
+    for key, window in windows.items():
         if window[0] < t[0] - step or window[1] > t[-1] + step:
             raise BadInput(
                 f"{e.file}: [split] {key} = {list(window)} leaves the record {file.name}, which runs from "
@@ -144,9 +181,9 @@ def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, B
             )
         slack = 1e-6 * step  # for times printed with few digits
         mask = (t >= window[0] - slack) & (t <= window[1] + slack)
-        masks.append(mask & ~masks[0] if masks else mask)
-        _check_enough(e, f"[split] {key} = {list(window)}", masks[-1])
-    return masks[0], masks[1]
+        masks[key] = mask & ~np.any([*masks.values()], axis=0) if masks else mask
+        _check_enough(e, f"[split] {key} = {list(window)}", masks[key])
+    return masks
 
 
 def _check_enough(e: Experiment, where: str, mask: BoolArray) -> None:

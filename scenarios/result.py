@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from estimator.closeloop.ambiguity import becomes
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, lead
 from estimator.closeloop.freeform import curve_of
@@ -33,7 +34,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A hypothesis that was rejected; score: held-out log score below that of the best, 0 at most."""
+    """A hypothesis that was rejected; score: log score on the part to choose, less that of the best."""
 
     kind: str
     location: str
@@ -121,16 +122,24 @@ def errors(problem: Problem, found: Outcome, best: Hypothesis) -> dict[str, Arra
     wrong = best_wrong(found)
     if wrong:
         compared["placebo"] = wrong
-    rms = {k: h.rms(problem) for k, h in compared.items()}
+    rms = {k: h.rms(problem, "test") for k, h in compared.items()}
     if found.honesty:
         rms["black_box"] = found.honesty.black_box.rms
     return rms | {"noise": found.noise}
 
 
 def best_wrong(found: Outcome) -> Hypothesis | None:
-    """The best single hypothesis that was rejected: an error that any effect of the kind would reach."""
+    """The best single hypothesis that was rejected: an error that any effect of the kind would reach.
+
+    A law that becomes a member at a limit of its shape, or that a member becomes, holds what was found: its
+    error says nothing of a wrong effect, and it is passed over.
+    """
     members = found.judgement.members
-    return next((h for h in found.singles if h not in members), None)
+    return next((h for h in found.singles if h not in members and not _nested(h, members)), None)
+
+
+def _nested(h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
+    return any(becomes(h, m) or becomes(m, h) for m in members)
 
 
 def _line(v: Visible) -> dict[str, Any]:

@@ -95,7 +95,7 @@ def viscous(size: float) -> Force:
 
 def record(F: np.ndarray, resistance: Force, seed: int, speed: float = 0.0, M: float = 95.0) -> Record:
     y = motion(F, resistance, speed, M) + NOISE * np.random.default_rng(seed).standard_normal((SAMPLES, 2))
-    return Record((Run(T, F[:, None], y, T < 10, T >= 10),), ("F",), ("q", "q_dot"), NOISE)
+    return Record((Run(T, F[:, None], y, T < 10, T >= 10, T >= 10),), ("F",), ("q", "q_dot"), NOISE)
 
 
 def problem(builder: ModelBuilder, made: Record, speed: float = 0.0) -> Problem:

@@ -71,7 +71,7 @@ def a_record():
     t = 3.0 + DT * np.arange(int(END / DT) + 1)  # a record's own clock
     u = np.column_stack([100 * np.sin(3 * (t - 3)) + 40])
     y = np.zeros((t.size, 1))
-    return Record((Run(t, u, y, t < 5, t >= 5),), ("F",), ("q",), np.array([1e-3]))
+    return Record((Run(t, u, y, t < 5, t >= 5, t >= 5),), ("F",), ("q",), np.array([1e-3]))
 
 
 def found(effects, values, verdict="traced"):

@@ -236,7 +236,7 @@ class Playing:
         self.q = np.sin(2 * np.pi * t) + 0.4 * np.sin(2 * np.pi * 2.7 * t)
         y = np.clip(self.q, -0.2, 0.2) + 0.2 * np.random.default_rng(seed).standard_normal(len(t))
         every = np.ones(len(t), bool)
-        run = Run(t, t[:, None], y[:, None], every, ~every)
+        run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
         self.record = SimpleNamespace(runs=(run,), floor_known=True, outputs=("y",))
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
@@ -281,10 +281,12 @@ class Beginning(Playing):
         t = np.arange(800) * 0.01
         self.q = np.where((t > 3.0) & (t < 3.3), 0.0, np.sin(2 * np.pi * 3.0 * t))
         every = np.ones(len(t), bool)
-        self.record = SimpleNamespace(runs=(Run(t, t[:, None], t[:, None], every, ~every),), floor_known=True)
+        self.record = SimpleNamespace(
+            runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),), floor_known=True
+        )
         y = 0.1 * np.random.default_rng(seed).standard_normal((len(t), 1))
         y -= self.identify_residual({"d": 1.0, "d_t0": moment}) - t[:, None]
-        self.record.runs = (Run(t, t[:, None], y, every, ~every),)
+        self.record.runs = (Run(t, t[:, None], y, every, ~every, ~every),)
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         [run] = self.record.runs

@@ -250,7 +250,7 @@ def test_a_bound_amplitude_and_what_calibration_explains_never_lead() -> None:
 def recorded(residual: Array, u: Array, simulated: Array, dt: float = 0.02) -> Record:
     """A record of which the first 60 % are to identify."""
     t = np.arange(len(u)) * dt
-    run = Run(t, u, simulated + residual, t < 0.6 * t[-1], t >= 0.6 * t[-1])
+    run = Run(t, u, simulated + residual, t < 0.6 * t[-1], t >= 0.6 * t[-1], t >= 0.6 * t[-1])
     names = tuple(f"y{j}" for j in range(residual.shape[1]))
     return Record((run,), tuple(f"u{i}" for i in range(u.shape[1])), names, np.ones(len(names)))
 
@@ -317,7 +317,10 @@ def test_a_black_box_of_two_files_runs_through_the_second_from_rest() -> None:
     residual = 5 * resonant(u[:, 0], 1.0, 0.1)[:, None] + rng.standard_normal((4000, 1))
     t, yes = np.arange(2000) * 0.02, np.ones(2000, dtype=bool)
     parts = [slice(0, 2000), slice(2000, 4000)]
-    runs = tuple(Run(t, u[p], residual[p], yes == (i == 0), yes == (i == 1)) for i, p in enumerate(parts))
+    runs = tuple(
+        Run(t, u[p], residual[p], yes == (i == 0), yes == (i == 1), yes == (i == 1))
+        for i, p in enumerate(parts)
+    )
     record = Record(runs, ("u",), ("y",), np.ones(1))
     found = black_box(record, [residual[p] for p in parts], np.ones(1))
     assert found.rms[0] < 0.4 * np.std(residual[2000:])
@@ -400,7 +403,7 @@ def drive_record(resistance: Callable[[Array], Array], rng: np.random.Generator)
         k3 = rates(x + h / 2 * k2, (f0 + f1) / 2)
         x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3, f1))
     y = np.array(motion)[::fine] + NOISE * rng.standard_normal((SAMPLES, 2))
-    run = Run(t[::fine], F[::fine, None], y, t[::fine] < 12, t[::fine] >= 12)
+    run = Run(t[::fine], F[::fine, None], y, t[::fine] < 12, t[::fine] >= 12, t[::fine] >= 12)
     return Record((run,), ("F",), ("q", "q_dot"), NOISE)
 
 
@@ -438,7 +441,7 @@ def test_a_force_without_a_name_becomes_a_curve_and_a_better_fmu(
     assert first.share > 0.9
     assert found is not None
     assert found.label == "free_form_velocity@carriage"
-    assert np.all(found.rms(asked) < 0.1 * outcome.base.rms(asked))
+    assert np.all(found.rms(asked, "test") < 0.1 * outcome.base.rms(asked, "test"))
     curve = curve_of(found)
     visited = np.abs(curve.x) < np.quantile(np.abs(asked.record.runs[0].y[:, 1]), 0.95)
     error = (curve.force - law(curve.x))[visited]

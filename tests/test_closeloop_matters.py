@@ -27,7 +27,7 @@ FORM = 0.2  # of an output, so 6 times the noise
 
 def asked(form_error: float = 0.0) -> Problem:
     y = SIGNAL * np.sqrt(2) * np.sin(T)[:, None] * np.ones(2)
-    run = Run(T, y[:, :0], y, T < SAMPLES, T >= SAMPLES)
+    run = Run(T, y[:, :0], y, T < SAMPLES, T >= SAMPLES, T >= SAMPLES)
     return Problem(lambda _: Path(), Record((run,), (), ("a", "b"), NOISE), {}, {}, form_error=form_error)
 
 
@@ -163,7 +163,7 @@ def test_several_effects_account_for_more_of_what_could_be_form(before, after, f
 @pytest.mark.parametrize(
     ("early", "late", "said"),
     [
-        (1.0, 5.0, "begins in the held-out part"),
+        (1.0, 5.0, "begins after it"),
         (5.0, 1.0, "ends before"),
         (1.2, 5.0, "nearest was"),
         (5.0, 1.2, "nearest was"),

@@ -56,7 +56,7 @@ def problem(drive: ForeignBuilder, missing: np.ndarray, rng: np.random.Generator
     t = np.arange(SAMPLES) * DT
     F = 60 * np.sin(2 * np.pi * t / 4) + 20 * np.sin(2 * np.pi * t / 0.7)
     y = drive_motion(F + missing) + NOISE * rng.standard_normal((SAMPLES, 2))
-    run = Run(t, F[:, None], y, t < 10, t >= 10)
+    run = Run(t, F[:, None], y, t < 10, t >= 10, t >= 10)
     record = Record((run,), ("F",), ("q", "q_dot"), NOISE)
     declared = {"M": 95.0, "F_v": 200.0, "q": 0.0, "q_dot": 0.0}
     return Problem(drive, record, declared, {"M": (80.0, 110.0)}, (), (CARRIAGE,))
@@ -146,7 +146,7 @@ def test_noise_floor_is_what_was_declared_or_what_the_data_show() -> None:
     rng = np.random.default_rng(4)
     t = np.arange(5000) * 0.01
     y = np.column_stack([np.sin(t), np.cos(t)]) + [0.01, 0.02] * rng.standard_normal((5000, 2))
-    run = Run(t, np.empty((5000, 0)), y, t < 30, t >= 30)
+    run = Run(t, np.empty((5000, 0)), y, t < 30, t >= 30, t >= 30)
     found = noise_floor(Record((run,), (), ("a", "b"), np.array([0.5, np.nan])))
     assert found[0] == 0.5
     assert_allclose(found[1], 0.02, rtol=0.05)

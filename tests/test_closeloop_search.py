@@ -88,7 +88,7 @@ def test_an_fmu_between_coarse_samples_shows_its_state(hidden):
     t, w = np.arange(0.0, 2.0, 0.005), 20 * np.pi
     u, rate = 1e-3 * np.sin(w * t), 1e-3 * w * np.cos(w * t)
     every, inputs = np.ones(len(t), bool), ("u_fl", "u_fl_dot")
-    run = Run(t, np.column_stack([u, rate]), np.zeros((len(t), 1)), every, ~every)
+    run = Run(t, np.column_stack([u, rate]), np.zeros((len(t), 1)), every, ~every, ~every)
     record = Record((run,), inputs, ("z1_ddot",), np.array([np.nan]))
     problem = Problem(lambda _: native("vehicle7dof"), record, {}, {})
     x = problem.simulate({}, problem.plant.states)[0][:, 1:]
@@ -112,7 +112,7 @@ def test_what_a_parameter_changes_is_what_a_simulation_says(lever, share):
         columns += [1e-3 * np.sin(np.outer(t, w) + phase).sum(1)]
         columns += [1e-3 * (w * np.cos(np.outer(t, w) + phase)).sum(1)]
     outputs, every = ("z1_ddot", "z2_ddot", "phi_x2_dot"), np.ones(len(t), bool)
-    run = Run(t, np.column_stack(columns), np.zeros((len(t), 3)), every, ~every)
+    run = Run(t, np.column_stack(columns), np.zeros((len(t), 3)), every, ~every, ~every)
     record = Record((run,), tuple(inputs), outputs, np.ones(3))
     problem = Problem(lambda _: native("vehicle7dof"), record, {}, {})
     plant, k = problem.plant, int(share * len(t))
@@ -191,10 +191,10 @@ def test_groups_keep_noise_white_and_slow_squares(n, n_y, seed):
 def test_what_moves_fast_is_not_grouped(frequency, group):
     t = np.arange(0.0, 40.0, 1e-3)
     y, fit = np.sin(2 * np.pi * frequency * t)[:, None], t < 35.0
-    record = Record((Run(t, y[:, :0], y, fit, ~fit),), (), ("y",), np.ones(1))
+    record = Record((Run(t, y[:, :0], y, fit, ~fit, ~fit),), (), ("y",), np.ones(1))
     problem = Problem(lambda _: Path(), record, {}, {})
     assert group_size(problem, y) == group
-    late = Record((Run(t, y[:, :0], y, t > 5.0, t <= 5.0),), (), ("y",), np.ones(1))
+    late = Record((Run(t, y[:, :0], y, t > 5.0, t <= 5.0, t <= 5.0),), (), ("y",), np.ones(1))
     assert group_size(replace(problem, record=late), y) == 1
 
 

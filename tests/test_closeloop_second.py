@@ -46,7 +46,7 @@ def test_a_single_burst_does_not_set_in():
 def test_shares_of_the_fitted_part_are_dated_wherever_it_lies(first, last, share, begin):
     t = begin + np.linspace(0.0, 40.0, 2001)
     fit = (t - begin >= 40.0 * first) & (t - begin <= 40.0 * last)
-    run = Run(t, t[:, None], t[:, None], fit, ~fit)
+    run = Run(t, t[:, None], t[:, None], fit, ~fit, ~fit)
     at = run.fit_time(share)
     assert at == pytest.approx(40.0 * (first + share * (last - first)), abs=0.03)
     assert run.fit_share(at) == pytest.approx(share, abs=1e-6)
@@ -167,7 +167,7 @@ class Swinging:
     def __init__(self, moment: float) -> None:
         t = np.linspace(0.0, 20.0, 4000)
         fit = t < 15.0
-        self.run = Run(t, t[:, None], self.simulate(t, 1.0, moment), fit, ~fit)
+        self.run = Run(t, t[:, None], self.simulate(t, 1.0, moment), fit, ~fit, ~fit)
         self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
         self.free_states = ()
 
@@ -211,7 +211,7 @@ class Saturating:
         fit, rng = t < 36.0, np.random.default_rng(seed)
         self.late = 1.0 * (t > 40.0)
         noise = 0.1 * rng.standard_normal(len(t))
-        self.run = Run(t, t[:, None], (3.0 + 2.0 * self.late + noise)[:, None], fit, ~fit)
+        self.run = Run(t, t[:, None], (3.0 + 2.0 * self.late + noise)[:, None], fit, ~fit, ~fit)
         self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
         self.form_error = 0.0
 
@@ -244,10 +244,10 @@ def test_where_a_fit_came_to_rest_is_no_evidence(one, other, seed):
         still = allowing.allowed(asked, compare.ranked(asked, sure, size), size)
     assert abs(compare.lead(asked, *told, size)[0]) < 3.0
     for h in told:
-        assert h.rms(asked) == pytest.approx(0.1, rel=0.1)
+        assert h.rms(asked, "choose") == pytest.approx(0.1, rel=0.1)
     for h in sure:  # what is known stays
         [moved] = [x for x in still if x.key == h.key]
-        assert moved.rms(asked) == pytest.approx(h.rms(asked), rel=0.1)
+        assert moved.rms(asked, "choose") == pytest.approx(h.rms(asked, "choose"), rel=0.1)
 
 
 def test_what_leaves_more_than_noise_is_not_helped():

@@ -34,7 +34,9 @@ class Swinging:
         every = np.ones(len(t), bool)
         self.true = {"q": 1.0, "k": k}
         y = noise * np.random.default_rng(seed).standard_normal((len(t), 1)) + swing(t, self.true)
-        self.record = SimpleNamespace(runs=(Run(t, y, y, every, ~every),), floor_known=True, outputs=("y",))
+        self.record = SimpleNamespace(
+            runs=(Run(t, y, y, every, ~every, ~every),), floor_known=True, outputs=("y",)
+        )
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         [run] = self.record.runs

@@ -183,7 +183,7 @@ def test_a_second_record_splits_the_class_of_the_first(builder: ModelBuilder, sl
     assert "comes down to coulomb_friction@carriage" in left.sentence
     [right] = [t for t in found if t.carries]
     wrong = next(t for t in found if not t.carries)
-    rms = {t.member.label: t.held.rms(other.problem) / other.found.noise for t in (right, wrong)}
+    rms = {t.member.label: t.held.rms(other.problem, "test") / other.found.noise for t in (right, wrong)}
     assert rms[right.member.label].max() < 1.1
     assert rms[wrong.member.label].max() > 5
     assert right.loose == ("coulomb_friction_carriage_v_s",)  # one way round, its rounding is not seen
@@ -215,7 +215,10 @@ def test_a_law_that_nearly_fits_yields_to_the_one_that_does(builder: ModelBuilde
     found = transfers(*ones)
     assert statuses(found) == {"viscous_damping": "surpassed", "quadratic_damping": "confirmed"}
     nearly = next(t for t in found if t.status == "surpassed")
-    assert gap_closed(*(x.rms(ones[1].problem) for x in (ones[1].found.base, nearly.own)), NOISE).min() > 0.95
+    assert (
+        gap_closed(*(x.rms(ones[1].problem, "test") for x in (ones[1].found.base, nearly.own)), NOISE).min()
+        > 0.95
+    )
     assert labels(standing(ones[0], found).left) == ["quadratic_damping"]
 
 

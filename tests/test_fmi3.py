@@ -260,7 +260,7 @@ def test_a_plant(vdp):
         plant = Plant(fmu, ["u"], ["x0", "x1_dot"])
         assert plant.states == ("x0", "x1")
         every = np.ones(len(t), dtype=bool)
-        run = Run(t, u, np.empty((len(t), 2)), fit=every, test=~every)
+        run = Run(t, u, np.empty((len(t), 2)), fit=every, choose=~every, test=~every)
         found = plant.simulate(run, {"mu": 0.8}, ["x1"])
         held = (u[1:, 0] + u[:-1, 0]) / 2
         assert_allclose(found, solved(t, held, 0.8, seen=u[:, 0])[:, [0, 2, 1]], atol=ERROR)

@@ -51,16 +51,16 @@ def test_one_file_is_one_run_in_the_units_of_the_fmu(tmp_path):
 
 def test_a_shared_border_identifies_only(tmp_path):
     (run,) = read(write(tmp_path)).runs
-    assert run.t[run.fit][-1] == run.t[600] == 6.0
+    assert run.t[run.fit | run.choose][-1] == run.t[600] == 6.0
     assert run.t[run.test][0] == run.t[601]
-    assert not (run.fit & run.test).any()
+    assert np.all(run.fit.astype(int) + run.choose + run.test == 1)
 
 
 def test_the_run_starts_with_the_record_and_ends_with_the_split(tmp_path):
     toml = GOOD.replace("[0.0, 6.0]", "[2.0, 6.0]").replace("[6.0, 10.0]", "[6.5, 9.0]")
     (run,) = read(write(tmp_path, toml)).runs
     assert (run.t[0], run.t[-1]) == (0.0, 9.0)
-    assert (run.fit.sum(), run.test.sum()) == (401, 251)
+    assert (run.fit.sum() + run.choose.sum(), run.test.sum()) == (401, 251)
 
 
 def test_two_files_are_two_runs(tmp_path):
@@ -69,17 +69,41 @@ def test_two_files_are_two_runs(tmp_path):
         'data = "data.csv"\ntime', "time"
     )
     first, second = read(write(tmp_path, toml)).runs
-    assert first.fit.all()
+    assert np.all(first.fit ^ first.choose)
     assert not first.test.any()
     assert second.test.all()
-    assert not second.fit.any()
+    assert not np.any(second.fit | second.choose)
+
+
+def test_what_chooses_is_a_fifth_spread_over_what_identifies(tmp_path):
+    (run,) = read(write(tmp_path)).runs
+    assert run.choose.sum() == pytest.approx(0.2 * 601, abs=15)
+    starts = np.flatnonzero(np.diff(run.choose.astype(int)) == 1) + 1
+    assert len(starts) == 5
+    assert np.diff(run.t[starts]) == pytest.approx(1.2, abs=0.15)
+
+
+def test_a_window_to_choose_is_taken_as_it_is_given(tmp_path):
+    toml = GOOD.replace("identify = [0.0, 6.0]", "identify = [0.0, 5.0]\nchoose = [5.0, 6.0]")
+    (run,) = read(write(tmp_path, toml)).runs
+    assert run.t[run.fit][-1] == 5.0
+    assert (run.t[run.choose][0], run.t[run.choose][-1]) == (run.t[501], 6.0)
+
+
+def test_a_file_to_choose_is_a_run_of_its_own(tmp_path):
+    split = 'identify_data = "data.csv"\nchoose_data = "data.csv"\ntest_data = "data.csv"'
+    toml = GOOD.replace("identify = [0.0, 6.0]\ntest = [6.0, 10.0]", split).replace(
+        'data = "data.csv"\ntime', "time"
+    )
+    parts = [[run.fit.all(), run.choose.all(), run.test.all()] for run in read(write(tmp_path, toml)).runs]
+    assert parts == np.eye(3, dtype=bool).tolist()
 
 
 def test_without_a_split_nothing_is_held_out(tmp_path):
     toml = GOOD.replace("[split]\nidentify = [0.0, 6.0]\ntest = [6.0, 10.0]\n", "")
     (run,) = read(write(tmp_path, toml)).runs
     assert run.fit.all()
-    assert not run.test.any()
+    assert not np.any(run.choose | run.test)
 
 
 def test_a_derived_column_is_the_derivative(tmp_path):
@@ -112,7 +136,7 @@ def test_shared_experiments_load(file):
     record = load_record(e, FmuDescription(e.id, "2.0", e.id, "{0}", described))
     (run,) = record.runs
     assert record.notes == ()
-    assert run.fit.sum() + run.test.sum() == run.t.size
+    assert np.all(run.fit.astype(int) + run.choose + run.test == 1)
     assert np.isfinite(record.noise_std).all()
 
 

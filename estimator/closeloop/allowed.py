@@ -1,6 +1,6 @@
-"""Laws that the part to identify cannot tell apart, on the held-out part: as near as their errors allow.
+"""Laws that the part to identify cannot tell apart, on the part to choose: as near as their errors allow.
 
-A parameter that the part to identify hardly shows, as friction that saturates in the held-out part alone,
+A parameter that the part to identify hardly shows, as friction that saturates in the part to choose alone,
 would else decide between them by where each fit came to rest.
 """
 
@@ -17,7 +17,7 @@ from estimator.closeloop.screen import built
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-APART = 20.0  # log score between them, from which the held-out part tells what the other does not
+APART = 20.0  # log score between them, from which the part to choose tells what the other does not
 MOST = 8  # laws that are looked at
 REACH = 3.0  # standard errors, that a value may be moved by
 STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
@@ -26,7 +26,7 @@ STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard error
 def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
     """Ranked single hypotheses, those that leave noise alone in the part to identify as their errors allow.
 
-    Only their residuals differ, and only where the held-out part sets them apart or from noise.
+    Only their residuals differ, and only where the part to choose sets them apart or from noise.
     """
     alike = [h for h in found if problem.record.floor_known and leaves_noise(h)][:MOST]
     if not alike or not _set_apart(problem, alike, size):
@@ -37,7 +37,7 @@ def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[
 
 def _set_apart(problem: Problem, alike: Sequence[Hypothesis], size: Array) -> bool:
     scores = [float(h.scores(problem, size).sum()) for h in alike]
-    samples = alike[0].held_out(problem).size
+    samples = alike[0].of(problem, "choose").size
     return max(scores) - min(scores) > APART or -2 * max(scores) > samples + CHANCE * np.sqrt(2 * samples)
 
 
@@ -55,7 +55,7 @@ def _as_errors_allow(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis
         return here.residuals(dict(zip((u.name for u in unknowns), best + z * error, strict=True)))
 
     def misfit(z: Array) -> Array:
-        left = np.concatenate([r[run.test] for r, run in zip(residuals(z), runs, strict=True)])
+        left = np.concatenate([r[run.choose] for r, run in zip(residuals(z), runs, strict=True)])
         return np.concatenate([(left / size).ravel(), root @ z])
 
     def slopes(z: Array) -> Array:

@@ -20,7 +20,7 @@ SAME = 0.01  # relative difference of the residual below which a small differenc
 def equivalent(
     problem: Problem, best: Hypothesis, others: Sequence[Hypothesis], size: Array
 ) -> list[Hypothesis]:
-    """The class of the best hypothesis: those that the held-out data do not tell from it, nor the others.
+    """The class of the best hypothesis: those that the part to choose does not tell from it, nor the others.
 
     Where the FMU's form leaves something open, the whole record tells, as forms differ from one part to the
     next, and what the best one leaves is no measure of a small difference.

@@ -1,14 +1,16 @@
-"""The chain: calibrate, detect, nominate, fit jointly, compare on held-out data, judge."""
+"""The chain: calibrate, detect, nominate, fit jointly, choose, judge, hold the answer against the test."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import count
 
 import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.closeloop.allowed import allowed
 from estimator.closeloop.calibrate import calibrate
-from estimator.closeloop.compare import Hypothesis
+from estimator.closeloop.compare import Hypothesis, beats, ranked
 from estimator.closeloop.curvature import confirmed
 from estimator.closeloop.detect import LEVEL, detect
 from estimator.closeloop.freeform import free_form
@@ -19,10 +21,11 @@ from estimator.closeloop.noise import noise_floor
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.problem import Problem
 from estimator.closeloop.progress import Progress, Tell
+from estimator.closeloop.reweighted import best_weights, fitted_again, rescaled
 from estimator.closeloop.screened import Screened, screened
 from estimator.closeloop.search import Search
 from estimator.closeloop.stages import Stages
-from estimator.closeloop.verdict import Judgement, judge, without_fits
+from estimator.closeloop.verdict import Judgement, confirmed_on_test, judge, without_fits
 from estimator.record import Array
 
 
@@ -70,37 +73,79 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
         return Outcome(*found, (), (), early, owed)
     search = Search(shown, tell, jobs)
     singles, pairs = search.run()
-    leading, judgement = _judged(shown, forces, singles, pairs, tell)
-    if leading.members and not judgement.members and len(leading.members[0].candidates) == 1:
-        more = search.instead(leading.members[0], singles)
-        if more != singles:
-            singles = more
-            _, judgement = _judged(shown, forces, singles, pairs, tell, again=True)
-    tell("intervals", "asking how far its parameters may be from there")
-    judgement = stages.done("intervals", lambda: _profiled(problem, judgement, size, jobs))
+    if not problem.record.floor_known and (singles or pairs):
+        tell("weights", "weighting the residuals by what the best fit leaves")
+        base, size, singles, pairs = stages.done(
+            "weights", lambda: _weighted_anew(shown, singles, pairs, jobs)
+        )
+        shown = replace(shown, base=base, size=size)
+        found = (declared, base, noise, size, *found[4:])
+    singles, pairs, judgement = _answered(shown, forces, search, singles, pairs, tell)
+    tell("test", "holding the answer against the test part")
+    judgement = confirmed_on_test(problem, base, judgement, size)
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
-        owed = replace(owed, free_form=curve)
-    final = {h.key: h for h in judgement.members}
-    singles, pairs = ([final.get(h.key, h) for h in some] for some in (singles, pairs))
+        if curve and beats(problem, curve, base, size, "test"):
+            owed = replace(owed, free_form=curve)
     return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
+
+
+def _weighted_anew(
+    shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], jobs: int
+) -> tuple[Hypothesis, Array, list[Hypothesis], list[Hypothesis]]:
+    """Base, size of a residual that counts as one, singles and pairs, best first, all by new weights."""
+    problem, before = shown.problem, shown.size
+    size = best_weights(problem, [*singles, *pairs])
+    ones, twos = (fitted_again(problem, found, before, size, jobs) for found in (singles, pairs))
+    return rescaled(shown.base, before, size), size, ranked(problem, ones, size), ranked(problem, twos, size)
+
+
+def _answered(
+    shown: Screened, forces: Sequence[MissingForce], search: Search,
+    singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], tell: Progress,
+) -> tuple[list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
+    """Single hypotheses and pairs, best first, and their judgement, whose members are as it saw them.
+
+    What is named has its errors taken from the sum of squares, which may also move it. It is judged again
+    with these, until nothing is named that was not judged so: each is asked once, so that this ends.
+    """
+    problem, size, done = shown.problem, shown.size, shown.stages.done
+    asked: set[tuple[str, ...]] = set()
+    denied: Hypothesis | None = None
+    for turn in count():
+        tell("verdict", "asking whether it is the law's curve")
+        leading, judgement = _judged(shown, forces, singles, pairs, f"verdict {turn}")
+        alone = leading.members and not judgement.members and len(leading.members[0].candidates) == 1
+        if alone and denied is None:
+            denied = leading.members[0]
+            singles = search.instead(denied, singles)
+            continue
+        members = [h for h in judgement.members if h.key not in asked]
+        if not members:
+            break
+        tell("intervals", "asking how far its parameters may be from there")
+        found = done(f"intervals {turn}", partial(_profiled, problem, members, size, search.jobs))
+        asked |= {h.key for h in members}
+        final = {h.key: h for h in found}
+        singles, pairs = (
+            ranked(problem, [final.get(h.key, h) for h in some], size) for some in (singles, pairs)
+        )
+    return list(singles), list(pairs), judgement.of([*singles, *pairs])
 
 
 def _judged(
     shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
-    pairs: Sequence[Hypothesis], tell: Progress, again: bool = False,
+    pairs: Sequence[Hypothesis], stage: str,
 ) -> tuple[Judgement, Judgement]:  # fmt: skip
     """What the comparison says, and what is left where each law is asked whether it is the force's curve."""
     problem, base, size, done = shown.problem, shown.base, shown.size, shown.stages.done
-    tell("verdict", "asking whether it is the law's curve")
-    which = " again" if again else ""
-    judged = done(f"allowed{which}", lambda: allowed(problem, singles, size))
+    judged = done(f"allowed {stage}", lambda: allowed(problem, singles, size))
     leading = judge(problem, base, judged, pairs, shown.noise, size, shown.began).of([*singles, *pairs])
-    return leading, done(f"verdict{which}", lambda: confirmed(problem, base, leading, forces, size))
+    return leading, done(stage, lambda: confirmed(problem, base, leading, forces, size))
 
 
-def _profiled(problem: Problem, judgement: Judgement, size: Array, jobs: int) -> Judgement:
-    """The judgement with the errors of its members as the sum of squares says."""
-    tasks = (delayed(profiled)(problem, h, size) for h in judgement.members)
-    return replace(judgement, members=tuple(Parallel(min(jobs, len(judgement.members) or 1))(tasks)))
+def _profiled(problem: Problem, members: Sequence[Hypothesis], size: Array, jobs: int) -> list[Hypothesis]:
+    """Hypotheses with their errors as the sum of squares says."""
+    tasks = (delayed(profiled)(problem, h, size) for h in members)
+    return list(Parallel(min(jobs, len(members)))(tasks))

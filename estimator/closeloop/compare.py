@@ -8,7 +8,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.closeloop.candidates import Candidate
-from estimator.closeloop.fit import BLOCKS, Fit, fit
+from estimator.closeloop.fit import BLOCKS, REFUSED, Fit, fit
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built, key, label
 from estimator.closeloop.slopes import STEP
@@ -16,7 +16,7 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-Part = Literal["fit", "test"]  # of a record: to identify, held out
+Part = Literal["fit", "choose", "test", "unseen"]  # of a record, as the masks of a Run
 BRIEF, LONG = 4, 20  # steps of a fit to rank it, and to finish it
 FINALISTS = 5
 GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
@@ -71,32 +71,32 @@ class Hypothesis:
         own = self.own
         return [u for u in self.fit.unknowns if u.name not in own]
 
-    def rms(self, problem: Problem) -> Array:
-        """Root mean square of the residual on the held-out part, (n_y,)."""
-        held_out: Array = np.sqrt(np.mean(self.held_out(problem) ** 2, axis=0))
-        return held_out
-
-    def held_out(self, problem: Problem) -> Array:
-        """Residual on the held-out part, (m, n_y)."""
-        return self.of(problem, "test")
+    def rms(self, problem: Problem, part: Part) -> Array:
+        """Root mean square of the residual on a part of the record, (n_y,)."""
+        return np.asarray(np.sqrt(np.mean(self.of(problem, part) ** 2, axis=0)))
 
     def of(self, problem: Problem, part: Part) -> Array:
         """Residual on a part of the record, (m, n_y)."""
         runs = zip(self.residuals, problem.record.runs, strict=True)
         return np.concatenate([r[getattr(run, part)] for r, run in runs])
 
-    def scores(self, problem: Problem, size: Array) -> Array:
-        """Log score of each block of the held-out part, up to a constant, (BLOCKS,)."""
-        squares = np.sum((self.held_out(problem) / size) ** 2, axis=1)
+    def scores(self, problem: Problem, size: Array, part: Part = "choose") -> Array:
+        """Log score of each block of a part of the record, up to a constant, (BLOCKS,)."""
+        squares = np.sum((self.of(problem, part) / size) ** 2, axis=1)
         return np.array([-0.5 * b.sum() for b in np.array_split(squares, BLOCKS)])
 
-    def significance(self) -> list[float]:
+    def significance(self, base: "Hypothesis | None" = None) -> list[float]:
         """Size of each candidate's amplitudes over their standard error; infinite where they are fixed.
 
         Where more is known, the root of its worth: the stiffness of a stop so hard that nothing enters it has
-        no upper bound, and a standard error as large as itself, but without the stop nothing fits.
+        no upper bound, and a standard error as large as itself, but without the stop nothing fits. base: the
+        fit without effects, which tells what a single one is worth. The worth counts for less where residuals
+        are correlated, by as much as the variance of the amplitudes is larger than in white noise.
         """
         names = [u.name for u in self.fit.unknowns]
+        worth = dict(self.worth)
+        if base is not None and len(self.candidates) == 1:
+            worth.setdefault(self.candidates[0].label, cost(base) - cost(self))
         found = []
         for c in self.candidates:
             i = [names.index(u.name) for u in c.amplitudes if u.name not in c.fixed]
@@ -105,7 +105,8 @@ class Hypothesis:
                 continue
             value, covariance = self.fit.values[i], self.fit.covariance[np.ix_(i, i)]
             z = float(np.sqrt(value @ np.linalg.pinv(covariance) @ value))
-            found.append(max(z, float(np.sqrt(max(self.worth.get(c.label, 0.0), 0.0)))))
+            over = float(np.min(self.fit.inflation[i]))
+            found.append(max(z, float(np.sqrt(max(worth.get(c.label, 0.0), 0.0) / over))))
         return found
 
 
@@ -121,7 +122,8 @@ def hypothesis(
 ) -> Hypothesis | None:
     """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
 
-    known, guess, step: see `fit`. None where the FMU does not run with them.
+    known, guess, step: see `fit`. None where the FMU does not run with them, or runs away: a residual that is
+    not finite, or of the size that stands for a refusal, is no answer.
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
@@ -129,6 +131,8 @@ def hypothesis(
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
+        return None
+    if not all(np.all(np.abs(r) < REFUSED * size) for r in residuals):
         return None
     return Hypothesis(promise.candidates, found, tuple(residuals))
 
@@ -271,7 +275,7 @@ def leaves_noise(h: Hypothesis) -> bool:
 
 
 def ranked(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
-    """Best first, by log score on the held-out part.
+    """Best first, by log score on the part to choose.
 
     Where the FMU's form leaves something open, by that of the whole record: forms differ from one part to the
     next, and what acts in one part alone would lose to what makes up for form in the other.
@@ -280,21 +284,23 @@ def ranked(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[H
     return sorted(found, key=lambda h: share * cost(h) - float(h.scores(problem, size).sum()))
 
 
-def lead(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array) -> tuple[float, float]:
-    """Sum over blocks of the log score of a over b, and its standard error."""
-    difference = a.scores(problem, size) - b.scores(problem, size)
+def lead(
+    problem: Problem, a: Hypothesis, b: Hypothesis, size: Array, part: Part = "choose"
+) -> tuple[float, float]:
+    """Sum over blocks of the log score of a over b on a part of the record, and its standard error."""
+    difference = a.scores(problem, size, part) - b.scores(problem, size, part)
     return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(len(difference)))
 
 
-def beats(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array) -> bool:
-    """Whether a is better than b by more than TELLING standard errors."""
-    mean, error = lead(problem, a, b, size)
+def beats(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array, part: Part = "choose") -> bool:
+    """Whether a is better than b by more than TELLING standard errors over blocks of a part."""
+    mean, error = lead(problem, a, b, size, part)
     return mean > TELLING * error
 
 
 def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
-    """What the sum of squares of the held-out part has more than noise would."""
-    return float(np.sum((h.held_out(problem) / size) ** 2 - 1))
+    """What the sum of squares of the part to choose has more than noise would."""
+    return float(np.sum((h.of(problem, "choose") / size) ** 2 - 1))
 
 
 def beyond_noise_of_all(problem: Problem, h: Hypothesis, size: Array) -> float:

@@ -1,8 +1,9 @@
 """Is there a discrepancy, and does it matter? Tested against records simulated without any effect.
 
-The reference distribution is a parametric bootstrap: free runs of the calibrated FMU with noise
-added, calibrated again (through the FMU's sensitivities, to first order) and judged on the same
-held-out part by the same figures.
+The reference distribution is a parametric bootstrap to first order: white noise of the record's size is
+drawn for all parts, what calibration to the noise of the identify part changes in the parts that no fit has
+seen follows from the FMU's sensitivities, and the same figures are computed. The FMU itself is not simulated
+again, so the reference is as good as the FMU is linear in its unknowns within their standard errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from estimator.record import Array
 
 REPLICATES = 499
 LEVEL = 0.01  # probability of calling noise a discrepancy
-SLOW_BLOCKS = 40  # pieces of the held-out part whose means show slow residuals
+SLOW_BLOCKS = 40  # pieces of what no fit has seen, whose means show slow residuals
 SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
 BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
@@ -54,17 +55,17 @@ def detect(
     likeness, sets_in: see `matters`.
     """
     runs = problem.record.runs
-    fit_mask, test_mask = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "test"))
-    held_out = np.concatenate(base.residuals)[test_mask] / noise
+    fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
+    left = np.concatenate(base.residuals)[unseen] / noise
     slopes = _sensitivities(problem, base, noise)
     g = _directions(screened.jacobian, regressors) if regressors else None
-    observed = _figures(held_out)
+    observed = _figures(left)
     n = slopes.shape[2]
     # noise in the part to identify moves the unknowns by root @ white noise
-    root = np.linalg.pinv(np.linalg.qr(slopes[fit_mask].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
-    late, copies = slopes[test_mask], []
+    root = np.linalg.pinv(np.linalg.qr(slopes[fitted].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
+    late, copies = slopes[unseen], []
     for _ in range(REPLICATES):
-        e = rng.standard_normal(held_out.shape)
+        e = rng.standard_normal(left.shape)
         if n:
             e -= late @ (root @ rng.standard_normal(root.shape[1]))
         copies.append(_figures(e))
@@ -93,13 +94,13 @@ def matters(
     """Whether a residual is too large to be left alone, in any output and either part of the record.
 
     Compared with the signal is what it has beyond noise, beyond what chance makes of that too. Where the
-    FMU's form leaves something open, the held-out part alone counts, and less than form leaves matters only
+    FMU's form leaves something open, what no fit has seen counts alone; less than form leaves matters only
     if one effect could explain much of it, or if it sets in during the record, as no form does.
     likeness: share of what is beyond noise that one effect could explain, by linear regression; clear:
     whether it is so much like one that noise never is.
     """
-    signal, rms, form_open = signal_size(problem), base.rms(problem), problem.form_error > 0
-    beyond = _beyond(problem, base, noise, "test")
+    signal, rms, form_open = signal_size(problem), base.rms(problem, "unseen"), problem.form_error > 0
+    beyond = _beyond(problem, base, noise, "unseen")
     if not form_open:
         beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
     least = SLIGHT if clear and not form_open else BEYOND
@@ -118,8 +119,8 @@ def _beyond(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> Arr
 
 
 def signal_size(problem: Problem) -> Array:
-    """Root mean square of each output on the held-out part, (n_y,)."""
-    measured = np.concatenate([run.y[run.test] for run in problem.record.runs])
+    """Root mean square of each output on the parts that no fit has seen, (n_y,)."""
+    measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
@@ -153,9 +154,9 @@ def _likeness_of_noise(g: Array, rng: np.random.Generator) -> Array:
     return np.asarray(np.max(drawn**2, axis=1))
 
 
-def _figures(held_out: Array) -> dict[str, float]:
-    means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(held_out, SLOW_BLOCKS)])
+def _figures(left: Array) -> dict[str, float]:
+    means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(left, SLOW_BLOCKS)])
     return {
-        "size of the held-out residual": float(np.max(np.mean(held_out**2, axis=0))),
-        "slow part of the held-out residual": float(np.max(np.mean(means**2, axis=0))),
+        "size of the residual that no fit has seen": float(np.max(np.mean(left**2, axis=0))),
+        "slow part of the residual that no fit has seen": float(np.max(np.mean(means**2, axis=0))),
     }

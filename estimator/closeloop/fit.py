@@ -70,6 +70,17 @@ class Fit:
         )
 
     @property
+    def inflation(self) -> Array:
+        """Variance of each value over that in white noise, (n,), at least 1: what correlated residuals do."""
+        scale = np.array([u.scale for u in self.unknowns])
+        width = np.array([u.high - u.low for u in self.unknowns])
+        white, as_they_are = (
+            np.diag(sandwich(r, self.jacobian, scale, width))
+            for r in (np.zeros_like(self.residual), self.residual)
+        )
+        return np.asarray(np.maximum(as_they_are / np.maximum(white, 1e-300), 1.0))
+
+    @property
     def std(self) -> dict[str, float]:
         """Standard errors by name."""
         deviation = np.sqrt(np.maximum(np.diag(self.covariance), 0))

@@ -69,10 +69,10 @@ def free_form(
     jobs: int,
     near: Sequence[Hypothesis] = (),
 ) -> Hypothesis | None:
-    """The force of free form that is best on the held-out part, fitted jointly; None where none is better.
+    """The force of free form that is best on the part to choose, fitted jointly; None where none is better.
 
     near: effects that came nearest, best first, whose ports are tried too. Better than the base means by
-    TELLING standard errors over blocks of the held-out part.
+    TELLING standard errors over blocks of that part.
     """
     candidates = [c for d in dependences(problem, forces) for c in _candidates(problem, d, forces)]
     if not candidates:

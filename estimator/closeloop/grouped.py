@@ -18,13 +18,20 @@ ENOUGH = 6000  # groups on the identify part
 
 
 def group_size(problem: Problem, simulated: Array) -> int:
-    """How many samples of the identify part are one; simulated: outputs (N, n_y) of the first run."""
+    """How many fitted samples are one; simulated: outputs (N, n_y) of the first run.
+
+    A group lies within a stretch of fitted samples: each stretch has to begin and end at a multiple of it.
+    """
     runs = [run for run in problem.record.runs if run.fit.any()]
-    index = np.flatnonzero(runs[0].fit)
-    if len(runs) > 1 or len(index) != index[-1] + 1:
+    fitted = runs[0].fit
+    if len(runs) > 1 or not fitted[0]:
         return 1
-    y = simulated[: len(index)]
+    edges = np.flatnonzero(np.diff(fitted)) + 1
+    inside = edges[edges <= np.flatnonzero(fitted)[-1]]
+    y = simulated[fitted]
     for n in GROUPS:
+        if np.any(inside % n):
+            continue
         groups = y[: len(y) // n * n].reshape(-1, n, y.shape[1])
         if len(groups) >= ENOUGH and np.all(groups.var(axis=1).mean(axis=0) <= LOST * y.var(axis=0)):
             return n

@@ -12,7 +12,7 @@ import numpy as np
 from estimator.closeloop.candidates import Candidate
 from estimator.closeloop.compare import Hypothesis, cost, finished
 from estimator.closeloop.dating import begins, moments_near
-from estimator.closeloop.fit import Fit, fit, sandwich, weighted
+from estimator.closeloop.fit import Fit, fit, weighted
 from estimator.closeloop.problem import Problem, Unknown
 from estimator.closeloop.screen import Promise, built
 from estimator.closeloop.settled import lower, settled
@@ -139,15 +139,7 @@ def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[floa
 
 def _usual(h: Hypothesis, i: int) -> float:
     """What a rise of the sum of squares is divided by for the i-th unknown, as residuals are not white."""
-    return float(max(np.sqrt(h.fit.covariance[i, i]) / _white(h)[i], 1.0) ** 2)
-
-
-def _white(h: Hypothesis) -> Array:
-    """Standard errors (n,) in white noise."""
-    scale = np.array([u.scale for u in h.fit.unknowns])
-    width = np.array([u.high - u.low for u in h.fit.unknowns])
-    covariance = sandwich(np.zeros_like(h.fit.residual), h.fit.jacobian, scale, width)
-    return np.asarray(np.sqrt(np.diag(covariance)))
+    return float(h.fit.inflation[i])
 
 
 def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> Fit:

@@ -26,9 +26,12 @@ SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
 Changes = Sequence[tuple[Candidate, Array]]
 
 
-def idle(h: Hypothesis) -> list[Candidate]:
-    """Members whose amplitude is not clear of zero."""
-    return [c for c, z in zip(h.candidates, h.significance(), strict=True) if z < SIGNIFICANT]
+def idle(h: Hypothesis, base: Hypothesis | None = None) -> list[Candidate]:
+    """Members whose amplitude is not clear of zero.
+
+    base: the FMU without effects, which tells what a single one is worth.
+    """
+    return [c for c, z in zip(h.candidates, h.significance(base), strict=True) if z < SIGNIFICANT]
 
 
 def try_pairs(

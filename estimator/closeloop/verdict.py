@@ -39,7 +39,6 @@ Verdict = Literal[
 ]
 MOVES = 3.0  # times the noise: an output that moves less shows nothing
 GAP = 0.95  # share of the gap to the noise that an effect must close where noise is declared
-WON = 10.0  # log score over the FMU without the effect, on held-out data
 CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residual that is noise
 FORM_EXPLAINED = 0.9  # share of the variance beyond the noise, where the FMU's form leaves something open
 HALF = 0.5  # the same that one effect has to explain of all outputs together
@@ -71,16 +70,17 @@ def gap_closed(before: Array, after: Array, noise: Array) -> Array:
 
 
 def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> bool:
-    """Whether a hypothesis accounts for the discrepancy on the held-out part.
+    """Whether a hypothesis accounts for the discrepancy on the part to choose.
 
+    Every effect must be clear of zero, and the whole better than without it over the blocks of that part.
     Outputs with declared noise must come down to it, or nearly so; the others must lose most of their
-    variance. Of several effects every one must be clear of zero, and the whole better than without.
+    variance.
     """
-    if (len(h.candidates) > 1 and idle(h)) or lead(problem, h, base, size)[0] < WON:
+    if idle(h, base) or not beats(problem, h, base, size):
         return False
     declared = ~np.isnan(problem.record.noise_std)
     squares = [
-        np.mean((x.held_out(problem) / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
+        np.mean((x.of(problem, "choose") / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
         for x in (h, base)
     ]
     enough = squares[0] <= (1 - EXPLAINED) * squares[1] if (~declared).any() else True
@@ -89,8 +89,8 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
 
 def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> BoolArray:
     """Whether a hypothesis brings each output (n_y,) down to its noise, or to what the FMU's form leaves."""
-    before, after = base.rms(problem), h.rms(problem)
-    scatter = SCATTER / np.sqrt(2 * len(h.held_out(problem)))
+    before, after = base.rms(problem, "choose"), h.rms(problem, "choose")
+    scatter = SCATTER / np.sqrt(2 * len(h.of(problem, "choose")))
     found: BoolArray = (after < (CLEAN + scatter) * noise) | (gap_closed(before, after, noise) >= GAP)
     if problem.form_error > 0:
         found |= _reached_in_form(problem, h, base, noise, size)
@@ -108,7 +108,7 @@ def _reached_in_form(
     share, what was small does not grow; where all was small, so that it could be form too, several explain
     nearly all. A fault of a sensor may also leave the others as they are, if nearly all goes from its own.
     """
-    before, after = base.rms(problem), h.rms(problem)
+    before, after = base.rms(problem, "choose"), h.rms(problem, "choose")
     left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
     gone = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
     if np.any(_faulty(problem, h) & gone & (was >= BEYOND**2)):
@@ -134,7 +134,7 @@ def _faulty(problem: Problem, h: Hypothesis) -> BoolArray:
 
 def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:
     """The verdict where no effect needs to be looked for, or None."""
-    measured = np.concatenate([run.y[run.test] for run in problem.record.runs])
+    measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
     if not detection.detected:
         if np.all(np.std(measured, axis=0) < MOVES * noise):
             reason = "no output moves out of its noise, so that no effect could have been seen"
@@ -143,11 +143,27 @@ def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise
             "no_discrepancy", (), f"the residual is what noise would leave (p = {detection.p_value:.2g})"
         )
     if not detection.material:
-        size = ", ".join(f"{r:.2f}" for r in base.rms(problem) / noise)
+        size = ", ".join(f"{r:.2f}" for r in base.rms(problem, "unseen") / noise)
         reason = f"the residual is more than noise, but too small to matter ({size} times the noise)"
         return Judgement("no_discrepancy", (), reason)
     dead = [n.sentence for n in problem.record.notes if n.kind == "constant"]
     return Judgement("sensor_fault", (), "; ".join(dead)) if dead else None
+
+
+def confirmed_on_test(problem: Problem, base: Hypothesis, found: Judgement, size: Array) -> Judgement:
+    """The judgement, held once against the part that neither fitting nor choosing has used.
+
+    The best member must be better than the FMU without it there too; else nothing is claimed. The others of
+    its class are not asked, for that would choose among them.
+    """
+    if not found.members or beats(problem, found.members[0], base, size, "test"):
+        return found
+    gained, error = lead(problem, found.members[0], base, size, "test")
+    reason = (
+        f"{found.members[0].label} accounts for the part to choose, but the test part does not confirm it: "
+        f"its log score changes by {gained:.3g} with a standard error of {error:.2g} there"
+    )
+    return Judgement("unexplained", (), reason, "a record in which what was seen appears in all three parts")
 
 
 def judge(
@@ -181,11 +197,11 @@ def judge(
         )
         return Judgement("no_discrepancy", (), reason)
     if _noise_alone(problem, base, noise, "fit"):
-        reason = "the part to identify shows no more than noise: what there is begins in the held-out part"
+        reason = "the part to identify shows no more than noise: what there is begins after it"
         return Judgement("unexplained", (), reason, "a split with some of it in the part to identify")
-    if _noise_alone(problem, base, noise, "test"):
-        reason = "the held-out part shows no more than noise: what there is ends before, unconfirmed"
-        return Judgement("unexplained", (), reason, "a split with some of it in the held-out part")
+    if _noise_alone(problem, base, noise, "choose"):
+        reason = "the part to choose shows no more than noise: what there is ends before, unconfirmed"
+        return Judgement("unexplained", (), reason, "a split with some of it in the part to choose")
     nearest = singles[0].label if singles else "none"
     return Judgement(
         "unexplained", (), f"no effect of the library accounts for the residual; nearest was {nearest}"
@@ -216,7 +232,7 @@ def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Arra
 
 
 def outgrown(m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:
-    """Whether m, which held-out data do not tell from h, leaves what h could explain of the identify part.
+    """Whether m, which the part to choose does not tell from h, leaves what h explains of the identify part.
 
     h: a law that becomes m, or m and one more. A right law gains alike on both parts; where the richer one
     gains on one alone, both are wrong.
@@ -260,7 +276,7 @@ def no_law(h: Hypothesis, law: Candidate | None = None) -> Judgement:
 
 def _not_all(m: Hypothesis, h: Hypothesis) -> Judgement:
     reason = (
-        f"{m.label} accounts for the held-out part, but not for the part to identify, where {h.label} would"
+        f"{m.label} accounts for the part to choose, but not for the part to identify, where {h.label} would"
     )
     return Judgement("unexplained", (), reason)
 

@@ -14,7 +14,7 @@ from scenarios.page.typography import label
 
 def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None) -> Plot:
     """Residual of the output that stands out most from its noise, and the first law found, if any."""
-    j = int(np.argmax(found.base.rms(problem) / found.noise))
+    j = int(np.argmax(found.base.rms(problem, "test") / found.noise))
     name, laws = problem.record.outputs[j], laws_found(found)
     ratios = [1.35, 1] if laws else [1]
     figure, axes = sheet(2.7, [["residual", "law"][: len(ratios)]], width_ratios=ratios)

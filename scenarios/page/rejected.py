@@ -21,7 +21,7 @@ NIL = 0.05  # a score or a significance that is nothing
 
 @dataclass(frozen=True)
 class Rejected:
-    """A rejected hypothesis: errors by output, and how far the best leads it on held-out data."""
+    """A rejected hypothesis: errors by output, and how far the best leads it on the part to choose."""
 
     name: str
     errors: list[str]
@@ -30,7 +30,7 @@ class Rejected:
 
 
 def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
-    """All rejected hypotheses, best first on held-out data."""
+    """All rejected hypotheses, best first on the part to choose."""
     best = found.chosen or found.base
     others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
     others.sort(key=lambda h: lead(problem, best, h, found.size)[0])
@@ -41,7 +41,7 @@ def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
     score, error = lead(problem, found.chosen or found.base, h, found.size)
     return Rejected(
         title(h),
-        [number(v) for v in h.rms(problem)],
+        [number(v) for v in h.rms(problem, "test")],
         f"{number(-score)}{HELD}±{HELD}{number(error, 2)}" if abs(score) >= NIL else "0",
         "; ".join(reasons(problem, found, h)),
     )
@@ -49,9 +49,9 @@ def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
 
 def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """Why a hypothesis was rejected, most telling first."""
-    weak = idle(h)
+    weak = idle(h, found.base)
     for c in weak:
-        z = h.significance()[h.candidates.index(c)]
+        z = h.significance(found.base)[h.candidates.index(c)]
         which = f" of {candidate_words(c)}" if len(h.candidates) > 1 else ""
         from_zero = f"only {number(z, 2)} standard errors from zero ({SIGNIFICANT:g} needed)"
         yield f"size{which} {from_zero if z >= NIL else 'zero'}"
@@ -69,7 +69,7 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 
 def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """What a hypothesis leaves of the residual, where that is too much."""
-    over, declared = h.rms(problem) / found.noise, ~np.isnan(problem.record.noise_std)
+    over, declared = h.rms(problem, "choose") / found.noise, ~np.isnan(problem.record.noise_std)
     short = np.flatnonzero(declared & ~reached(problem, h, found.base, found.noise, found.size))
     if short.size:
         j = short[np.argmax(over[short])]
@@ -85,7 +85,7 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 
 
 def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
-    squares: Array = (h.rms(problem) / found.size) ** 2
+    squares: Array = (h.rms(problem, "choose") / found.size) ** 2
     return squares
 
 
@@ -98,8 +98,8 @@ def detection_words(found: Outcome) -> str:
     size = "large enough to matter" if d.material else "too small to matter"
     return (
         f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {LEVEL:g} it "
-        f"counts) and {size}. It was held against {REPLICATES} records that the calibrated FMU gives with "
-        "noise alone, calibrated like the measured one."
+        f"counts) and {size}. It was held against {REPLICATES} draws of white noise of the record's size; "
+        "what calibration to that noise would change follows from the FMU's sensitivities, to first order."
     )
 
 

@@ -62,6 +62,7 @@ def _run(run: Run) -> Row:
         "duration": f"{short(run.t[-1] - run.t[0])} s",
         "samples": f"{len(run.t)} at {short(1 / step)} Hz",
         "identify": _window(run, run.fit),
+        "choose": _window(run, run.choose),
         "test": _window(run, run.test),
     }
 

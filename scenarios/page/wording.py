@@ -54,7 +54,7 @@ def gap_words(case: Case, closes: str = "It closes") -> str:
     """How much of the gap is closed, judged by the output where it is least."""
     shares = case.gaps.values()
     if not shares:
-        return "No output had a gap to its noise on the held-out part."
+        return "No output had a gap to its noise on the test part."
     least = "at least " if len(shares) > 1 else ""
     return f"{closes} {least}{percent(min(shares))} of the gap between model and measurement."
 
@@ -104,9 +104,9 @@ def _ambiguous(case: Case) -> Story:
     return Story(
         f"{capital(names)} explains what the model misses; this record cannot tell which. "
         + gap_words(case, "The first closes"),
-        "Each of them accounts for the residual, and the held-out data do not tell them apart beyond chance "
-        "and small differences of form. None may be taken for the cause before the run named in section 6 "
-        "has been made.",
+        "Each of them accounts for the residual, and the part to choose does not tell them apart beyond "
+        "chance and small differences of form. None may be taken for the cause before the run named in "
+        "section 6 has been made.",
         "The class has these members, best first. The figures and the augmented FMU show the first.",
     )
 
