@@ -40,7 +40,7 @@ def equivalent(
         if problem.form_error > 0:
             told = mean + behind / 2 >= max(price, alike)
         else:
-            worse = problem.record.floor_known and h.fit.converged and behind > max(CURVE, SAME * cost(best))
+            worse = h.fit.converged and behind > max(CURVE, SAME * cost(best))
             told = worse or (mean >= max(price, alike) and beats(problem, best, h, size))
         if not told:
             members.append(h)

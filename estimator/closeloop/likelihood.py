@@ -34,8 +34,6 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     are linear in their parameters stay as they are. Moments are tried one after the other, as the sum of
     squares is rugged in them.
     """
-    if not problem.record.floor_known:
-        return h
     before: list[Hypothesis] = []
     for _ in range(ROUNDS):
         h = settled(problem, h, size)
