@@ -11,10 +11,10 @@ export OPENBLAS_NUM_THREADS ?= 1
 demo: .venv/ready  ## build the FMU, close the loop on the bundled record, name the report
 	$(BIN)/railfmi build testrig --out $(OUT)/demo
 	$(BIN)/railfmi check $(OUT)/demo/Testrig.fmu
-	$(BIN)/railfmi close-loop scenarios/demo/rig-drag --out $(OUT)/demo
+	$(BIN)/railfmi close-loop scenarios/shipped/demo/rig-drag --out $(OUT)/demo
 
 scenarios: .venv/ready  ## all scenarios, with their figures and a contact sheet
-	$(BIN)/railfmi run scenarios/*.toml --out $(OUT)/scenarios
+	$(BIN)/railfmi run scenarios/shipped/*.toml --out $(OUT)/scenarios
 
 test: .venv/ready-dev  ## everything that is fast
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
@@ -37,7 +37,7 @@ bench: .venv/ready-dev  ## side-by-side measurements
 SEED ?=
 COUNT ?= 240
 challenge: .venv/ready-dev  ## a fresh blind set of records closed and scored; SEED=, COUNT=; goes on where it stopped
-	$(BIN)/python -m tests.challenge --out $(OUT)/challenge --count $(COUNT) $(if $(SEED),--seed $(SEED))
+	$(BIN)/python -m benchmarks.challenge --out $(OUT)/challenge --count $(COUNT) $(if $(SEED),--seed $(SEED))
 
 .venv/ready: pyproject.toml requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit("railfmi needs Python 3.11 or newer; set PYTHON=..." if sys.version_info < (3, 11) else 0)'

@@ -19,14 +19,14 @@ from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from estimator.history import filtered, samples
-from estimator.joint import Joint, UnknownParameter, UnknownState
+from estimator.filters.bounds import bounded
+from estimator.filters.history import filtered, samples
+from estimator.filters.system import Joint, UnknownParameter, UnknownState
+from estimator.filters.ukf import Ukf
+from estimator.filters.unknown_input import Shaped
 from estimator.record import Array
-from estimator.shaping import Shaped
-from estimator.transform import bounded
-from estimator.ukf import Ukf
 from fmus.errors import BadInput
-from fmus.export.pythonfmu import build_python
+from fmus.export.builders.pythonfmu import build_python
 from fmus.host.fmu import Fmu
 from fmus.wheelset.model import Wheelset
 
@@ -134,7 +134,7 @@ def builds(folder: Path) -> Iterator[tuple[str, Path]]:
     """The FMUs that can be built here."""
     yield "PythonFMU", build_python(Wheelset(), folder / "python")
     try:
-        from fmus.export.native.build import build_native
+        from fmus.export.builders.native.build import build_native
 
         yield "native", build_native(Wheelset(), folder / "native")
     except (ImportError, BadInput) as error:

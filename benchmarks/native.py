@@ -14,11 +14,11 @@ from ctypes import c_double, c_size_t, c_uint, c_void_p
 from math import inf
 from pathlib import Path
 
-from fmus.export.native.build import build_native
-from fmus.export.native.code import sources
-from fmus.export.native.compilers import NUMBERS
-from fmus.export.native.table import table
-from fmus.export.pythonfmu import build_python
+from fmus.export.builders.native.build import build_native
+from fmus.export.builders.native.code import sources
+from fmus.export.builders.native.compilers import NUMBERS
+from fmus.export.builders.native.table import table
+from fmus.export.builders.pythonfmu import build_python
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
 from fmus.model import Model, equations

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.export.inside.stepping import Stepper
-from fmus.export.pythonfmu import build_python
+from fmus.export.builders.pythonfmu import build_python
+from fmus.export.runtime.stepping import Stepper
 from fmus.host.fmu import Fmu
 from fmus.model import equations
 from fmus.testrig.model import Testrig

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.contact.laws import LAWS
-from fmus.export.inside.stepping import Stepper
-from fmus.export.pythonfmu import build_python
+from fmus.contact.forces.laws import LAWS
+from fmus.export.builders.pythonfmu import build_python
+from fmus.export.runtime.stepping import Stepper
 from fmus.host.fmu import Fmu
 from fmus.model import equations
 from fmus.variables import Input, Parameter, State

@@ -1,7 +1,7 @@
 """Integrators as CasADi functions step(x, u, p, dt) -> (x after dt, error), inputs held over the step.
 
 error: of the step over what is tolerated; above 1 the step is to be made again with a shorter one
-(`fmus.export.inside.stepping`). 0 where the method does not know.
+(`fmus.export.runtime.stepping`). 0 where the method does not know.
 """
 
 from collections.abc import Callable, Sequence

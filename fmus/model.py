@@ -19,7 +19,15 @@ from fmus.effects.effect import Effect
 from fmus.effects.site import Site
 from fmus.integrate import Method, rk4
 from fmus.port import UNITS
-from fmus.variables import Expr, Input, Output, Parameter, Rate, State, Variable
+from fmus.variables import (
+    Expr,
+    Input,
+    Output,
+    Parameter,
+    Rate,
+    State,
+    Variable,
+)
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,19 @@ import pytest
 from hypothesis import settings
 
 from fmus.effects import parse_effect
-from fmus.export.pythonfmu import build_python
+from fmus.export.builders.pythonfmu import build_python
 from fmus.models import model_class
 from scenarios import close_loop
-from scenarios.result import Result
-from tests.everything import fitting
-from tests.foreign import foreign_builder
-from tests.vdp import build_vdp
+from scenarios.closing.result import Result
+from tests.helpers.everything import fitting
+from tests.helpers.foreign import foreign_builder
+from tests.helpers.paths import SHIPPED
+from tests.helpers.vdp import build_vdp
 
 settings.register_profile("railfmi", deadline=None)  # a busy machine is no failure
 settings.load_profile("railfmi")
 
-DEMO = Path(__file__).parents[1] / "scenarios" / "demo" / "rig-drag"
+DEMO = SHIPPED / "demo" / "rig-drag"
 Built = Callable[..., Path]
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from fmus.errors import BadInput
-from fmus.export.native.build import build_native
+from fmus.export.builders.native.build import build_native
 from fmus.model import Model
 
 Array = NDArray[np.float64]

@@ -7,7 +7,12 @@ import casadi as cs
 
 from benchmarks.measured.benchmark import Benchmark, of_held
 from fmus.model import Model
-from fmus.variables import Expr, Input, Parameter, State
+from fmus.variables import (
+    Expr,
+    Input,
+    Parameter,
+    State,
+)
 
 STILL = 1e-3  # speed at which the magnitude is rounded, well below the counter's step
 

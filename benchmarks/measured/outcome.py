@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from benchmarks.measured.benchmark import Benchmark
-from scenarios.result import Result
+from scenarios.closing.result import Result
 
 Answer = Literal["named", "partly named", "left open", "misnamed", "error above target"]
 ERRORS = ("declared", "before", "after", "black_box", "noise")

@@ -5,7 +5,13 @@ from pathlib import Path
 from benchmarks.measured.benchmark import Benchmark, of_held
 from fmus.effects.input_delay import late, late_rates
 from fmus.model import Model
-from fmus.variables import Expr, Input, Parameter, State, rate
+from fmus.variables import (
+    Expr,
+    Input,
+    Parameter,
+    State,
+    rate,
+)
 
 
 class WheelDrive(Model):

@@ -7,7 +7,13 @@ import numpy as np
 
 from benchmarks.measured.benchmark import Array, Benchmark, Columns
 from fmus.model import Model
-from fmus.variables import Expr, Input, Parameter, State, rate
+from fmus.variables import (
+    Expr,
+    Input,
+    Parameter,
+    State,
+    rate,
+)
 
 BAND = 250.0  # Hz; the excitation ends at 200 Hz, and what is above is not raised further
 IDENTIFIED = 10000  # samples of the multisines, one period and more: the test record is kept whole

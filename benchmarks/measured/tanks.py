@@ -6,7 +6,14 @@ import casadi as cs
 
 from benchmarks.measured.benchmark import Benchmark, Columns
 from fmus.model import Model
-from fmus.variables import Expr, Input, Output, Parameter, State, rate
+from fmus.variables import (
+    Expr,
+    Input,
+    Output,
+    Parameter,
+    State,
+    rate,
+)
 
 CLOCK = 1e-3  # ks a second: laws around an FMU are worked out each thousandth of its unit of time
 EMPTY = 1e-6  # V, a level below which nothing runs out

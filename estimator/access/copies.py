@@ -8,7 +8,13 @@ from typing import Self
 import numpy as np
 
 from estimator.access.loop import Loop, PythonLoop
-from estimator.access.pointers import Functions, forget, functions, reason, saved_in_initialisation
+from estimator.access.pointers import (
+    Functions,
+    forget,
+    functions,
+    reason,
+    saved_in_initialisation,
+)
 from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 from fmus.host.archive import Archive

@@ -6,7 +6,13 @@ from typing import Protocol
 
 import numpy as np
 
-from estimator.access.pointers import Functions, entrance, getter, setter, stepper
+from estimator.access.pointers import (
+    Functions,
+    entrance,
+    getter,
+    setter,
+    stepper,
+)
 from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 from fmus.host.instance import WARNING

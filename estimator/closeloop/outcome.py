@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from estimator.closeloop.compare import Hypothesis
-from estimator.closeloop.detect import Detection
-from estimator.closeloop.honesty import Honesty
-from estimator.closeloop.missing_force import MissingForce
-from estimator.closeloop.screen import Promise
-from estimator.closeloop.verdict import Judgement
+from estimator.closeloop.decision.detect import Detection
+from estimator.closeloop.decision.verdict import Judgement
+from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array
 
 

@@ -7,12 +7,12 @@ from importlib import import_module
 from typing import Any
 
 PUBLIC = {  # name: module
-    "contact_table": "table",
-    "creep_forces": "forces",
-    "equivalent_conicity": "conicity",
+    "contact_table": "geometry.table",
+    "creep_forces": "forces.creep",
+    "equivalent_conicity": "geometry.conicity",
     "hertz": "normal",
-    "kalker": "coefficients",
-    "klingel_wavelength": "conicity",
+    "kalker": "forces.coefficients",
+    "klingel_wavelength": "geometry.conicity",
     "virtual_penetration": "normal",
 }
 

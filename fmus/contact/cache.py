@@ -47,9 +47,9 @@ def folder() -> Path:
 
 @cache
 def _code_version() -> str:
-    """A short hash of the sources beside this file and of numpy's version."""
+    """A short hash of the sources of this package and of numpy's version."""
     digest = hashlib.sha256(np.__version__.encode())
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    for file in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 

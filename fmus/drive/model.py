@@ -6,7 +6,13 @@ shows: a drive as a supplier would send it, mass and viscous friction only.
 
 from fmus.model import Model
 from fmus.port import Port
-from fmus.variables import Expr, Input, Parameter, State, rate
+from fmus.variables import (
+    Expr,
+    Input,
+    Parameter,
+    State,
+    rate,
+)
 
 
 class Drive(Model):

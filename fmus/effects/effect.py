@@ -8,7 +8,12 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from fmus.variables import Expr, Parameter, State, Variable
+from fmus.variables import (
+    Expr,
+    Parameter,
+    State,
+    Variable,
+)
 
 if TYPE_CHECKING:
     from fmus.effects.site import Site

@@ -6,7 +6,12 @@ In data: a missing force that keeps to one curve over the displacement, and to n
 from collections.abc import Mapping
 
 from fmus.effects.force_law import Array
-from fmus.effects.free_form import FreeForm, between_ends, covering, from_end_to_end
+from fmus.effects.free_form import (
+    FreeForm,
+    between_ends,
+    covering,
+    from_end_to_end,
+)
 from fmus.variables import Expr, Parameter
 
 

@@ -11,7 +11,13 @@ from fmus.component import Component
 from fmus.effects.effect import Effect
 from fmus.errors import BadInput, did_you_mean
 from fmus.port import Port
-from fmus.variables import Expr, Input, Parameter, State, Variable
+from fmus.variables import (
+    Expr,
+    Input,
+    Parameter,
+    State,
+    Variable,
+)
 
 CLOCK = State("s", doc="time since the start, for what depends on it", nominal=10.0, name="clock")
 WAY = State("m", doc="way since the start, for what depends on it", nominal=100.0, name="way")

@@ -5,7 +5,13 @@ from typing import Any, Literal
 
 from fmus.model import Model
 from fmus.units import base_exponents
-from fmus.variables import Input, Output, Parameter, State, Variable
+from fmus.variables import (
+    Input,
+    Output,
+    Parameter,
+    State,
+    Variable,
+)
 
 KINDS = (State, Input, Parameter, Output)
 

@@ -10,7 +10,12 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from fmus.host.instance import WARNING, CallFailed, Instance, heard
+from fmus.host.instance import (
+    WARNING,
+    CallFailed,
+    Instance,
+    heard,
+)
 
 
 class Fmi3Instance(Instance):

@@ -6,7 +6,13 @@ Equations and symbols: README.md beside this file.
 import casadi as cs
 
 from fmus.model import Model
-from fmus.variables import Expr, Input, Output, Parameter, State
+from fmus.variables import (
+    Expr,
+    Input,
+    Output,
+    Parameter,
+    State,
+)
 
 CHOICE = "this model"
 

@@ -5,13 +5,20 @@ Equations, symbols and range of validity: README.md beside this file.
 
 import casadi as cs
 
-from fmus.contact.coefficients import coefficients
-from fmus.contact.friction import friction_coefficient
-from fmus.contact.laws.polach import creep_force, stress_gradient
+from fmus.contact.forces.coefficients import coefficients
+from fmus.contact.forces.friction import friction_coefficient
+from fmus.contact.forces.laws.polach import creep_force, stress_gradient
 from fmus.integrate import rodas3
 from fmus.model import Model
 from fmus.port import Port
-from fmus.variables import Expr, Input, Output, Parameter, State, rate
+from fmus.variables import (
+    Expr,
+    Input,
+    Output,
+    Parameter,
+    State,
+    rate,
+)
 
 V_MIN = 0.01  # m/s, rounds the rolling speed near standstill, where creepage has no limit
 W_MIN = 1e-9  # m/s, rounds the slip speed at zero

@@ -11,7 +11,14 @@ from dataclasses import replace
 from fmus.component import Component
 from fmus.model import Model
 from fmus.port import Port, alike
-from fmus.variables import Expr, Input, Output, Parameter, State, rate
+from fmus.variables import (
+    Expr,
+    Input,
+    Output,
+    Parameter,
+    State,
+    rate,
+)
 
 TABLE = "thesis Table 3.5"
 CORNERS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}

@@ -11,8 +11,8 @@ import casadi as cs
 import numpy as np
 
 from fmus.contact.arguments import Array
+from fmus.contact.geometry.table import SEARCHES, contact_table
 from fmus.contact.normal import hertz, virtual_penetration
-from fmus.contact.table import SEARCHES, contact_table
 from fmus.variables import Expr
 from fmus.wheelset.track import Track
 

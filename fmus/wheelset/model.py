@@ -14,15 +14,28 @@ from typing import NamedTuple
 import casadi as cs
 
 from fmus.component import Component
-from fmus.contact.coefficients import looked_up
-from fmus.contact.friction import friction_coefficient
-from fmus.contact.laws import selected_law
-from fmus.contact.search import FLANGE_ANGLE
+from fmus.contact.forces.coefficients import looked_up
+from fmus.contact.forces.friction import friction_coefficient
+from fmus.contact.forces.laws import selected_law
+from fmus.contact.geometry.search import FLANGE_ANGLE
 from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.port import Port
-from fmus.variables import Expr, Input, Output, Parameter, State, rate
-from fmus.wheelset.curves import FIELDS, LOAD, NU, G, contact_curves
+from fmus.variables import (
+    Expr,
+    Input,
+    Output,
+    Parameter,
+    State,
+    rate,
+)
+from fmus.wheelset.curves import (
+    FIELDS,
+    LOAD,
+    NU,
+    G,
+    contact_curves,
+)
 from fmus.wheelset.stepping import rk4_within_stability
 from fmus.wheelset.track import Track
 

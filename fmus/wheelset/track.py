@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from fmus.contact.measured import load_profile
-from fmus.contact.pair import TAPE, Pair
-from fmus.contact.search import check_touches
+from fmus.contact.geometry.measured import load_profile
+from fmus.contact.geometry.pair import TAPE, Pair
+from fmus.contact.geometry.search import check_touches
 from fmus.errors import BadInput
 
 SIZES = ("cant", "gauge", "back_to_back", "r0")

@@ -12,12 +12,12 @@ import pandas as pd
 
 from estimator.record import Array, Record
 from fmus.errors import BadInput
-from fmus.export.coupled import COUPLING_STEP
-from fmus.export.effects_alone import EffectsAlone, Plugs
-from fmus.export.hypotheses import Effects, ForeignBuilder
-from fmus.export.native.build import build_native
+from fmus.export.around.effects_alone import EffectsAlone, Plugs
+from fmus.export.builders.hypotheses import Effects, ForeignBuilder
+from fmus.export.builders.native.build import build_native
+from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container.coupled import COUPLING_STEP
 from fmus.export.provenance import Origin
-from fmus.export.pythonfmu import build_python
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription
 from scenarios.exchange.exporting import export_ssp

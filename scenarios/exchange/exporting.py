@@ -11,22 +11,39 @@ from typing import Any
 from fmus.errors import BadInput
 from fmus.export.provenance import PLACE as PROVENANCE
 from fmus.export.provenance import provenance, sealed
-from fmus.export.ssp import Component, Connector, Link, System, write_package
+from fmus.export.ssp import (
+    Component,
+    Connector,
+    Link,
+    System,
+    write_package,
+)
 from fmus.export.ssp.source import signal_source
 from fmus.export.ssp.system import RESOURCES
 from fmus.host.archive import Archive
-from fmus.host.connections import Connection, Directory, links
 from fmus.host.description import FmuDescription
-from scenarios.closing import writable
-from scenarios.exchange.form import Form, Kind, Packer, starts
+from fmus.host.master.connections import Connection, Directory, links
+from scenarios.exchange.form import (
+    Form,
+    Kind,
+    Packer,
+    starts,
+)
 from scenarios.exchange.sampling import Fed, constants, sampled
-from scenarios.exchange.settings import PLACE, chosen, dropped, motion, settings
-from scenarios.running.asking import asked, wanted
-from scenarios.running.case import prepared
-from scenarios.running.declaration import Declaration
-from scenarios.running.given import sources
-from scenarios.running.reading import Scenario, load_scenario
-from scenarios.validation import of_file
+from scenarios.exchange.settings import (
+    PLACE,
+    chosen,
+    dropped,
+    motion,
+    settings,
+)
+from scenarios.experiment.validation import of_file
+from scenarios.output import writable
+from scenarios.simulating.asking import asked, wanted
+from scenarios.simulating.case import prepared
+from scenarios.simulating.declaration import Declaration
+from scenarios.simulating.given import sources
+from scenarios.simulating.reading import Scenario, load_scenario
 
 Tell = Callable[[str], None]
 

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Literal
 
 from fmus.errors import BadInput
-from fmus.export.native.build import build_native
-from fmus.export.pythonfmu import build_python
+from fmus.export.builders.native.build import build_native
+from fmus.export.builders.pythonfmu import build_python
 from fmus.model import Model
-from scenarios.running.building import Builder, model_of
-from scenarios.running.declaration import Declaration, Member
-from scenarios.running.friction import CONDITIONS
-from scenarios.validation import of_file
+from scenarios.experiment.validation import of_file
+from scenarios.simulating.building import Builder, model_of
+from scenarios.simulating.declaration import Declaration, Member
+from scenarios.simulating.friction import CONDITIONS
 
 Kind = Literal["native", "python"]
 

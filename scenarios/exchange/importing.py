@@ -10,16 +10,21 @@ from typing import Any
 
 from fmus.errors import BadInput
 from fmus.export.provenance import PLACE as PROVENANCE
-from fmus.export.ssp import Component, Link, System, read_package
+from fmus.export.ssp import (
+    Component,
+    Link,
+    System,
+    read_package,
+)
 from fmus.export.ssp.system import RESOURCES
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription
-from fmus.host.recording import TIME
+from fmus.host.master.recording import TIME
 from fmus.units import conversion
-from scenarios.closing import writable
 from scenarios.exchange.settings import PLACE
 from scenarios.exchange.toml_text import toml_text
-from scenarios.running.reading import load_scenario
+from scenarios.output import writable
+from scenarios.simulating.reading import load_scenario
 
 Tell = Callable[[str], None]
 Descriptions = Mapping[str, FmuDescription]

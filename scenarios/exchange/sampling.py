@@ -9,11 +9,11 @@ import pandas as pd
 
 from estimator.record import Array
 from fmus.export.ssp.writing import known_unit
-from fmus.host.clock import clock
 from fmus.host.description import FmuDescription
-from fmus.host.recording import TIME
-from fmus.host.signals import Signal, Source, signal
-from scenarios.running.declaration import Declaration
+from fmus.host.master.clock import clock
+from fmus.host.master.recording import TIME
+from fmus.host.master.signals import Signal, Source, signal
+from scenarios.simulating.declaration import Declaration
 
 Descriptions = Mapping[str, FmuDescription]
 

@@ -5,12 +5,12 @@ from typing import Any
 
 from fmus.errors import BadInput, did_you_mean
 from fmus.export.provenance import FOLDER
-from scenarios.declaration import Table
 from scenarios.exchange.toml_text import toml_text
-from scenarios.running.asking import asked
-from scenarios.running.declaration import Declaration, Moment
-from scenarios.running.friction import CONDITIONS
-from scenarios.running.reading import Scenario
+from scenarios.experiment.declaration import Table
+from scenarios.simulating.asking import asked
+from scenarios.simulating.declaration import Declaration, Moment
+from scenarios.simulating.friction import CONDITIONS
+from scenarios.simulating.reading import Scenario
 
 PLACE = f"{FOLDER}/scenario.toml"
 

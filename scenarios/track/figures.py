@@ -7,7 +7,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
-from scenarios.figures.sheet import AFTER, BEFORE, INK, LAW, SHADE, envelope, legend, name_axes, sheet
+from scenarios.drawing.sheet import (
+    AFTER,
+    BEFORE,
+    INK,
+    LAW,
+    SHADE,
+    envelope,
+    legend,
+    name_axes,
+    sheet,
+)
 from scenarios.track.rails import Array, Quantity
 from scenarios.track.spectra import Spectrum
 from scenarios.track.track import Track

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from fmus.errors import BadInput, did_you_mean
+from scenarios.experiment.validation import read_table
 from scenarios.track.defects import DEFECTS
 from scenarios.track.sources import SOURCES
 from scenarios.track.sources.source import Source
 from scenarios.track.track import Track
-from scenarios.validation import read_table
 
 DEFECT = "defect"  # the kind of a table that has a shape
 

@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from fmus.errors import BadInput
-from scenarios.track.rails import Array, Quantity, Rails, rails_of
+from scenarios.track.rails import (
+    Array,
+    Quantity,
+    Rails,
+    rails_of,
+)
 
 
 class Layer(Protocol):

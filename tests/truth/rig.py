@@ -12,7 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.truth.rig_effects import NOTHING, TYPICAL, Effects, SensorFault, Torque, single
+from tests.truth.rig_effects import (
+    NOTHING,
+    TYPICAL,
+    Effects,
+    SensorFault,
+    Torque,
+    single,
+)
 from tests.truth.rig_inputs import (
     LARGEST_TORQUE,
     Array,
@@ -25,7 +32,14 @@ from tests.truth.rig_inputs import (
     record_frequency,
     torque_profile,
 )
-from tests.truth.rig_motion import DECLARED, Rig, creep_force, motor_torque, simulate, steady_state
+from tests.truth.rig_motion import (
+    DECLARED,
+    Rig,
+    creep_force,
+    motor_torque,
+    simulate,
+    steady_state,
+)
 
 __all__ = [
     "Effects",

@@ -16,7 +16,15 @@ from tests.truth.more import Kinks
 from tests.truth.passing import arrived_with_rate
 from tests.truth.rig import measured
 from tests.truth.rig_effects import SensorFault
-from tests.truth.vehicle_effects import CORNERS, NOTHING, TYPICAL, Effects, Law, Push, single
+from tests.truth.vehicle_effects import (
+    CORNERS,
+    NOTHING,
+    TYPICAL,
+    Effects,
+    Law,
+    Push,
+    single,
+)
 from tests.truth.vehicle_inputs import (
     Array,
     Profile,
@@ -27,7 +35,14 @@ from tests.truth.vehicle_inputs import (
     run_over,
     spectrum_rails,
 )
-from tests.truth.vehicle_motion import COORDINATES, DECLARED, Motion, Vehicle, matrices, simulate
+from tests.truth.vehicle_motion import (
+    COORDINATES,
+    DECLARED,
+    Motion,
+    Vehicle,
+    matrices,
+    simulate,
+)
 
 __all__ = [
     "COORDINATES",

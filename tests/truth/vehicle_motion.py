@@ -14,7 +14,12 @@ from scipy.integrate import solve_ivp
 
 from tests.truth.laws import ImpactTrain
 from tests.truth.more import At, acting, changed
-from tests.truth.vehicle_effects import CORNERS, NOTHING, SUSPENSIONS, Effects
+from tests.truth.vehicle_effects import (
+    CORNERS,
+    NOTHING,
+    SUSPENSIONS,
+    Effects,
+)
 from tests.truth.vehicle_inputs import Array, Track
 
 COORDINATES = ("z1", "phi_y1", "phi_x1", "z2", "phi_x2", "z3", "phi_x3")

@@ -16,8 +16,21 @@ import numpy as np
 from tests.truth.passing import NOT_CHANGED, arrived_with_rate
 from tests.truth.rig import measured
 from tests.truth.rig_effects import SensorFault
-from tests.truth.wheelset_effects import NOTHING, TYPICAL, Effects, single
-from tests.truth.wheelset_motion import COORDINATES, DECLARED, OTHER, SAME, Form, Wheelset, simulate
+from tests.truth.wheelset_effects import (
+    NOTHING,
+    TYPICAL,
+    Effects,
+    single,
+)
+from tests.truth.wheelset_motion import (
+    COORDINATES,
+    DECLARED,
+    OTHER,
+    SAME,
+    Form,
+    Wheelset,
+    simulate,
+)
 from tests.truth.wheelset_track import Array, Run, random_alignment
 
 __all__ = [

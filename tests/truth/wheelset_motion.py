@@ -16,7 +16,14 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from tests.truth.more import At, acting, changed
-from tests.truth.wheelset_contact import LAMBDA, LOAD, Array, G, contacts, kalker
+from tests.truth.wheelset_contact import (
+    LAMBDA,
+    LOAD,
+    Array,
+    G,
+    contacts,
+    kalker,
+)
 from tests.truth.wheelset_effects import NOTHING, Effects
 from tests.truth.wheelset_track import Run
 

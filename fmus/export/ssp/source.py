@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fmus.model import Model
-from fmus.variables import Expr, Output, Parameter, State, Variable
+from fmus.variables import (
+    Expr,
+    Output,
+    Parameter,
+    State,
+    Variable,
+)
 
 CLOCK = "source_time"
 AHEAD = "ahead"

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from fmus.errors import BadInput
-from fmus.export.pythonfmu import ZIP_DATE
+from fmus.export.builders.pythonfmu import ZIP_DATE
 from fmus.export.ssp.system import (
     NAMESPACES,
     OSP,

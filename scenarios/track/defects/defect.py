@@ -5,8 +5,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.declaration import Number, Table
-from scenarios.track.rails import Array, Quantity, Rails, rails_of
+from scenarios.experiment.declaration import Number, Table
+from scenarios.track.rails import (
+    Array,
+    Quantity,
+    Rails,
+    rails_of,
+)
 
 DRAWN = 201  # points over a defect
 MARGIN = 1.25  # of its reach; with these points its centre and both its ends are among them

@@ -10,11 +10,16 @@ from scipy.integrate import cumulative_trapezoid
 from estimator.record import BoolArray
 from fmus.errors import BadInput, did_you_mean
 from fmus.units import to_si
-from scenarios.declaration import Number, Positive, Table
-from scenarios.readers import read_sheet
-from scenarios.readers.sheet import Sheet
-from scenarios.readers.units import StatedUnits
-from scenarios.track.rails import PLANES, Array, Quantity, check_direction
+from scenarios.experiment.declaration import Number, Positive, Table
+from scenarios.experiment.readers import read_sheet
+from scenarios.experiment.readers.sheet import Sheet
+from scenarios.experiment.readers.units import StatedUnits
+from scenarios.track.rails import (
+    PLANES,
+    Array,
+    Quantity,
+    check_direction,
+)
 from scenarios.track.sources.source import Source
 from scenarios.track.track import Track
 

@@ -10,8 +10,20 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fmus.errors import did_you_mean
-from scenarios.declaration import Interval, Number, Positive, Table
-from scenarios.track.rails import PLANES, Array, Quantity, Rails, check_direction, rails_of
+from scenarios.experiment.declaration import (
+    Interval,
+    Number,
+    Positive,
+    Table,
+)
+from scenarios.track.rails import (
+    PLANES,
+    Array,
+    Quantity,
+    Rails,
+    check_direction,
+    rails_of,
+)
 from scenarios.track.sources.source import Source
 from scenarios.track.spectra import Spectra, Spectrum, spectra
 from scenarios.track.statistics import KNOWN, Statistics, fit

@@ -1,0 +1,52 @@
+"""Make a blind set from a seed, close the loop on each record, print the scoreboard: `make challenge`."""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmarks.challenge.draw import plans
+from benchmarks.challenge.match import Answer
+from benchmarks.challenge.run import Challenge, run
+from benchmarks.challenge.table import markdown, text
+from benchmarks.challenge.truth import SHARES, SYSTEMS
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the challenge; interrupted, it goes on with the same command."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.challenge", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/challenge"), help="folder of all sets")
+    parser.add_argument("--seed", type=int, help="of the set; a fresh one is drawn without")
+    parser.add_argument("--count", type=int, default=sum(SHARES.values()), help="records, shares kept")
+    parser.add_argument("--jobs", type=int, default=1, help="records at a time")
+    parser.add_argument("--cores", type=int, default=0, help="processes of one record; 0: all")
+    parser.add_argument("--limit", type=float, default=1800.0, help="s a record")
+    parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="leave out the others")
+    parser.add_argument("--only-make", action="store_true", help="make the records, answer none")
+    parser.add_argument("--so-far", action="store_true", help="the scoreboard of what is answered already")
+    a = parser.parse_args(arguments)
+    for stopping in (signal.SIGINT, signal.SIGTERM):  # both end the record's process too
+        signal.signal(stopping, signal.default_int_handler)
+    seed = secrets.randbelow(10**6) if a.seed is None else a.seed
+    chosen = [p for p in plans(seed, a.count) if p.system in a.systems]
+    challenge = Challenge(a.out / f"seed-{seed}-{a.count}", seed, a.limit, a.cores)
+    print(f"seed {seed}: {len(chosen)} records in {challenge.folder}", flush=True)
+    if a.only_make:
+        for plan in chosen:
+            challenge.truth(plan)
+        return
+    if a.so_far:
+        chosen = [p for p in chosen if challenge.answered(p)]
+    found = run(challenge, chosen, a.jobs, lambda line: print(line, flush=True))
+    marked = [(truth, Answer.of(kept)) for truth, kept in found]
+    every = markdown(marked, seed, a.count, every=True)
+    (challenge.folder / "all.md").write_text(every, encoding="utf-8")
+    (challenge.folder / "scoreboard.md").write_text(markdown(marked, seed, a.count), encoding="utf-8")
+    print(text(marked, seed, a.count))
+
+
+if __name__ == "__main__":
+    main()

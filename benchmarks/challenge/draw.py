@@ -1,0 +1,128 @@
+"""From one seed: which record of the set holds what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from benchmarks.challenge.menu import (
+    FAULTS,
+    MENU,
+    OUTPUTS,
+    Entry,
+)
+from benchmarks.challenge.strange import CONFUSABLE, OUTSIDE
+from benchmarks.challenge.truth import SHARES, SYSTEMS
+
+Thing = TypeVar("Thing")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a record shall hold: entries with the location of each; sizes are drawn when it is made."""
+
+    index: int
+    group: str
+    system: str
+    entries: tuple[tuple[Entry, str], ...] = ()
+    conditions: tuple[str, ...] = ()
+    quiet: bool = False
+    note: str = ""
+
+    @property
+    def name(self) -> str:
+        """The record's name, which tells nothing."""
+        return f"record-{self.index:03d}"
+
+
+def counts(count: int) -> dict[str, int]:
+    """How many of each group there are among `count`, by largest remainders."""
+    total = sum(SHARES.values())
+    exact = {group: count * share / total for group, share in SHARES.items()}
+    found = {group: int(value) for group, value in exact.items()}
+    rest = sorted(exact, key=lambda g: found[g] - exact[g])
+    for group in rest[: count - sum(found.values())]:
+        found[group] += 1
+    return found
+
+
+def plans(seed: int, count: int) -> list[Plan]:
+    """The whole set; the same for the same seed and count."""
+    rng = np.random.default_rng([seed, count])
+    made: list[Plan] = []
+    for group, n in counts(count).items():
+        made += [next(source) for source in [DRAWN[group](rng)] for _ in range(n)]
+    order = rng.permutation(len(made))
+    return [_numbered(made[i], index) for index, i in enumerate(order)]
+
+
+def _numbered(plan: Plan, index: int) -> Plan:
+    return Plan(index, plan.group, plan.system, plan.entries, plan.conditions, plan.quiet, plan.note)
+
+
+def deal(things: Sequence[Thing], rng: np.random.Generator) -> Iterator[Thing]:
+    """All of them in random order, then again."""
+    while True:
+        for i in rng.permutation(len(things)):
+            yield things[i]
+
+
+def _placed(entry: Entry, rng: np.random.Generator) -> tuple[Entry, str]:
+    return entry, str(rng.choice(list(entry.locations)))
+
+
+def without(rng: np.random.Generator) -> Iterator[Plan]:
+    """Records without an effect."""
+    for system in deal(SYSTEMS, rng):
+        yield Plan(0, "none", system, conditions=("plain",))
+
+
+def singles(rng: np.random.Generator) -> Iterator[Plan]:
+    """One effect: every kind, and every system in turn."""
+    own = {system: deal(MENU[system], rng) for system in SYSTEMS}
+    for system in deal(SYSTEMS, rng):
+        yield Plan(0, "single", system, (_placed(next(own[system]), rng),))
+
+
+def strangers(rng: np.random.Generator) -> Iterator[Plan]:
+    """Outside the vocabulary."""
+    own = {system: deal(OUTSIDE[system], rng) for system in SYSTEMS}
+    for system in deal(SYSTEMS, rng):
+        yield Plan(0, "outside", system, (_placed(next(own[system]), rng),))
+
+
+def lookalikes(rng: np.random.Generator) -> Iterator[Plan]:
+    """Known confusions."""
+    for c in deal(CONFUSABLE, rng):
+        yield Plan(0, "confusable", c.system, (_placed(c.entry, rng),), c.conditions, c.quiet, c.note)
+
+
+def faults(rng: np.random.Generator) -> Iterator[Plan]:
+    """Faults of sensors: every kind on every system."""
+    for system, fault in deal([(s, f) for s in SYSTEMS for f in FAULTS], rng):
+        yield Plan(0, "sensor", system, ((fault, str(rng.choice(OUTPUTS[system]))),))
+
+
+def doubles(rng: np.random.Generator) -> Iterator[Plan]:
+    """Two effects of different kinds."""
+    own = {system: deal(MENU[system], rng) for system in SYSTEMS}
+    for system in deal(SYSTEMS, rng):
+        one, other = next(own[system]), next(own[system])
+        while other.kind == one.kind or set(one.locations) & set(other.locations) & OWNERS:
+            other = next(own[system])
+        yield Plan(0, "double", system, (_placed(one, rng), _placed(other, rng)))
+
+
+# what two effects cannot both change
+OWNERS = {"T_P", "f_sync", "y_irr", "V", "mu0", "friction_condition", "R_2", "m1", "k1"}
+DRAWN: dict[str, Callable[[np.random.Generator], Iterator[Plan]]] = {
+    "none": without,
+    "single": singles,
+    "outside": strangers,
+    "confusable": lookalikes,
+    "sensor": faults,
+    "double": doubles,
+}

@@ -1,0 +1,192 @@
+"""A record made after its plan: simulated with and without its effects, disturbed, written, told apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.challenge.bench import (
+    NO_MORE,
+    Bench,
+    Outputs,
+    bench,
+)
+from benchmarks.challenge.draw import Plan
+from benchmarks.challenge.menu import OUTPUTS
+from benchmarks.challenge.truth import Item, Truth
+from tests.truth.more import More, made
+from tests.truth.rig import measured
+from tests.truth.rig_effects import SensorFault
+from tests.truth.wheelset_effects import CONDITIONS, FRICTION
+from tests.truth.wheelset_motion import Wheelset
+
+LOWEST = 60.0  # s, over which a drift of mu0 goes on
+SHARE = {"limit_share": "limit", "slew_share": "slew"}
+WORSE = ("wet", "low", "very_low")  # than dry
+DIGITS = 8
+ATTEMPTS = 20
+FAINT = 2.0  # times the noise: less may be left alone by the rule of what matters
+IDENTIFY = 0.6  # of the record, as every bench splits it
+LATE = 0.1  # of the ratio over all of the record: an effect with less in the part to identify is not there
+
+
+def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
+    """Write the record's folder, then the file of its truth; what is there already is kept.
+
+    Sizes under which the system leaves what its model can say (a wheel locks, a flange climbs) are drawn
+    again, faults of a sensor alone that drown in its noise, and what acts first where the record is held out.
+    A sensor that moves too little for any fault of the kind is left for the system's next one.
+    Raises ValueError where that does not help.
+    """
+    told = truths / f"{plan.name}.json"
+    if told.exists():
+        return Truth.read(told)
+    draws = (here for here in (plan, *elsewhere(plan)) for _ in range(ATTEMPTS))
+    for attempt, here in enumerate(draws):
+        try:
+            truth, text, columns = tried(here, np.random.default_rng([seed, plan.index, attempt]))
+        except ValueError as error:
+            why = error
+            continue
+        write(records / plan.name, text, columns)
+        truth.write(told)
+        return truth
+    kinds = " and ".join(f"{e.kind}@{location}" for e, location in plan.entries)
+    raise ValueError(f"{plan.name}: {ATTEMPTS} draws of {kinds} failed, the last: {why}")
+
+
+def elsewhere(plan: Plan) -> list[Plan]:
+    """The same fault at the system's other sensors, in order from its own; none where it is no sensor's."""
+    if plan.group != "sensor":
+        return []
+    ((fault, at),) = plan.entries
+    outputs = OUTPUTS[plan.system]
+    own = outputs.index(at)
+    return [replace(plan, entries=((fault, o),)) for o in (*outputs[own + 1 :], *outputs[:own])]
+
+
+def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
+    """A record with one draw of conditions and sizes: truth, experiment.toml, columns of the data."""
+    raw = [(e, location, e.sizes(rng)) for e, location in plan.entries]
+    here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
+    items = tuple(Item(e.kind, p, settled(e.kind, p, sizes, here)) for e, p, sizes in raw)
+    truth, seen = measure(plan, items, here, rng)
+    if plan.group == "sensor" and truth.largest_snr < FAINT:
+        raise ValueError(f"the fault is {truth.largest_snr:.2f} times the noise")
+    return truth, here.toml(plan.name, effect_of(items, here)), {"time": here.t, **here.inputs, **seen}
+
+
+def _lowest_mu0(sizes: list[tuple[str, dict[str, Any]]]) -> float:
+    """The lowest change of mu0 in a run."""
+    at_mu0 = [s for place, s in sizes if place == "mu0"]
+    return min((s.get("delta", 0.0) + LOWEST * s.get("rate", 0.0) for s in at_mu0), default=0.0)
+
+
+def settled(kind: str, location: str, sizes: dict[str, Any], here: Bench) -> dict[str, Any]:
+    """Parameters of an effect in the units of docs/effects.md, from sizes that depend on the run."""
+    found = dict(sizes)
+    for share, name in SHARE.items():
+        if share in found:
+            part = found.pop(share) * float(np.abs(here.inputs[location]).max())
+            found["band" if kind == "dead_band" else name] = part
+    if kind == "free_play":
+        found = {"k": here.strength(location)[0], **found}
+    if location == "friction_condition":
+        worse = CONDITIONS[WORSE[int(found.pop("condition")) - 1]]
+        now = {n: here.true.get(n, getattr(Wheelset(), n)) for n in FRICTION}
+        found |= {f"delta_{n}": v - now[n] for n, v in zip(FRICTION, worse, strict=True)}
+    if kind in ("sensor_bias", "sensor_drift"):
+        part = here.noise[location] / (float(here.t[-1]) if kind == "sensor_drift" else 1.0)
+        found = {name: value * part for name, value in found.items()}
+    return found
+
+
+def effect_of(items: tuple[Item, ...], here: Bench) -> More:
+    """All but the sensors' faults, as the truth models take them."""
+    more = NO_MORE
+    for item in items:
+        if item.is_fault:
+            continue
+        p: dict[str, Any] = dict(item.parameters)
+        if item.kind in ("stiffness_change", "damping_change"):
+            k, b = here.strength(item.location)
+            change = p.pop("change")
+            p |= {"k": change * k} if item.kind == "stiffness_change" else {"c": change * b}
+        if item.kind == "free_play":
+            p["k"] = here.strength(item.location)[0]
+        if item.location == "friction_condition":
+            t0 = p.pop("t0")
+            for name, delta in p.items():
+                more += made(item.kind, name.removeprefix("delta_"), delta=delta, t0=t0)
+            continue
+        p = {n: tuple(v) if isinstance(v, list) else v for n, v in p.items()}
+        more += made(item.kind, item.location, **p)
+    return more
+
+
+def fault_of(items: tuple[Item, ...], output: str) -> SensorFault:
+    """The fault of an output's sensor."""
+    found = {}
+    for item in items:
+        if item.is_fault and item.location == output:
+            found = {n: 1 + v if n == "gain" else v for n, v in item.parameters.items()}  # type: ignore[operator]
+    return SensorFault(**found)  # type: ignore[arg-type]
+
+
+def shown(here: Bench, clean: Outputs, items: tuple[Item, ...]) -> Outputs:
+    """What sensors without noise show."""
+    still = np.random.default_rng(0)
+    return {o: measured(here.t, y, fault_of(items, o), 0.0, still) for o, y in clean.items()}
+
+
+def ratios(here: Bench, with_it: Outputs, without: Outputs, part: float = 1.0) -> dict[str, float]:
+    """Rms of the difference over the noise, by output; part: of the record, from its start."""
+    seen = here.t <= part * here.t[-1]
+    return {
+        o: float(np.sqrt(np.mean((with_it[o] - without[o])[seen] ** 2)) / noise)
+        for o, noise in here.noise.items()
+    }
+
+
+def measure(
+    plan: Plan, items: tuple[Item, ...], here: Bench, rng: np.random.Generator
+) -> tuple[Truth, Outputs]:
+    """The truth with its signal-to-noise ratios, and the outputs with noise."""
+    more = effect_of(items, here)
+    clean = here.simulate(more, more)
+    with_it = shown(here, clean, items)
+    sound = clean if more == NO_MORE else here.simulate(NO_MORE, more)
+    early, whole = (max(ratios(here, with_it, sound, part).values()) for part in (IDENTIFY, 1.0))
+    if early < LATE * whole:
+        raise ValueError(f"{early:.2f} times the noise in the part to identify, {whole:.2f} in all")
+    each = []
+    for item in items if len(items) > 1 else ():
+        alone = here.simulate(effect_of((item,), here), more)
+        each.append(max(ratios(here, shown(here, alone, (item,)), sound).values()))
+    truth = Truth(
+        plan.name,
+        plan.group,
+        plan.system,
+        items,
+        here.true,
+        here.noise,
+        ratios(here, with_it, sound) if items else {},
+        tuple(pair for e, _ in plan.entries for pair in e.near),
+        plan.quiet,
+        plan.note,
+        tuple(each),
+    )
+    seen = {o: y + rng.normal(0.0, here.noise[o], y.size) for o, y in with_it.items()}
+    return truth, seen
+
+
+def write(home: Path, text: str, columns: Outputs) -> None:
+    """experiment.toml and data.csv, as of a measured record."""
+    home.mkdir(parents=True, exist_ok=True)
+    table = np.column_stack([*columns.values()])
+    head = ",".join(columns)
+    np.savetxt(home / "data.csv", table, fmt=f"%.{DIGITS}g", delimiter=",", header=head, comments="")
+    (home / "experiment.toml").write_text(text, encoding="utf-8")

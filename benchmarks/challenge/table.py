@@ -1,0 +1,40 @@
+"""The scoreboard as text and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from benchmarks.challenge.match import judged
+from benchmarks.challenge.score import Marked, failures, scoreboard
+
+
+def text(marked: Sequence[Marked], seed: int, count: int) -> str:
+    """For a terminal."""
+    rows = scoreboard(marked)
+    wide = max(len(r.what) for r in rows)
+    lines = [f"challenge of {count} records, seed {seed}", ""]
+    lines += [f"{r.what:<{wide}}  {r.value}" + (f"   (asked: {r.target})" if r.target else "") for r in rows]
+    lost = failures(marked)
+    if lost:
+        lines += ["", "not right:"]
+        lines += [" | ".join(line) for line in map(_line, lost)]
+    return "\n".join(lines)
+
+
+def markdown(marked: Sequence[Marked], seed: int, count: int, every: bool = False) -> str:
+    """For the documentation; every: all records, not only those that are not right."""
+    lines = [f"Seed {seed}, {len(marked)} of {count} records.", "", "| | found | asked |", "|---|---|---|"]
+    lines += [f"| {r.what} | {r.value} | {r.target} |" for r in scoreboard(marked)]
+    listed = sorted(marked, key=lambda m: m[0].name) if every else failures(marked)
+    if listed:
+        head = "| record | group | truth | SNR | judged | answer | s |"
+        lines += ["", "All:" if every else "Not right:", "", head, "|---|---|---|---|---|---|---|"]
+        lines += ["| " + " | ".join(_line(m)) + " |" for m in listed]
+    return "\n".join(lines) + "\n"
+
+
+def _line(m: Marked) -> list[str]:
+    t, a = m
+    label = f"{t.system}: {t.label}"
+    ratio = f"{t.largest_snr:.2g}" if t.items else ""
+    return [t.name, t.group, label, ratio, judged(t, a), a.label.replace("|", "/"), f"{a.seconds:.0f}"]

@@ -1,0 +1,75 @@
+"""Laws that the part to identify cannot tell apart, on the part to choose: as near as their errors allow.
+
+A parameter that the part to identify hardly shows, as friction that saturates in the part to choose alone,
+would else decide between them by where each fit came to rest.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import pinvh
+from scipy.optimize import least_squares
+
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.promise import built
+from estimator.closeloop.hypotheses.scores import CHANCE, leaves_noise, ranked
+from estimator.closeloop.question.problem import Problem
+from estimator.record import Array
+from fmus.host.fmu import FmuError
+
+APART = 20.0  # log score between them, from which the part to choose tells what the other does not
+MOST = 8  # laws that are looked at
+REACH = 3.0  # standard errors, that a value may be moved by
+STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
+
+
+def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
+    """Ranked single hypotheses, those that leave noise alone in the part to identify as their errors allow.
+
+    Only their residuals differ, and only where the part to choose sets them apart or from noise.
+    """
+    alike = [h for h in found if problem.record.floor_known and leaves_noise(h)][:MOST]
+    if not alike or not _set_apart(problem, alike, size):
+        return list(found)
+    moved = {id(h): _as_errors_allow(problem, h, size) for h in alike}
+    return ranked(problem, [moved.get(id(h), h) for h in found], size)
+
+
+def _set_apart(problem: Problem, alike: Sequence[Hypothesis], size: Array) -> bool:
+    scores = [float(h.scores(problem, size).sum()) for h in alike]
+    samples = alike[0].of(problem, "choose").size
+    return max(scores) - min(scores) > APART or -2 * max(scores) > samples + CHANCE * np.sqrt(2 * samples)
+
+
+def _as_errors_allow(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
+    """The hypothesis with the residuals of values near its own, by their covariance, that fit the rest."""
+    here, unknowns, best = built(problem, h.candidates), h.fit.unknowns, h.fit.values
+    error = np.sqrt(np.diag(h.fit.covariance))
+    if not np.all(error > 0):
+        return h
+    values, vectors = np.linalg.eigh(pinvh(h.fit.covariance / np.outer(error, error)))
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    runs = problem.record.runs
+
+    def residuals(z: Array) -> list[Array]:
+        return here.residuals(dict(zip((u.name for u in unknowns), best + z * error, strict=True)))
+
+    def misfit(z: Array) -> Array:
+        left = np.concatenate([r[run.choose] for r, run in zip(residuals(z), runs, strict=True)])
+        return np.concatenate([(left / size).ravel(), root @ z])
+
+    def slopes(z: Array) -> Array:
+        at = misfit(z)
+        return np.column_stack([(misfit(z + d) - at) / NUDGE for d in NUDGE * np.eye(len(z))])
+
+    low, high = (np.array([getattr(u, side) for u in unknowns]) for side in ("low", "high"))
+    inside = (
+        np.clip((low - best) / error, -REACH, -NUDGE),
+        np.clip((high - best) / error, NUDGE, REACH),
+    )
+    try:
+        z = least_squares(misfit, np.zeros(len(best)), slopes, inside, max_nfev=STEPS).x
+        return replace(h, residuals=tuple(residuals(z)))
+    except FmuError:
+        return h

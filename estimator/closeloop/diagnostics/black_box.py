@@ -1,0 +1,192 @@
+"""A black box for the residual: what a linear model without any physics would make of the same record.
+
+An ARX model from the FMU's inputs and simulated outputs to the residual, all outputs with the same poles.
+Least squares, refined by prefiltering (Steiglitz and McBride, IEEE Trans. Automatic Control 10 (1965),
+461-464) since what counts is the free run; nothing measured is fed back. Order by Schwarz's criterion.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import lfilter
+
+from estimator.record import (
+    Array,
+    BoolArray,
+    Record,
+    Run,
+)
+
+ORDERS = (0, 1, 2, 4, 8)  # numbers of poles that are tried
+ROUNDS = 6  # of prefiltering
+SAMPLES = 4000  # at most so many are fitted, each the mean of several where a record has more
+LARGEST = 0.999  # magnitude of a pole
+RIDGE = 1e-9  # of the columns' mean square: neighbouring samples of a smooth signal are nearly alike
+ENOUGH = 10  # samples for each coefficient
+STILL = 1e-9  # of a signal's size: it moves less, and drives nothing
+
+
+@dataclass(frozen=True, eq=False)
+class BlackBox:
+    """What is left with a black box added to the calibrated FMU.
+
+    order: number of poles, None where no black box is worth its coefficients; poles: in the plane of z,
+    at steps of `step` s; residuals: of each run (N, n_y); rms: on the held-out part, (n_y,).
+    """
+
+    order: int | None
+    poles: NDArray[np.complex128]
+    step: float
+    residuals: tuple[Array, ...]
+    rms: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A run at the black box's rate: t (n,), what drives it z (n, n_z), residual e (n, n_y), fit (n,)."""
+
+    t: Array
+    z: Array
+    e: Array
+    fit: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """A denominator a (order + 1,), and its free run of each part (n, n_y); squares left by output (n_y,)."""
+
+    a: Array
+    shown: list[Array]
+    left: Array
+    coefficients: int
+
+
+def black_box(record: Record, residuals: Sequence[Array], size: Array) -> BlackBox:
+    """Fit a black box to the residuals (N, n_y) of a calibrated FMU's runs, on the identify part alone.
+
+    size: (n_y,) size of a residual that counts as one.
+    """
+    every = max(1, -(-sum(len(run.t) for run in record.runs) // SAMPLES))
+    parts = _scaled([_part(run, r, size, every) for run, r in zip(record.runs, residuals, strict=True)])
+    model = _chosen(parts)
+    shown = [np.zeros_like(part.e) for part in parts] if model is None else model.shown
+    left = tuple(
+        r - size * _between(part.t, e, run.t)
+        for run, r, part, e in zip(record.runs, residuals, parts, shown, strict=True)
+    )
+    held_out = np.concatenate([r[run.test] for r, run in zip(left, record.runs, strict=True)])
+    return BlackBox(
+        None if model is None else len(model.a) - 1,
+        np.roots([1.0] if model is None else model.a).astype(complex),
+        every * float(np.median(np.diff(record.runs[0].t))),
+        left,
+        np.sqrt(np.mean(held_out**2, axis=0)),
+    )
+
+
+def _part(run: Run, residual: Array, size: Array, every: int) -> _Part:
+    """Means of `every` samples; a last piece that is shorter is left out."""
+    n = len(run.t) // every * every
+
+    def means(x: Array | BoolArray) -> Array:
+        return np.asarray(x[:n].reshape(-1, every, *x.shape[1:]).mean(axis=1))
+
+    z = means(np.hstack([run.u, run.y - residual]))
+    fitted: BoolArray = means(run.fit) > 1 - 0.5 / every  # all of them
+    return _Part(means(run.t), z, means(residual / size), fitted)
+
+
+def _scaled(parts: Sequence[_Part]) -> list[_Part]:
+    """What drives, about its mean and in units of its spread, with a constant; what is still is left out."""
+    z = np.concatenate([part.z[part.fit] for part in parts])
+    mean, spread = z.mean(axis=0), z.std(axis=0)
+    moves = spread > STILL * (np.abs(mean) + 1e-300)
+    return [
+        _Part(
+            p.t,
+            np.column_stack([np.ones(len(p.t)), (p.z - mean)[:, moves] / spread[moves]]),
+            p.e,
+            p.fit,
+        )
+        for p in parts
+    ]
+
+
+def _between(t: Array, e: Array, at: Array) -> Array:
+    """Values e (n, n_y) at times t (n,), linear between them, at other times (N,)."""
+    return np.column_stack([np.interp(at, t, column) for column in e.T])
+
+
+def _chosen(parts: Sequence[_Part]) -> _Model | None:
+    """The model of the order that Schwarz's criterion prefers, or None where that is no model."""
+    fitted = np.concatenate([part.e[part.fit] for part in parts])
+    n, n_y = fitted.shape
+    best, least = None, float(n * np.log(np.mean(fitted**2, axis=0) + 1e-300).sum())
+    for order in ORDERS:
+        if ENOUGH * (order + 1) * parts[0].z.shape[1] > n:
+            break
+        for model in _rounds(parts, order):
+            score = n * np.log(model.left / n + 1e-300).sum() + model.coefficients * np.log(n * n_y)
+            if score < least:
+                best, least = model, float(score)
+    return best
+
+
+def _rounds(parts: Sequence[_Part], order: int) -> Iterator[_Model]:
+    """The model of an order, and its refinements by prefiltering."""
+    a = np.array([1.0])
+    for _ in range(ROUNDS if order else 1):
+        if order:
+            a = _denominator(parts, a, order)
+        yield _free_run(parts, a, order)
+
+
+def _lagged(x: Array, a: Array, order: int) -> Array:
+    """Columns x (n, k) filtered by 1/a, at 0 to `order` steps before: (n, k (order + 1)), at rest before."""
+    filtered = lfilter([1.0], a, x, axis=0)
+    padded = np.vstack([np.zeros((order, x.shape[1])), filtered])
+    return np.hstack([padded[order - i : len(padded) - i] for i in range(order + 1)])
+
+
+def _denominator(parts: Sequence[_Part], a: Array, order: int) -> Array:
+    """The next denominator: least squares of the ARX equation, all signals filtered by 1/a, made stable."""
+    drives, own = [], []
+    for part in parts:
+        if not part.fit.any():
+            continue
+        span = slice(*(np.flatnonzero(part.fit)[[0, -1]] + [0, 1]))
+        e = _lagged(part.e[span], a, order).reshape(-1, order + 1, part.e.shape[1])
+        drives.append(_lagged(part.z, a, order)[span][order:])
+        own.append(e[order:])
+    phi, e = np.concatenate(drives), np.concatenate(own)
+    rest = e - (phi @ _solve(phi, e.reshape(len(e), -1))).reshape(e.shape)
+    columns = np.moveaxis(rest, 1, 2).reshape(-1, order + 1)  # rows: samples of each output
+    return _stable(np.concatenate([[1.0], -_solve(columns[:, 1:], columns[:, :1])[:, 0]]))
+
+
+def _free_run(parts: Sequence[_Part], a: Array, order: int) -> _Model:
+    """Numerators by least squares of the free run with a denominator, from rest."""
+    columns = [_lagged(part.z, a, order) for part in parts]
+    phi = np.concatenate([c[part.fit] for c, part in zip(columns, parts, strict=True)])
+    e = np.concatenate([part.e[part.fit] for part in parts])
+    b = _solve(phi, e)
+    left = np.sum((e - phi @ b) ** 2, axis=0)
+    return _Model(a, [c @ b for c in columns], left, b.size + order)
+
+
+def _solve(phi: Array, e: Array) -> Array:
+    """Least squares phi x = e by the normal equations, with a little ridge."""
+    gram = phi.T @ phi
+    gram[np.diag_indices_from(gram)] += RIDGE * np.mean(np.diag(gram)) + 1e-300
+    return np.asarray(cho_solve(cho_factor(gram), phi.T @ e))
+
+
+def _stable(a: Array) -> Array:
+    """A polynomial in 1/z with the poles outside of the unit circle mirrored into it."""
+    poles = np.roots(a)
+    size = np.abs(poles)
+    inside = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1.0), size), LARGEST)
+    return np.real(np.poly(poles / np.maximum(size, 1e-300) * inside))

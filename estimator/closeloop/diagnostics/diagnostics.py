@@ -1,0 +1,65 @@
+"""What a report owes its reader beside the finding: what others reach, and what could have been seen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.closeloop.diagnostics.black_box import BlackBox, black_box
+from estimator.closeloop.diagnostics.decoys import decoy_gain
+from estimator.closeloop.diagnostics.power import Visible, power
+from estimator.closeloop.diagnostics.stability import stability
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.screening.regressors import Changes
+from estimator.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Honesty:
+    """black_box: a model without physics on the same record; power: the smallest effects that would have been
+    shown; decoy_gain: what chance regressors reach of Promise.gain; stability: by kind@location, the share of
+    halves of the record in which it leads; free_form: where nothing explains, a curve that comes nearer."""
+
+    black_box: BlackBox
+    power: tuple[Visible, ...]
+    decoy_gain: float
+    stability: Mapping[str, float]
+    free_form: Hypothesis | None = None
+
+
+def honesty(
+    problem: Problem,
+    base: Hypothesis,
+    screened: Fit,
+    change: Changes,
+    size: Array,
+    level: float,
+    rng: np.random.Generator,
+    free_form: Hypothesis | None = None,
+) -> Honesty:
+    """All of it, from the calibrated FMU `base`, its fit as it was screened, and the screening's changes.
+
+    size: (n_y,) that the residual was weighted with; level: of the test for likeness to any effect.
+    """
+    return Honesty(
+        black_box(problem.record, base.residuals, size),
+        tuple(power(screened, change, level, rng, room=room(problem, base.theta))),
+        decoy_gain(screened, change, len(size), rng),
+        stability(screened, change, rng),
+        free_form,
+    )
+
+
+def room(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+    """The largest change of each parameter of the FMU that its limits leave."""
+    given, known = problem.start(theta), problem.plant.fmu.description.variables
+    found = {}
+    for name in problem.plant.fmu.description.parameters:
+        v = known[name]
+        value = given.get(name, v.start or 0.0)
+        up = np.inf if v.max is None else v.max - value
+        down = np.inf if v.min is None else value - v.min
+        found[name] = float(max(up, down))
+    return found

@@ -1,0 +1,85 @@
+"""Stability of the nomination: who stays among the leading when half of the record is left out.
+
+Complementary halves of blocks (Meinshausen and Bühlmann, J. Royal Statistical Society B 72 (2010), 417-473;
+Shah and Samworth, ibid. 75 (2013), 55-80). What leads by a few moments of the record leads in few halves.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
+from estimator.closeloop.screening.regressors import Changes
+from estimator.record import Array
+
+PAIRS = 25  # of complementary halves
+LEADING = 10  # effects that are nominated, of each the best shape
+RIDGE = 1e-9  # of a regressor's square
+NOTHING = 1e-12  # of it, left after projection: it says nothing new
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Sums over each block: of columns with one another, and with the residual: (B, n, n) and (B, n)."""
+
+    gram: Array
+    along: Array
+
+
+def stability(
+    base: Fit, change: Changes, rng: np.random.Generator, leading: int = LEADING, pairs: int = PAIRS
+) -> dict[str, float]:
+    """Share of block halves in which each effect (kind@location) is among the leading ones, by its gain.
+
+    base: of the calibrated FMU; what calibration could take over is projected out in each half anew.
+    """
+    halves = _halves(rng, pairs)
+    blocks = np.array_split(np.arange(len(base.residual)), BLOCKS)
+    edges = [slice(int(b[0]), int(b[-1]) + 1) if len(b) else slice(0, 0) for b in blocks]
+    own = _pieces(base.jacobian, base.residual, edges)
+    gains: dict[str, Array] = {}
+    for c, g in change:
+        found = _gains(c, g, base, own, edges, halves)
+        gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
+    if not gains:
+        return {}
+    table = np.array(list(gains.values()))
+    place = np.argsort(np.argsort(-table, axis=0, kind="stable"), axis=0)
+    counted = np.mean((place < leading) & (table > 0), axis=1)
+    return dict(zip(gains, counted.tolist(), strict=True))
+
+
+def _halves(rng: np.random.Generator, pairs: int) -> Array:
+    """Which blocks are in each half, (2 pairs, BLOCKS): one and its complement in turn."""
+    order = rng.permuted(np.tile(np.arange(BLOCKS), (pairs, 1)), axis=1)
+    one = order < BLOCKS // 2
+    return np.vstack([one, ~one]).astype(float)
+
+
+def _pieces(columns: Array, residual: Array, edges: list[slice]) -> _Pieces:
+    gram = np.array([columns[e].T @ columns[e] for e in edges])
+    return _Pieces(gram, np.array([columns[e].T @ residual[e] for e in edges]))
+
+
+def _gains(c: Candidate, g: Array, base: Fit, own: _Pieces, edges: list[slice], halves: Array) -> Array:
+    """Fall of each half's sum of squares by a candidate, (h,); nothing beyond its amplitude's bounds."""
+    mine = _pieces(g, base.residual, edges)
+    across = np.einsum("hb,bnk->hnk", halves, np.array([base.jacobian[e].T @ g[e] for e in edges]))
+    gram, along = np.einsum("hb,bkl->hkl", halves, mine.gram), halves @ mine.along
+    if base.jacobian.shape[1]:
+        held = np.einsum("hb,bnm->hnm", halves, own.gram)
+        taken = np.linalg.pinv(held, hermitian=True) @ across
+        gram = gram - np.swapaxes(across, 1, 2) @ taken
+        along = along - np.einsum("hnk,hn->hk", taken, halves @ own.along)
+    left, whole = np.einsum("hkk->hk", gram), halves @ np.einsum("bkk->bk", mine.gram)
+    size = np.where(left > NOTHING * whole, np.sqrt(np.maximum(left, 0.0)), np.inf)
+    scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(g.shape[1])
+    z = along / size
+    beta = np.linalg.solve(scaled, z[..., None])[..., 0]
+    found: Array = np.sum(z * beta, axis=1)
+    if len(c.amplitudes) == 1:
+        u = c.amplitudes[0]
+        wanted = -beta[:, 0]  # the residual is reduced by the opposite of what it looks like
+        found = np.where((wanted < 0) & (u.low >= 0) | (wanted > 0) & (u.high <= 0), 0.0, found)
+    return found

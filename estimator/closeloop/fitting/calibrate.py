@@ -1,0 +1,56 @@
+"""The FMU as declared, and calibrated within the declared bounds."""
+
+import numpy as np
+
+from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.noise import noise_floor, weights
+from estimator.record import Array
+
+ROUGH = 1e-3  # gain of a step that is enough where much is left unexplained
+NEAR = 2.0  # mean square, in units of a residual that counts as one, from which down it is not
+SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is left alone
+
+
+def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
+    """Hypotheses without effects, declared and calibrated, and the size of a residual that counts as one.
+
+    Where noise is not declared that size depends on the residual, so the calibration is repeated with it.
+    """
+    record = problem.record
+    states = _start_unknowns(problem)
+    spread = np.std(np.vstack([run.y for run in record.runs]), axis=0) + noise_floor(record)
+    start = fit(problem, states, spread, gain=ROUGH)
+    declared = Hypothesis((), start, tuple(problem.residuals(start.theta)))
+    parameters = [
+        Unknown(n, problem.declared[n], low, high, (high - low) / 10)
+        for n, (low, high) in problem.calibrate.items()
+    ]
+    unknowns = [*parameters, *states]
+    base, size = declared, weights(record, list(declared.residuals))
+    for _ in range(1 if record.floor_known else 2):
+        found = fit(problem, unknowns, size, base.fit.theta, gain=ROUGH)
+        if np.mean(found.residual**2) < NEAR:
+            found = fit(problem, unknowns, size, found.theta)
+        base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
+        size = weights(record, list(base.residuals))
+    return declared, base, size
+
+
+def _start_unknowns(problem: Problem) -> list[Unknown]:
+    """Start states to be found: those that are free, and whose error could be seen in the residual."""
+    guess = problem.start_states(problem.record.runs[0])
+    if not guess:
+        return []
+    known = problem.plant.fmu.description.variables
+    start = {name: value for name, (value, _) in guess.items()}
+    as_guessed = problem.residuals(start)
+    size = weights(problem.record, as_guessed)
+    found = []
+    for name, (value, error) in guess.items():
+        scale = error if np.isfinite(error) else 0.01 * (known[name].nominal or 1.0)
+        moved = problem.residuals({**start, name: value + scale})[0] - as_guessed[0]
+        if np.sum((moved / size) ** 2) > SEEN:
+            found.append(Unknown(name, value, value - error, value + error, float(scale)))
+    return found

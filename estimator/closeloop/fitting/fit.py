@@ -1,0 +1,152 @@
+"""Fit unknowns by simulation error on the identify part, with bounds and standard errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from estimator.closeloop.fitting.slopes import STEP, Slopes
+from estimator.closeloop.hypotheses.fitted import (
+    WIDE,
+    Fit,
+    _inverse,
+    sandwich,
+)
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Array
+from fmus.host.fmu import FmuError
+
+GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
+
+
+NEAR = 5.0  # mean square, in units of noise, from which down derivatives are carried along
+
+
+LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
+
+
+SLIGHT = 0.1  # standard errors: a shift that makes no difference
+
+
+REFUSED = 1e6  # size of a residual where the FMU could not be run
+
+
+Named = Callable[[Sequence[float]], dict[str, float]]  # values by name, of a place
+
+
+def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
+    """Residual on the identify part over `size` (n_y,), sample after sample, (m,)."""
+    try:
+        flat = (problem.identify_residual(theta) / size).ravel()
+    except FmuError:
+        flat = np.full(sum(int(run.fit.sum()) for run in problem.record.runs) * len(size), np.nan)
+    return np.nan_to_num(np.clip(flat, -REFUSED, REFUSED), nan=REFUSED)
+
+
+def fit(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    size: Array,
+    start: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    evaluations: int = 30,
+    known: Mapping[str, Array] | None = None,
+    guess: Mapping[str, Array] | None = None,
+    gain: float = GAIN,
+    step: float = STEP,
+) -> Fit:
+    """Least squares of the simulation error over the unknowns, from `start` or their own start values.
+
+    evaluations: simulations at most, the first one of each leg counted and those for differences not; gain:
+    share of the sum of squares; a step that gains less is the last one. known: derivatives (m,) of the
+    weighted residual by some of the unknowns, taken as they are; guess: such as are good enough to begin;
+    step: of differences, in scales; a moment, which a model meets only at its own steps, has the usual one.
+    """
+    low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
+    x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
+    names = [u.name for u in unknowns]
+
+    def theta(x: Sequence[float]) -> dict[str, float]:
+        return {**(fixed or {}), **dict(zip(names, x, strict=True))}
+
+    residual = _residual(problem, theta, size, len(names) + 2)
+    if not unknowns:
+        alone = residual(x0)
+        return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
+    fading = [i for i, name in enumerate(names) if name in problem.free_states]
+    begun = _begun(problem, theta, size) if fading else None
+    steps = np.array([STEP if u.is_moment else step for u in unknowns])
+    slopes = Slopes(residual, scale, high, [(known or {}).get(n) for n in names], fading, begun, steps)
+    x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
+    slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
+    secants = not known and problem.record.floor_known
+    x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, secants)
+    r, jacobian = residual(x), slopes.at(x)
+    middle = _middle(x, jacobian, scale, low, high)
+    if np.any(middle != x) and np.sum(residual(middle) ** 2) < r @ r + len(x):
+        x, r = middle, residual(middle)
+    return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)
+
+
+def _residual(problem: Problem, theta: Named, size: Array, places: int) -> Callable[[Array], Array]:
+    """The weighted residual (m,) as a function of x; that of the last places is kept."""
+
+    @lru_cache(places)
+    def simulated(x: tuple[float, ...]) -> Array:
+        return weighted(problem, theta(x), size)
+
+    return lambda x: simulated(tuple(x.tolist()))
+
+
+def _begun(problem: Problem, theta: Named, size: Array) -> Callable[[Array, float], Array] | None:
+    """The first share of the weighted residual as a function of x; None of several runs."""
+    if sum(run.fit.any() for run in problem.record.runs) > 1:
+        return None
+    part = lru_cache(problem.beginning)
+    return lambda x, share: weighted(part(share), theta(x.tolist()), size)
+
+
+def _descended(
+    residual: Callable[[Array], Array], slopes: Slopes, x: Array, bounds: tuple[Array, Array], scale: Array,
+    evaluations: int, gain: float, secants: bool,
+) -> tuple[Array, bool]:  # fmt: skip
+    """Where steps from x end, and whether not broken off.
+
+    With derivatives by differences throughout while the way is far; near the end along secants, and there by
+    differences again, until these gain little from the start.
+    """
+    left = evaluations
+    while True:
+        exact, before = slopes.exact, float(np.sum(residual(x) ** 2))
+        near = secants and before < NEAR * len(residual(x))
+        found = least_squares(
+            residual, x, slopes.at if near else slopes.by_differences, bounds,
+            x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,
+        )  # fmt: skip
+        x, left = found.x, left - found.nfev
+        little = 2 * found.cost > (1 - LITTLE) * before
+        if not near or (exact and little) or left <= 0:
+            break
+        slopes.by_differences(x)
+    if near and not (slopes.exact or (exact and little)):
+        slopes.by_differences(x)
+    return x, found.status > 0
+
+
+def _middle(x: Array, jacobian: Array, scale: Array, low: Array, high: Array) -> Array:
+    """The mean of what data and bounds leave, (n,); x: where the sum of squares is least.
+
+    What the data tell stays where it is; where they tell only the sum of two, each goes as far from its
+    bounds as the other lets it. Small shifts, which make no difference, are none.
+    """
+    bounded = high - low < WIDE * scale
+    away = np.zeros(len(x))
+    away[bounded] = ((low[bounded] + high[bounded]) / 2 - x[bounded]) / scale[bounded]
+    inverse, prior = _inverse(jacobian * scale, scale, high - low)
+    shift = inverse @ (prior * away)
+    if np.all(np.abs(shift) < SLIGHT * np.sqrt(np.diag(inverse))):
+        return x
+    return np.asarray(np.clip(x + shift * scale, low, high))

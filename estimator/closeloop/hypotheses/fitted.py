@@ -1,0 +1,119 @@
+"""What a fit found: values, their covariance, and the local picture around them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag, pinvh
+
+from estimator.closeloop.question.problem import Unknown
+from estimator.record import Array
+
+WIDE = 1e3  # scales within which an unknown without bounds lies
+
+
+HELD = 1e-2  # of an unknown's scale: one that comes so near to a bound is held by it
+
+
+BLOCKS = 30  # pieces of the record between which residuals count as independent
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Values found, their standard errors, and the local picture around them.
+
+    residual: (m,) weighted, on the identify part; jacobian: (m, n) its derivatives by the unknowns;
+    covariance: (n, n), from blocks of the record where residuals are not white; converged: not broken off.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    values: Array
+    covariance: Array
+    residual: Array
+    jacobian: Array
+    converged: bool = True
+
+    @property
+    def theta(self) -> dict[str, float]:
+        """Values by name."""
+        return {u.name: float(v) for u, v in zip(self.unknowns, self.values, strict=True)}
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Derivatives (m,) of the residual by each unknown."""
+        return {u.name: column for u, column in zip(self.unknowns, self.jacobian.T, strict=True)}
+
+    @property
+    def beyond_noise(self) -> float:
+        """What its sum of squares has more than noise would."""
+        return float(self.residual @ self.residual) - len(self.residual)
+
+    def extended(self, other: Fit, names: Collection[str]) -> Fit:
+        """The same with some unknowns of another fit as they are there."""
+        i = [k for k, u in enumerate(other.unknowns) if u.name in names]
+        return Fit(
+            (*self.unknowns, *(other.unknowns[k] for k in i)),
+            np.concatenate([self.values, other.values[i]]),
+            block_diag(self.covariance, other.covariance[np.ix_(i, i)]),
+            self.residual,
+            np.hstack([self.jacobian, other.jacobian[:, i]]),
+            self.converged,
+        )
+
+    @property
+    def inflation(self) -> Array:
+        """Variance of each value over that in white noise, (n,), at least 1: what correlated residuals do."""
+        scale = np.array([u.scale for u in self.unknowns])
+        width = np.array([u.high - u.low for u in self.unknowns])
+        white, as_they_are = (
+            np.diag(sandwich(r, self.jacobian, scale, width))
+            for r in (np.zeros_like(self.residual), self.residual)
+        )
+        return np.asarray(np.maximum(as_they_are / np.maximum(white, 1e-300), 1.0))
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard errors by name."""
+        deviation = np.sqrt(np.maximum(np.diag(self.covariance), 0))
+        return {u.name: float(s) for u, s in zip(self.unknowns, deviation, strict=True)}
+
+
+def loose(fit: Fit) -> Fit:
+    """The fit without the unknowns that a bound holds back: what they could take over they have taken."""
+    low, high, scale = (np.array([getattr(u, key) for u in fit.unknowns]) for key in ("low", "high", "scale"))
+    free = np.flatnonzero(np.minimum(fit.values - low, high - fit.values) > HELD * scale)
+    return replace(
+        fit,
+        unknowns=tuple(fit.unknowns[i] for i in free),
+        values=fit.values[free],
+        covariance=fit.covariance[np.ix_(free, free)],
+        jacobian=fit.jacobian[:, free],
+    )
+
+
+def _inverse(j: Array, scale: Array, width: Array) -> tuple[Array, Array]:
+    """Covariance (n, n) of the unknowns in scales for white residuals, and what bounds alone say, (n,)."""
+    prior = 12 * (scale / np.minimum(width, WIDE * scale)) ** 2
+    return np.asarray(pinvh(j.T @ j + np.diag(prior))), prior
+
+
+def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:
+    """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
+
+    Never below the covariance for white residuals of variance 1. Where the score of the whole does not
+    vanish, as at a bound that holds an unknown back, the step that it asks for counts as an error too.
+    width: (n,) between the bounds, which say as much as a uniform distribution between them; without bounds
+    that is WIDE scales, so that what has no influence is not taken for certain.
+    """
+    j = jacobian * scale
+    inverse, _ = _inverse(j, scale, width)
+    scores = np.array(
+        [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
+    )
+    whole = scores.sum(axis=0)
+    robust = inverse @ (scores.T @ scores + np.outer(whole, whole)) @ inverse
+    grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(inverse), 1e-300), 1.0))
+    covariance: Array = inverse * np.outer(grown, grown) * np.outer(scale, scale)
+    return covariance

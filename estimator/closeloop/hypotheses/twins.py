@@ -1,0 +1,56 @@
+"""Effects that no record can tell apart, since they act on the FMU in the same way: one is fitted for all."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.question.problem import Unknown
+from estimator.record import Array
+from fmus.effects import EFFECTS
+
+Twins = Mapping[str, tuple[str, ...]]  # labels by the label that stands for them
+
+
+def twins(change: Sequence[tuple[Candidate, Array]]) -> dict[str, tuple[str, ...]]:
+    """Labels of effects of one kind that change the same to the last bit, by the first of them."""
+    changes: dict[str, list[bytes]] = {}
+    kinds: dict[str, str] = {}
+    for c, g in change:
+        if not c.is_fault:
+            changes.setdefault(c.label, []).append(g.tobytes())
+            kinds[c.label] = c.kind
+    alike: dict[int, list[str]] = {}
+    for label, parts in changes.items():
+        alike.setdefault(hash((kinds[label], *parts)), []).append(label)
+    return {first: tuple(others) for first, *others in alike.values() if others}
+
+
+def with_twins(found: Sequence[Hypothesis], known: Twins) -> list[Hypothesis]:
+    """Hypotheses of one candidate, each followed by what it says of its twins."""
+    every = []
+    for h in found:
+        others = known.get(h.label, ())
+        every += [h, *(_moved(h, label.partition("@")[2]) for label in others)]
+    return every
+
+
+def _moved(h: Hypothesis, location: str) -> Hypothesis:
+    """The same at another location."""
+    (c,) = h.candidates
+    here, there = (f"{c.kind}_{at}_" for at in (c.location, location))
+
+    def named(name: str) -> str:
+        return there + name.removeprefix(here) if name.startswith(here) else name
+
+    def moved(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
+        return tuple(replace(u, name=named(u.name)) for u in unknowns)
+
+    fixed = {named(n): v for n, v in c.fixed.items()}
+    twin = replace(c, location=location, amplitudes=moved(c.amplitudes), shape=moved(c.shape), fixed=fixed)
+    return replace(h, candidates=(twin,), fit=replace(h.fit, unknowns=moved(h.fit.unknowns)))
+
+
+def limits(kind: str) -> tuple[str, ...]:
+    """Kinds of effects that one becomes at a limit; none of a sensor's fault."""
+    return EFFECTS[kind].becomes if kind in EFFECTS else ()

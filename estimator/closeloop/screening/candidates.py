@@ -1,0 +1,165 @@
+"""The candidates of a record: every effect and sensor fault that makes sense, in each shape worth trying."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.record import Array, Record
+from estimator.sensor_faults import sensor_faults as sensors
+from fmus.effects import EFFECTS
+from fmus.effects.component_effect import ComponentEffect
+from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
+from fmus.effects.input_effect import HOLD, InputEffect
+from fmus.effects.parameter_effect import ParameterEffect
+from fmus.effects.site import Site
+from fmus.variables import Parameter, Variable
+
+FINE = 0.1  # of a shape parameter's value: a change of it that matters
+
+
+LARGEST = 200.0  # realistic sizes of a parameter's change: ten times the parameter
+
+
+NEAR = 0.2  # of its start: a calibrated parameter is within it
+
+
+MOMENT = 0.01  # of the record's length, the same for a time
+
+
+def physical_candidates(
+    offers: Sequence[tuple[str, str]], site: Site, record: Record, forces: Sequence[MissingForce]
+) -> list[Candidate]:
+    """Every effect on offer, (kind, location), in each shape worth trying."""
+    at = {missing.port.name: missing for missing in forces}
+    found: list[Candidate] = []
+    for kind, location in offers:
+        effect = EFFECTS[kind]
+        if issubclass(effect, ForceLaw):
+            if location in at:
+                found += _of_a_force(effect, location, at[location])
+        elif issubclass(effect, InputEffect):
+            if location in record.inputs:
+                found += _of_an_input(effect, location, record)
+        elif issubclass(effect, ParameterEffect):
+            found += _of_a_parameter(effect, location, site, record)
+        elif issubclass(effect, ComponentEffect):
+            size = {a: effect.size(_length(record)) for a in effect.amplitudes}
+            shapes = effect.guesses(_times(record))
+            found += [_candidate(effect, location, size, shape, _length(record)) for shape in shapes]
+    return found
+
+
+def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
+    """Bias, gain, delay and drift of each measured output."""
+    found = []
+    y = np.vstack([run.y for run in record.runs])
+    length = max(float(run.t[-1] - run.t[0]) for run in record.runs)
+    step = float(np.median(np.diff(record.runs[0].t)))
+    for j, output in enumerate(record.outputs):
+        spread = float(np.std(y[:, j])) + float(noise[j])
+        size = {"sensor_bias": 0.05 * spread, "sensor_gain": 0.05, "sensor_delay": 3 * step}
+        size["sensor_drift"] = 0.05 * spread / length
+        for kind in sensors.KINDS:
+            low = 0.0 if kind == "sensor_delay" else -np.inf
+            unknown = Unknown(sensors.parameter(kind, output), 0.0, low, np.inf, size[kind])
+            found.append(Candidate(kind, output, (unknown,)))
+    return found
+
+
+def _of_a_force(effect: type[ForceLaw], location: str, seen: MissingForce) -> Iterator[Candidate]:
+    motion = seen.t - seen.t[0], seen.displacement, seen.velocity
+    for shape in effect.guesses(*motion, seen.force):
+        sizes = {a: _size(effect, a, shape, motion, seen.force) for a in effect.amplitudes}
+        yield _candidate(effect, location, sizes, shape, float(motion[0][-1]))
+
+
+def _of_an_input(effect: type[InputEffect], location: str, record: Record) -> Iterator[Candidate]:
+    run, j = record.runs[0], record.inputs.index(location)
+    u, size = run.u[run.fit, j], effect.size(_length(record))
+    whole = effect.complete
+    for shape in effect.guesses(_times(record), u):
+        sizes = {a: whole.get(a, size) for a in effect.amplitudes}
+        told = {HOLD: float(run.u[0, j])} if any(p.name == HOLD for p in effect.parameters("1")) else {}
+        yield _candidate(effect, location, sizes, {**shape, **told}, _length(record))
+
+
+def _of_a_parameter(
+    effect: type[ParameterEffect], location: str, site: Site, record: Record
+) -> Iterator[Candidate]:
+    members = effect.locations(site)[location]
+    sizes = {}
+    for name in members:
+        value = site.variables[name].start or site.variables[name].nominal or 1.0
+        for a in effect.amplitudes:
+            own = a if location == name else f"{a}_{name}"
+            sizes[own] = effect.size(value, _length(record))
+    for shape in effect.guesses(_times(record)):
+        found = _candidate(effect, location, sizes, shape, _length(record))
+        limited = (_limited(u, site.variables[n]) for u, n in zip(found.amplitudes, members, strict=True))
+        yield replace(found, amplitudes=tuple(limited))
+
+
+def _limited(change: Unknown, of: Variable) -> Unknown:
+    """A change that leaves a parameter within its limits, wherever near its start it may be."""
+    value, most = of.start or 0.0, LARGEST * change.scale
+    low = -np.inf if of.min is None else of.min - value - NEAR * abs(value)
+    high = np.inf if of.max is None else of.max - value + NEAR * abs(value)
+    return replace(change, low=max(low, -most), high=min(high, most))
+
+
+def _candidate(
+    effect: type[Effect], location: str, sizes: Mapping[str, float], shape: Mapping[str, float], length: float
+) -> Candidate:
+    """sizes: of each amplitude; shape: start values, of those that a record tells the final ones."""
+    declared = {p.name: p for p in effect.parameters(_ANY[effect.acts_on])}
+    fixed = dict(effect.complete)
+    fixed |= {n: v for n, v in shape.items() if n in effect.told or n == HOLD}
+    amplitudes = tuple(
+        _unknown(effect, location, name, declared.get(name, declared.get(name.split("_")[0])), 0.0, abs(size))
+        for name, size in sizes.items()
+    )
+    free = {n: v for n, v in shape.items() if n not in fixed}
+    others = tuple(
+        _unknown(
+            effect, location, n, declared[n], v, MOMENT * length if n == "t0" else FINE * (abs(v) or 1.0)
+        )
+        for n, v in free.items()
+    )
+    named = {effect.name_at(location, n): v for n, v in fixed.items()}
+    return Candidate(effect.kind, location, amplitudes, others, named)
+
+
+_ANY = {"port": "rotation", "component": "", "parameter": "1", "input": "1"}  # units do not matter here
+
+
+def _unknown(
+    effect: type[Effect], location: str, name: str, p: Parameter | None, start: float, scale: float
+) -> Unknown:
+    low = -np.inf if p is None or p.min is None else p.min
+    high = np.inf if p is None or p.max is None else p.max
+    return Unknown(effect.name_at(location, name), start, low, high, scale)
+
+
+def _size(
+    effect: type[ForceLaw], amplitude: str, shape: Mapping[str, float], motion: tuple[Array, Array, Array],
+    force: Array,
+) -> float:  # fmt: skip
+    """The amplitude with which the law's force has the rms of the missing one."""
+    unit = effect.along({**shape, amplitude: 1.0}, *motion)
+    rms = float(np.sqrt(np.mean(unit**2)))
+    return float(np.sqrt(np.mean(force**2))) / max(rms, 1e-12)
+
+
+def _times(record: Record) -> Array:
+    """Times of the identify part, s from the start."""
+    run = record.runs[0]
+    return np.asarray(run.t[run.fit] - run.t[0])
+
+
+def _length(record: Record) -> float:
+    return float(record.runs[0].t[-1] - record.runs[0].t[0])

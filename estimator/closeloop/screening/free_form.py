@@ -1,0 +1,83 @@
+"""Where a force of free form may act, and over what: by regression of the smoothed missing forces."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.record import Array
+from fmus.effects import EFFECTS
+from fmus.effects.free_form import FreeForm
+
+PIECES = 10  # of the identify part, each left out in turn
+
+
+RIDGE = 1e-3  # of the splines' mean square: controls that nothing visits stay at zero
+
+
+FREE_FORMS: dict[str, type[FreeForm]] = {k: e for k, e in EFFECTS.items() if issubclass(e, FreeForm)}
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How much of a port's missing force is a curve over one quantity; share: on pieces left out, 1 at most.
+
+    shape: the curve's ends or order.
+    """
+
+    kind: str
+    location: str
+    against: str
+    share: float
+    shape: dict[str, float]
+
+
+def dependences(problem: Problem, forces: Sequence[MissingForce]) -> list[Dependence]:
+    """Over what the missing force at each port is a curve, most first; of several shapes the best."""
+    best: dict[tuple[str, str], Dependence] = {}
+    for d in _dependences(problem, forces):
+        key = (d.kind, d.location)
+        if key not in best or d.share > best[key].share:
+            best[key] = d
+    return sorted(best.values(), key=lambda d: -d.share)
+
+
+def offered(problem: Problem, forces: Sequence[MissingForce]) -> list[tuple[str, str]]:
+    """(kind, port) of every force of free form that makes sense at the port."""
+    model = problem.builder.outside().model
+    known = model.ports() if model else {}
+    ports = [m.port.name for m in forces]
+    return [
+        (k, at) for at in ports for k, law in FREE_FORMS.items() if at not in known or law.fits(known[at])
+    ]
+
+
+def _dependences(problem: Problem, forces: Sequence[MissingForce]) -> Iterator[Dependence]:
+    at_port = {m.port.name: m for m in forces}
+    for kind, at in offered(problem, forces):
+        law, m = FREE_FORMS[kind], at_port[at]
+        for shape in law.guesses(m.t - m.t[0], m.displacement, m.velocity, m.force):
+            weight = 1 / np.maximum(m.std, LEAST * np.median(m.std) + 1e-300)
+            splines = law.splines(shape, m.displacement, m.velocity) * weight[:, None]
+            yield Dependence(kind, at, law.against, left_out(splines, m.force * weight), shape)
+
+
+def left_out(columns: Array, y: Array) -> float:
+    """Share of the squares of y (n,) that regression on columns (n, k) predicts in pieces left out.
+
+    1 is all of it; below 0 the prediction is worse than none.
+    """
+    pieces = np.array_split(np.arange(len(y)), PIECES)
+    grams = np.array([columns[p].T @ columns[p] for p in pieces])
+    along = np.array([columns[p].T @ y[p] for p in pieces])
+    ridge = (RIDGE * np.mean(np.diag(grams.sum(axis=0))) + 1e-300) * np.eye(columns.shape[1])
+    rest = 0.0
+    for i, p in enumerate(pieces):
+        seen = np.linalg.solve(grams.sum(axis=0) - grams[i] + ridge, along.sum(axis=0) - along[i])
+        rest += float(np.sum((y[p] - columns[p] @ seen) ** 2))
+    return 1 - rest / (float(y @ y) + 1e-300)
+
+
+LEAST = 1e-3  # of the median standard deviation of a missing force: it is nowhere known better

@@ -1,0 +1,153 @@
+"""An FMU linearised along its free run, by restarts: what a small change of anything does to its outputs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.closeloop.question.problem import Problem
+from estimator.plant import PLANTS
+from estimator.record import Array
+
+POINTS = 200  # at most this many linearisations along the run
+PROBES = 5  # samples at which a restart is compared with the free run
+HIDDEN = 1e-3  # of a state's largest step: a restart that differs more has lost a state
+NUDGE = 1e-4  # of a lever's size
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """x+ = A x + B w, y = C x + D w around a free run, w the change of each lever.
+
+    index: (k,) samples; A: (k, n, n); B: (k, n, n_w); C: (k, n_y, n); D: (k, n_y, n_w).
+    """
+
+    index: NDArray[np.intp]
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+    def of(self, outputs: slice) -> "Linearised":
+        """The same with some of the outputs."""
+        return replace(self, C=self.C[:, outputs], D=self.D[:, outputs])
+
+    def near(self, samples: int) -> NDArray[np.intp]:
+        """For each sample the linearisation before it, (samples,)."""
+        near: NDArray[np.intp] = np.maximum(np.searchsorted(self.index, np.arange(samples), "right") - 1, 0)
+        return near
+
+
+class Influence(NamedTuple):
+    """What a unit of a lever does to the states in each step, (N, n), and to the outputs, (N, n_y)."""
+
+    states: Array
+    outputs: Array
+
+
+def shows_its_state(problem: Problem, theta: Mapping[str, float], x: Array) -> bool:
+    """Whether a restart from the states that the FMU shows, x (N, n), goes on as its free run did."""
+    plant, run, start = problem.plant, problem.record.runs[0], problem.start(theta)
+    if not plant.states:
+        return False
+    moves = np.abs(np.diff(x, axis=0)).max(axis=0) + 1e-300
+    for k in np.linspace(0, len(x) - 2, PROBES).astype(int):
+        here = start | dict(zip(plant.states, x[k].tolist(), strict=True))
+        found = plant.simulate(run.part(k, k + 2), here, plant.states)[1, len(plant.outputs) :]
+        if np.any(np.abs(found - x[k + 1]) > HIDDEN * moves):
+            return False
+    return True
+
+
+def linearise(
+    problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp],
+    levers: Sequence[str], more: Sequence[str] = (),
+) -> Linearised:  # fmt: skip
+    """Linearise steps between the samples `keep` of the first run, whose states are x (N, n).
+
+    levers: inputs; more: outputs beside those of the record.
+    """
+    record, run = problem.record, problem.record.runs[0]
+    plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
+    index = np.unique(np.linspace(0, len(keep) - 2, min(POINTS, len(keep) - 1)).astype(int))
+    start = problem.start(theta)
+    nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))
+    parts: list[tuple[Array, Array, Array, Array]] = []
+    for k in index:
+        here, dt = keep[k], float(run.t[keep[k + 1]] - run.t[keep[k]])
+        u = dict(zip(plant.inputs, run.u[here : keep[k + 1] + 1].mean(axis=0).tolist(), strict=True))
+        given = {**start, **u}
+        x0, y0 = plant.response(x[here], given, dt)
+        columns = [plant.response(x[here] + d, given, dt) for d in nudges]
+        size = np.diag(nudges)
+        a = np.column_stack([(x1 - x0) / d for (x1, _), d in zip(columns, size, strict=True)])
+        c = np.column_stack([(y1 - y0) / d for (_, y1), d in zip(columns, size, strict=True)])
+        b, e = np.empty((len(x0), len(levers))), np.empty((len(y0), len(levers)))
+        for i, name in enumerate(levers):
+            h = NUDGE * _size(problem, name, given)
+            x1, y1 = plant.response(x[here], {**given, name: _value(problem, name, given) + h}, dt)
+            b[:, i], e[:, i] = (x1 - x0) / h, (y1 - y0) / h
+        parts.append((a, b, c, e))
+    A, B, C, D = (np.array(p) for p in zip(*parts, strict=True))
+    return Linearised(index, A, B, C, D)
+
+
+def _value(problem: Problem, name: str, given: Mapping[str, float]) -> float:
+    return given.get(name, problem.plant.fmu.description.variables[name].start or 0.0)
+
+
+def _size(problem: Problem, name: str, given: Mapping[str, float]) -> float:
+    """Size of a lever, away from its limit above."""
+    v = problem.plant.fmu.description.variables[name]
+    size = abs(_value(problem, name, given)) or v.nominal or 1.0
+    at_the_top = v.max is not None and _value(problem, name, given) + NUDGE * size > v.max
+    return -size if at_the_top else size
+
+
+def influences(
+    problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp], levers: Sequence[str]
+) -> tuple[Linearised, dict[str, Influence]]:
+    """The FMU linearised, and what each lever, an input or a parameter, does between the samples `keep`.
+
+    What a parameter does goes with the motion, which may be faster than the linearisations lie apart: it
+    comes from a free run with the parameter changed.
+    """
+    plant = problem.plant
+    inputs = [name for name in levers if name in plant.fmu.description.inputs]
+    local = linearise(problem, theta, x, keep, inputs)
+    near = local.near(len(keep))
+    found = {name: Influence(local.B[near, :, i], local.D[near, :, i]) for i, name in enumerate(inputs)}
+    run, start = problem.record.runs[0].part(0, keep[-1] + 1), problem.start(theta)
+    n_y, a, c = len(plant.outputs), local.A[near[:-1]], local.C[near]
+    before = plant.simulate(run, start, plant.states)[keep]
+    for name in (n for n in levers if n not in found):
+        h = NUDGE * _size(problem, name, start)
+        after = plant.simulate(run, {**start, name: _value(problem, name, start) + h}, plant.states)[keep]
+        dy, dx = np.split((after - before) / h, (n_y,), axis=1)
+        steps = dx[1:] - np.einsum("kmn,kn->km", a, dx[:-1])
+        steps[0] = dx[1]  # what moves at the start is no step
+        found[name] = Influence(np.vstack([steps, steps[-1:]]), dy - np.einsum("kyn,kn->ky", c, dx))
+    return local, found
+
+
+def responses(
+    local: Linearised, levers: Mapping[str, Influence], moved: Sequence[Mapping[str, Array]], samples: int
+) -> Array:
+    """Change of the outputs (samples, n_y, k) by each of k sets of changes (samples,) of levers."""
+    near = local.near(samples)
+    n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
+    force, direct = np.zeros((k, samples, n)), np.zeros((k, samples, n_y))
+    for f, d, changes in zip(force, direct, moved, strict=True):
+        for name, change in changes.items():
+            w = change[:samples, None]
+            f += levers[name].states * np.vstack([(w[1:] + w[:-1]) / 2, w[-1:]])
+            d += levers[name].outputs * w
+    steps = np.ascontiguousarray(np.moveaxis(force, 0, 2))
+    x, states = np.zeros((n, k)), np.empty((samples, n, k))
+    for s in range(samples):
+        states[s] = x
+        x = local.A[near[s]] @ x + steps[s]
+    found: Array = local.C[near] @ states + np.moveaxis(direct, 0, 2)
+    return found

@@ -1,0 +1,230 @@
+"""Screening by sensitivity: how much of the residual could each candidate explain?
+
+Each effect is worked out around the FMU along its free run, at a realistic size; what that change of
+forces, inputs and parameters does to the outputs comes from the linearised FMU, or from a simulation where
+the FMU hides its state. What the calibrated parameters could take over is projected out. It nominates;
+the joint fit decides.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.screening.grouped import group_size, grouped, grouped_fit
+from estimator.closeloop.screening.levers import Course, names_of, shifts
+from estimator.closeloop.screening.linear import (
+    Influence,
+    Linearised,
+    influences,
+    responses,
+    shows_its_state,
+)
+from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.record import Array
+from estimator.sensor_faults.sensor_faults import faulty
+from fmus.effects.site import SPEED
+from fmus.export.around.outside import Around, around
+
+NOTHING = 1e-9  # of a regressor left after projection: it says nothing new
+
+
+ALIKE = 1e-2  # of a regressor's length: of two that differ by less each gets half
+
+
+TRUSTED = 5.0  # scales from which a linear answer is not trusted further
+
+
+TOGETHER = 128  # changes whose responses are worked out at once
+
+
+RUNAWAY = 1e9  # times what counts as one: no answer of a linear picture that holds
+
+
+class Screening:
+    """Works out what candidates would change; the FMU is run and linearised when first asked for.
+
+    size: (n_y,) of a residual that counts as one. forces: at each port, with the motion there that it
+    makes; a law is worked out along that motion, since the FMU without the law may move quite differently.
+    fit: the fit as changes are to be compared with it, so many samples (`grouped.py`) as one.
+    """
+
+    def __init__(self, problem: Problem, base: Fit, size: Array, forces: Sequence[MissingForce] = ()) -> None:
+        self.problem, self.theta, self.size, self.forces = problem, base.theta, size, forces
+        self._shown = problem.simulate(self.theta)
+        self.group = group_size(problem, self._shown[0])
+        self.fit = grouped_fit(base, len(size), self.group)
+        self._made: dict[str, Around] = {}
+        self._local: tuple[Linearised, dict[str, Influence]] | None = None
+
+    def changes(self, candidates: Sequence[Candidate]) -> list[Array]:
+        """Change of the residual of `fit` by each candidate's amplitudes at their scales, (m, k) each."""
+        physical = [c for c in candidates if not c.is_fault]
+        moved = {c: self._moved(c) for c in physical}
+        columns = iter(self._answers([change for c in physical for change in moved[c]]))
+        own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
+        own |= {c: self._fault(c) for c in candidates if c.is_fault}
+        return [own[c] for c in candidates]
+
+    @property
+    def length(self) -> float:
+        """Of the run that is fitted, s."""
+        return float(self._free.t[-1])
+
+    def _moved(self, c: Candidate) -> list[dict[str, Array]]:
+        """What each amplitude of a candidate changes of what the FMU is given."""
+        if c.label not in self._made:
+            self._made[c.label] = around(self.problem.builder.outside(), [(c.kind, c.location)])
+        course = self._courses.get(c.location, self._free)
+        return [shifts(self._made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
+
+    @cached_property
+    def _at(self) -> NDArray[np.intp]:
+        """Samples that are looked at: the middle of each group, up to the last one that is fitted."""
+        return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
+
+    @cached_property
+    def _free(self) -> Course:
+        """The free run of the first run of the record."""
+        problem, theta, at = self.problem, self.theta, self._at
+        description = problem.builder.outside().description
+        names = [*description.inputs, *description.parameters]
+        plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
+        motion = [name for p in problem.ports for name in (p.displacement, p.velocity)]
+        [full, *_] = problem.simulate(theta, motion)
+        known = plant.fmu.description.variables
+        start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
+        columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
+        given = [columns.get(n, np.full(last, start[n])) for n in names]
+        t = run.t[:last] - run.t[0]
+        speed = columns.get(SPEED, np.zeros(last))
+        way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
+        return Course(t[at], full[at, len(plant.outputs) :], np.column_stack(given)[at], way[at])
+
+    @cached_property
+    def _courses(self) -> dict[str, Course]:
+        """For each port the course with the motion that its missing force makes."""
+        return {m.port.name: _along(self._free, m) for m in self.forces if m.motion is not None}
+
+    @cached_property
+    def _states(self) -> Array | None:
+        """States of the free run (n, n_x); None where the FMU does not show all of them."""
+        plant = self.problem.plant
+        [full, *_] = self.problem.simulate(self.theta, plant.states)
+        x: Array = full[: _last(self.problem), len(plant.outputs) :]
+        return x if shows_its_state(self.problem, self.theta, x) else None
+
+    def _answers(self, moved: Sequence[Mapping[str, Array]]) -> list[Array]:
+        """Change of the weighted residual on the identify part by each change of levers, (m,) each."""
+        if not moved:
+            return []
+        if self._states is None:
+            return [self._simulated(change) for change in moved]
+        local, levers = self._linearised(names_of(moved), self._states)
+        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size[:, None]
+        found: list[Array] = []
+        for i in range(0, len(moved), TOGETHER):
+            some = moved[i : i + TOGETHER]
+            with np.errstate(over="ignore", invalid="ignore"):
+                y = responses(local, levers, some, len(self._at))[fit]
+                columns = (y * scale).reshape(-1, y.shape[2]).T
+                sound = np.all(np.abs(columns) < RUNAWAY, axis=1)
+            # what sticks and slips has no linear picture: it runs away
+            found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
+        return found
+
+    def _linearised(self, levers: list[str], x: Array) -> tuple[Linearised, dict[str, Influence]]:
+        if self._local is None or not set(levers) <= set(self._local[1]):
+            self._local = influences(self.problem, self.theta, x, self._at, levers)
+        return self._local
+
+    def _simulated(self, change: Mapping[str, Array]) -> Array:
+        """The same of one change by a simulation with it given to the FMU."""
+        problem = self.problem
+        run, plant, start = problem.record.runs[0], problem.plant, problem.start(self.theta)
+        known = plant.fmu.description.variables
+        push = {}
+        for name, samples in change.items():
+            rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
+            push[name] = rest + np.interp(np.arange(len(run.t)), self._at, samples)
+        moved = plant.simulate(run, start, push=push) - self._unchanged
+        return self._weighted(moved[run.fit])
+
+    @cached_property
+    def _unchanged(self) -> Array:
+        """Outputs of the first run without any change (N, n_y)."""
+        return self.problem.plant.simulate(self.problem.record.runs[0], self.problem.start(self.theta))
+
+    def _fault(self, c: Candidate) -> Array:
+        """Change of the residual by a fault of a sensor, (m, 1)."""
+        record, fault = self.problem.record, {u.name: u.scale for u in c.amplitudes}
+        parts = [
+            (faulty(y, run.t, record.outputs, fault) - y)[run.fit]
+            for y, run in zip(self._shown, record.runs, strict=True)
+            if run.fit.any()
+        ]
+        return self._weighted(np.concatenate(parts))[:, None]
+
+    def _weighted(self, change: Array) -> Array:
+        """A change of the outputs on the identify part (m, n_y) as one of the residual of `fit`."""
+        return grouped(-(change / self.size).ravel(), len(self.size), self.group)
+
+
+def _along(free: Course, missing: MissingForce) -> Course:
+    """The course with the motion that a missing force makes."""
+    t = missing.t - missing.t[0]
+    motion = np.column_stack([np.interp(free.t, t, column) for column in np.asarray(missing.motion).T])
+    return replace(free, motion=motion)
+
+
+def _last(problem: Problem) -> int:
+    return int(np.flatnonzero(problem.record.runs[0].fit)[-1]) + 1
+
+
+def screen(base: Fit, sets: Sequence[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
+    """Promise of each set of candidates with its changes (m, k), best first."""
+    basis = np.linalg.qr(base.jacobian)
+    return sorted((_promise(base, *basis, c, raw) for c, raw in sets), key=lambda p: -p.gain)
+
+
+def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:
+    """Amplitudes (k,) within bounds with which regressors g (m, k) come nearest to r; short where alike."""
+    if not g.shape[1]:
+        return np.zeros(0)
+    size = np.linalg.norm(g, axis=0)
+    q, triangle = np.linalg.qr(np.vstack([g / size, ALIKE * np.eye(len(size))]))
+    whole = np.concatenate([r, np.zeros(len(size))])
+    found = lsq_linear(triangle, q.T @ whole, (low * size, high * size), method="bvls")
+    return np.asarray(found.x / size)
+
+
+def _promise(
+    base: Fit, basis: Array, triangle: Array, candidates: tuple[Candidate, ...], raw: Array
+) -> Promise:
+    g = raw - basis @ (basis.T @ raw)
+    r = base.residual - basis @ (basis.T @ base.residual)
+    amplitudes = [u for c in candidates for u in c.amplitudes]
+    size, left = np.linalg.norm(raw, axis=0) + 1e-300, np.linalg.norm(g, axis=0)
+    usable = left > NOTHING * size
+    low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
+    beta = np.zeros(len(amplitudes))
+    beta[usable] = _bounded(g[:, usable], -r, low[usable], high[usable])
+    gain = float(r @ r - np.sum((r + g @ beta) ** 2))
+    beta = np.clip(beta, -TRUSTED, TRUSTED)
+    start = {u.name: float(b * u.scale) for u, b in zip(amplitudes, beta, strict=True)}
+    start |= {u.name: u.start for c in candidates for u in c.shape}
+    if len(base.values):
+        rest = basis.T @ (base.residual + raw @ beta)
+        shift = np.linalg.lstsq(triangle, -rest, rcond=None)[0]
+        low, high = (np.array([getattr(u, side) for u in base.unknowns]) for side in ("low", "high"))
+        trusted = TRUSTED * np.array([u.scale for u in base.unknowns])
+        moved = np.clip(base.values + np.clip(shift, -trusted, trusted), low, high)
+        start |= {u.name: float(v) for u, v in zip(base.unknowns, moved, strict=True)}
+    return Promise(candidates, gain, start)

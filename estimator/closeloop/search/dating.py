@@ -1,0 +1,45 @@
+"""When exactly did it set in? Moments tried one after the other by simulation.
+
+The sum of squares has a minimum for about each swing of the motion: what sets in a swing later does nearly
+the same. A fit stays in the one where it began.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from estimator.closeloop.fitting.fit import weighted
+from estimator.closeloop.fitting.rounds import finished
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.onset import begins, moments_near
+from estimator.closeloop.hypotheses.promise import Promise, built
+from estimator.closeloop.hypotheses.scores import best_by_label
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Array
+
+LEADING, RIVAL = 3, 2.0  # hypotheses that are dated, up to so many times the best sum of squares
+
+
+def dated(
+    problem: Problem, unknowns: Sequence[Unknown], found: Sequence[Hypothesis], size: Array, jobs: int
+) -> list[Hypothesis]:
+    """All hypotheses, best first on the identify part; leading ones fitted again from a better moment."""
+    tried = [h for h in found[:LEADING] if begins(h) and cost(h) < RIVAL * cost(found[0])]
+    moments = Parallel(n_jobs=jobs)(delayed(_moment)(problem, h, size) for h in tried)
+    again = [
+        Promise(h.candidates, 0.0, {**h.fit.theta, begins(h)[0]: moment})
+        for h, moment in zip(tried, moments, strict=True)
+        if moment is not None
+    ]
+    return best_by_label([*found, *finished(problem, unknowns, again, size, jobs)]) if again else list(found)
+
+
+def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:
+    """A moment with which, all else as it is, the identify part is matched better, or None."""
+    [name, *_] = begins(h)
+    here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
+    inside = [t for t in moments_near(now, length) if 0.0 < t < length and t != now]
+    squares = [float(np.sum(weighted(here, {**h.theta, name: t}, size) ** 2)) for t in inside]
+    best = int(np.argmin(squares)) if squares else 0
+    return inside[best] if squares and squares[best] < cost(h) else None

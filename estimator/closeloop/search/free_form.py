@@ -1,0 +1,137 @@
+"""The fallback where no law explains: a force of free form, one smooth curve at one port.
+
+How often a curve comes back in a turn is chosen by regression of the smoothed missing forces on its splines;
+which port, and over what (velocity, displacement, angle), by regression of the residual on what the splines
+do to the outputs; both are judged on pieces left out. The best are fitted inside the FMU jointly with the
+calibrated parameters. It names no cause, but the FMU with it is nearer to the measurement.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr
+
+from estimator.closeloop.fitting.rounds import hypotheses
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.scores import beats, ranked
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.free_form import FREE_FORMS, Dependence, dependences, left_out
+from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.closeloop.screening.regressors import Calibration, Changes
+from estimator.closeloop.screening.screen import Screening, screen
+from estimator.record import Array
+
+RESOLVED = 3.0  # standard errors that a control of realistic size must be worth
+
+
+FINALISTS = 2  # of them, fitted to the end
+
+
+TRIED = 3  # places and quantities that are fitted by simulation
+
+
+PLACES = 2  # ports of the effects that came nearest
+
+
+BOUND = 3.0  # times the largest missing force: more than that no curve has
+
+
+GRID = 200  # points of a curve
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A fitted force of free form on a port: what it is over, force, its standard error, (GRID,) each, SI."""
+
+    kind: str
+    location: str
+    against: str
+    x: Array
+    force: Array
+    std: Array
+
+
+def free_form(
+    problem: Problem,
+    base: Hypothesis,
+    forces: Sequence[MissingForce],
+    size: Array,
+    jobs: int,
+    near: Sequence[Hypothesis] = (),
+) -> Hypothesis | None:
+    """The force of free form that is best on the part to choose, fitted jointly; None where none is better.
+
+    near: effects that came nearest, best first, whose ports are tried too. Better than the base means by
+    TELLING standard errors over blocks of that part.
+    """
+    candidates = [c for d in dependences(problem, forces) for c in _candidates(problem, d, forces)]
+    if not candidates:
+        return None
+    screening = Screening(problem, base.fit, size, forces)
+    change = list(zip(candidates, screening.changes(candidates), strict=True))
+    calibration = Calibration.of(screening.fit)
+    chosen = [resolved(calibration, c, g) for c, g in promising(screening.fit, change, near)]
+    promises = screen(screening.fit, [((c,), g) for c, g in chosen if c.amplitudes])
+    # a strong law differs from its linear picture, and then a start without it is the better one
+    promises += [replace(p, start=base.fit.theta) for p in promises]
+    found = ranked(problem, hypotheses(problem, base, promises, size, jobs, FINALISTS), size)
+    better = [h for h in found if cost(h) < cost(base) and beats(problem, h, base, size)]
+    return better[0] if better else None
+
+
+def promising(base: Fit, change: Changes, near: Sequence[Hypothesis]) -> list[tuple[Candidate, Array]]:
+    """Candidates that predict the residual best in pieces left out, and those at the ports of the nearest."""
+    calibration = Calibration.of(base)
+    residual = calibration.without(base.residual)
+    share = [left_out(calibration.without(g), residual) for _, g in change]
+    order = [change[i] for i in np.argsort(share)[::-1]]
+    ports = {c.location for c, _ in change}
+    places = list(dict.fromkeys(c.location for h in near for c in h.candidates if c.location in ports))
+    more = [(c, g) for c, g in order[TRIED:] if c.location in places[:PLACES]]
+    return order[:TRIED] + more
+
+
+def resolved(calibration: Calibration, c: Candidate, g: Array) -> tuple[Candidate, Array]:
+    """A candidate with those of its controls that the record resolves; the others stay at zero.
+
+    g: (m, k) changes by its controls at their scales. A constant part, or one that a calibrated parameter
+    makes up for, moves nothing and would run away.
+    """
+    triangle, order = qr(calibration.without(g), mode="r", pivoting=True)
+    kept = sorted(order[np.abs(np.diag(triangle)) > RESOLVED])
+    return replace(c, amplitudes=tuple(c.amplitudes[i] for i in kept)), g[:, kept]
+
+
+def _candidates(problem: Problem, d: Dependence, forces: Sequence[MissingForce]) -> list[Candidate]:
+    """The candidate of a dependence in its shape, its controls bound to what the missing force is at most."""
+    offers, site = ((d.kind, d.location),), problem.builder.outside()
+    shape = {f"{d.kind}_{d.location}_{n}": v for n, v in d.shape.items()}
+    [m] = [m for m in forces if m.port.name == d.location]
+    scale, most = float(np.sqrt(np.mean(m.force**2))), BOUND * float(np.abs(m.force).max())
+    if scale == 0:
+        return []
+    return [
+        replace(c, amplitudes=tuple(Unknown(u.name, 0.0, -most, most, scale) for u in c.amplitudes))
+        for c in physical_candidates(offers, site, problem.record, forces)
+        if dict(c.fixed) == shape
+    ]
+
+
+def curve_of(h: Hypothesis) -> Curve:
+    """The curve of a force of free form with the standard error that its fit gives."""
+    c = next(c for c in h.candidates if c.kind in FREE_FORMS)
+    law, prefix = FREE_FORMS[c.kind], c.prefix
+    shape = {n.removeprefix(prefix): v for n, v in c.fixed.items()}
+    x = law.span(shape, GRID)
+    splines = law.splines(shape, *law.motion(x))
+    names = [u.name for u in h.fit.unknowns]
+    i = [names.index(u.name) for u in c.amplitudes]
+    splines = splines[:, [law.amplitudes.index(u.name.removeprefix(prefix)) for u in c.amplitudes]]
+    controls, covariance = h.fit.values[i], h.fit.covariance[np.ix_(i, i)]
+    variance = np.einsum("ni,ij,nj->n", splines, covariance, splines)
+    std = np.sqrt(np.maximum(variance, 0.0))
+    return Curve(c.kind, c.location, law.against, x, -splines @ controls, std)

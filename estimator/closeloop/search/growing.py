@@ -1,0 +1,115 @@
+"""Leading hypotheses fitted again over a growing part of the record, from the declared values.
+
+Where an effect is strong, the base's values have taken over what they could of it, and a small error of an
+unknown leads the FMU to quite another motion in the end: the sum of squares is rugged. Over the first
+seconds it is not, and what is found there leads the way on, for those that fit them best. Start states,
+which could take over much of so short a part, stay as measured until the whole is fitted. Differences of
+the usual step smooth what is rugged and end in the valley; from there finer ones find the way further down.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from joblib import Parallel, delayed
+
+from estimator.closeloop.fitting.fit import NEAR, fit
+from estimator.closeloop.fitting.rounds import (
+    finished,
+    from_there,
+    hypothesis,
+    together,
+)
+from estimator.closeloop.fitting.slopes import FINE
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost, mean_square
+from estimator.closeloop.hypotheses.onset import moment
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.hypotheses.scores import best_by_label
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Array
+
+Parts = tuple[tuple[float, int], ...]  # shares of the identify part, and evaluations of a fit to it
+FIRST: Parts = ((0.125, 8), (0.25, 6))
+THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
+SURVIVORS, RIVAL = 4, 4.0  # of the first parts: so many go on, up to so many times the best mean square
+LEADING = 4  # labels, of those that fit best and of the most promising ones
+REFINED = 2  # of all in the end, that are still far from noise: fitted again by finer differences
+SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
+
+
+def from_the_beginning(
+    problem: Problem,
+    base: Hypothesis,
+    found: Sequence[Hypothesis],
+    promises: Sequence[Promise],
+    size: Array,
+    jobs: int,
+) -> list[Hypothesis]:
+    """All hypotheses, best first on the identify part, the leading ones perhaps better than found so far."""
+    physical = [p for p in promises if not p.candidates[0].is_fault]
+    fitted = [h.label for h in found if not h.candidates[0].is_fault]
+    leading = dict.fromkeys([*fitted[:LEADING], *list(dict.fromkeys(p.label for p in physical))[:LEADING]])
+    unknowns = base.fit.unknowns
+    declared = {u.name: u.start for u in unknowns}
+    states = {n: v for n, v in declared.items() if n in problem.free_states}
+    started = replace(problem, declared={**problem.declared, **states})
+    others = [u for u in unknowns if u.name not in states]
+    starts = [
+        replace(p, start={**p.start, **declared})
+        for label in leading
+        for p in _shapes([p for p in physical if p.label == label])
+    ]
+    tried = list(zip(together(started, starts), starts, strict=True))
+    begun = Parallel(n_jobs=jobs)(delayed(_begun)(here, others, p, size) for here, p in tried)
+    alive = [(h, here) for h, (here, _) in zip(begun, tried, strict=True) if h is not None]
+    alive.sort(key=lambda pair: mean_square(pair[0]))
+    tasks = (
+        delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), size, THEN)
+        for h, here in alive[:SURVIVORS]
+        if mean_square(h) < RIVAL * mean_square(alive[0][0])
+    )
+    grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
+    again = finished(problem, unknowns, from_there(grown[:LEADING]), size, jobs)
+    best = best_by_label([*found, *grown, *again])
+    rugged = [h for h in best[:REFINED] if mean_square(h) > NEAR and cost(h) < RIVAL * cost(best[0])]
+    return best_by_label([*best, *finished(problem, unknowns, from_there(rugged), size, jobs, step=FINE)])
+
+
+def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
+    """Of the promises of one label those that are fitted; what sets in later does so from nothing."""
+    best = promises[0]
+    if moment(best.candidates[0]) is None:
+        return promises[:SHAPES]
+    off = {u.name: 0.0 for u in best.candidates[0].amplitudes}
+    return [replace(best, start={**best.start, **off})]
+
+
+def _begun(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array) -> Hypothesis | None:
+    """A fit to the first parts of the record; of what sets in later first without it to all before."""
+    before, start = _before(problem, promise), promise.start
+    if 0.0 < before < 1.0:
+        start = start | fit(problem.beginning(before), unknowns, size, start).theta
+    return _grown(problem, unknowns, replace(promise, start=start), size, FIRST)
+
+
+def _grown(
+    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, parts: Parts
+) -> Hypothesis | None:
+    """The best fit to the last of growing parts of the record, or None where the FMU does not run."""
+    before, start = _before(problem, promise), promise.start
+    best: Hypothesis | None = None
+    for part, evaluations in parts:
+        share = before + (1 - before) * part
+        here = problem.beginning(share)
+        found = hypothesis(here, unknowns, replace(promise, start=start), size, evaluations)
+        if found is None:
+            return best
+        start = found.fit.theta
+        if part == parts[-1][0] and (best is None or cost(found) < cost(best)):
+            best = found
+    return best
+
+
+def _before(problem: Problem, promise: Promise) -> float:
+    """Share of the identify part that lies before what a promise lets set in."""
+    begins = moment(promise.candidates[0])
+    return 0.0 if begins is None else problem.record.runs[0].fit_share(begins)

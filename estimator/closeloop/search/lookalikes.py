@@ -1,0 +1,110 @@
+"""What could stand in a law's place? Others that change the outputs as it does, fitted from where it is.
+
+Two such laws are two names of one motion, but from the calibrated FMU, which is far from it where an effect
+is strong, the fit of one may end where that of the other does not. Whether the record tells them apart is
+asked when both are there. And where the force does not follow the curve of the law that was found, the others
+over the same motion, each from there too.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from estimator.closeloop.decision.law_form import motion, over_what
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import Promise, distinct, key
+from estimator.closeloop.screening.regressors import Calibration, Changes
+from estimator.closeloop.screening.screen import Screening
+from estimator.record import Array
+
+ALIKE = 0.05  # of what a law does and calibration cannot take over: one that looks like it leaves less of it
+UNTOLD = 20.0  # of the sum of squares: what noise could hide
+WORSE = 1.5  # times the sum of squares of the best one, from which on a fit may have ended elsewhere
+MOST = 3  # that are fitted
+
+
+def lookalikes(
+    screening: Screening, calibration: Calibration, found: Sequence[Hypothesis], change: Changes
+) -> list[Promise]:
+    """Promises of the best of `found`, best first, with one of its laws replaced by one that looks like it.
+
+    calibration: of the screening's fit; change: of the candidates that may take a place. What was fitted
+    nearly as well is left out. The gain of a promise is what it misses, negative.
+    """
+    best = found[0]
+    known = {h.key for h in found if cost(h) < WORSE * cost(best)}
+    promises: list[Promise] = []
+    for i, c in enumerate(best.candidates):
+        if c.is_fault:
+            continue
+        fitted = _shaped(c, _shape(c, best.theta))
+        response = _response(screening, calibration, fitted, best.theta)
+        for other, g in _others(screening, fitted, change):
+            laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
+            if key(laws) in known:
+                continue
+            missed, start = _nearest(other, calibration.without(g), response)
+            if missed < max(UNTOLD, ALIKE**2 * float(response @ response)):
+                promises.append(Promise(laws, -missed, {**best.theta, **start}))
+    promises.sort(key=lambda p: -p.gain)
+    return distinct(promises)[:MOST]
+
+
+def over_the_same(
+    screening: Screening, calibration: Calibration, h: Hypothesis, change: Changes
+) -> list[Promise]:
+    """Promises of other laws over the motion of a single one, at its place, the most alike first.
+
+    Else as `lookalikes`. None for what is no law over a velocity or displacement.
+    """
+    [c], (location, over) = h.candidates, motion(h)
+    if not over:
+        return []
+    response = _response(screening, calibration, _shaped(c, _shape(c, h.theta)), h.theta)
+    promises = []
+    for other, g in change:
+        if other.location == location and other.kind != c.kind and over_what(other) == over:
+            missed, start = _nearest(other, calibration.without(g), response)
+            promises.append(Promise((other,), -missed, {**h.theta, **start}))
+    promises.sort(key=lambda p: -p.gain)
+    return distinct(promises)[:MOST]
+
+
+def _response(
+    screening: Screening, calibration: Calibration, c: Candidate, theta: Mapping[str, float]
+) -> Array:
+    """What a law does to the residual (m,) and calibration cannot take over."""
+    [own] = screening.changes([c])
+    return calibration.without(own @ [theta[u.name] / u.scale for u in c.amplitudes])
+
+
+def _others(screening: Screening, c: Candidate, change: Changes) -> list[tuple[Candidate, Array]]:
+    """What could take a candidate's place, with its changes; of the same kind in the shape that it has."""
+    elsewhere = {other.location: other for other, _ in change if other.kind == c.kind}
+    moved = [_shaped(other, _shape(c)) for at, other in elsewhere.items() if at != c.location]
+    same = zip(moved, screening.changes(moved), strict=True)
+    return [*same, *((o, g) for o, g in change if o.kind != c.kind and not o.is_fault)]
+
+
+def _shape(c: Candidate, theta: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
+    """Values of a candidate's shape by the name of the parameter alone."""
+    return {u.name.removeprefix(c.prefix): theta.get(u.name, u.start) for u in c.shape}
+
+
+def _shaped(c: Candidate, shape: Mapping[str, float]) -> Candidate:
+    """The candidate in another shape; what that does not tell stays."""
+    named = ((u, u.name.removeprefix(c.prefix)) for u in c.shape)
+    return replace(c, shape=tuple(replace(u, start=shape.get(name, u.start)) for u, name in named))
+
+
+def _nearest(c: Candidate, g: Array, response: Array) -> tuple[float, dict[str, float]]:
+    """What a candidate with the changes g (m, k) misses of a response (m,), squared, and its values."""
+    low, high = (np.array([getattr(u, side) / u.scale for u in c.amplitudes]) for side in ("low", "high"))
+    size = lsq_linear(g, response, (low, high)).x
+    missed = float(np.sum((response - g @ size) ** 2))
+    values = {u.name: float(b * u.scale) for u, b in zip(c.amplitudes, size, strict=True)}
+    return missed, values | {u.name: u.start for u in c.shape}

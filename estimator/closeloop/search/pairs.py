@@ -1,0 +1,161 @@
+"""Pairs of effects: a wrong single effect can hide the right one until its partner is there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from estimator.closeloop.fitting.rounds import finished, hypotheses
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import (
+    Promise,
+    built,
+    distinct,
+    label,
+)
+from estimator.closeloop.hypotheses.scores import best_by_label, idle
+from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.grouped import grouped_fit
+from estimator.closeloop.screening.missing_force import missing_forces
+from estimator.closeloop.screening.screen import Screening, screen
+from estimator.record import Array
+
+LEADING = 8  # single effects that partners are looked for
+
+
+QUICK = 3e6  # candidates times samples, up to which all leading effects are built in and screened anew
+
+
+PARTNERS = 12  # leading candidates among which pairs are screened
+
+
+PROMISES = 4  # pairs from each of the two screenings that are fitted
+
+
+FINALISTS = 2  # of them, fitted to the end
+
+
+BESIDE = 0.25  # of an output's noise: the rms that a second effect has to explain
+
+
+Changes = Sequence[tuple[Candidate, Array]]
+
+
+def try_pairs(
+    problem: Problem, base: Hypothesis, screening: Screening, singles: Sequence[Hypothesis], change: Changes,
+    noise: Array, jobs: int,
+) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
+    """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
+
+    screening, change: of the base and the single candidates; noise: (n_y,) of the outputs.
+
+    Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
+    """
+    size = screening.size
+    physical = [(c, g) for c, g in change if not c.is_fault]
+    alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
+    promises = _from_base(screening.fit, physical)
+    if alone:
+        promises += _partners(problem, screening, list(alone.values())[:LEADING], physical, noise)
+    found = hypotheses(problem, base, promises, size, jobs, FINALISTS)
+    reached = min((cost(h) for h in singles), default=cost(base))
+    doubtful = [h for h in found if idle(h) and cost(h) < reached]
+    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in idle(h)]
+    freed = finished(problem, base.fit.unknowns, without, size, jobs) if without else []
+    least = {h.label: cost(h) for h in best_by_label([*alone.values(), *freed])}
+    found = [replace(h, worth=_worth(h, least)) if h in doubtful else h for h in found]
+    return [h for h in found if not idle(h)], freed
+
+
+def _rest(h: Hypothesis, c: Candidate) -> tuple[Candidate, ...]:
+    return tuple(other for other in h.candidates if other is not c)
+
+
+def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
+    """See Hypothesis.worth; least: sums of squares that hypotheses reached, by label."""
+    known = {c.label: label(_rest(h, c)) for c in h.candidates}
+    return {member: least[rest] - cost(h) for member, rest in known.items() if rest in least}
+
+
+def beside(
+    problem: Problem, base: Hypothesis, best: Hypothesis, screening: Screening, change: Changes, least: float,
+    jobs: int,
+) -> list[Hypothesis]:  # fmt: skip
+    """Fitted pairs of a hypothesis that explains with what its residual is still like, without idle members.
+
+    screening, change: of the base, whose linear picture is near enough to see whether there is anything;
+    least: share of what is left beyond noise that a second effect has to explain.
+    """
+    fit = grouped_fit(best.fit, len(screening.size), screening.group)
+    enough = BESIDE**2 * len(best.fit.residual) / len(screening.size)
+    promises = [p for p in _with(best, fit, change) if p.gain > max(enough, least * fit.beyond_noise)]
+    found = hypotheses(problem, base, promises, screening.size, jobs, FINALISTS) if promises else []
+    return [h for h in found if not idle(h)]
+
+
+def _from_base(base: Fit, physical: Changes) -> list[Promise]:
+    order = screen(base, [((c,), g) for c, g in physical])
+    by_candidate = dict(physical)
+    leading = [p.candidates[0] for p in order[:PARTNERS]]
+    sets = [
+        ((a, b), np.hstack([by_candidate[a], by_candidate[b]]))
+        for a, b in combinations(leading, 2)
+        if a.label != b.label
+    ]
+    return distinct(screen(base, sets))[:PROMISES]
+
+
+def _partners(
+    problem: Problem,
+    screening: Screening,
+    leading: Sequence[Hypothesis],
+    change: Changes,
+    noise: Array,
+) -> list[Promise]:
+    """Pairs of the leading single effects and what could explain most of what each leaves.
+
+    Those first that would leave least: a right partner of a single effect that is not the best one counts.
+    The best one is screened anew, with its effect in the FMU and partners in the shapes that its missing
+    force suggests (the frequency of a second effect does not show beside a first one ten times its size); the
+    others are too, in the shapes that they have, where that is quick.
+    """
+    quick = len(change) * len(screening.fit.residual) < QUICK
+    found = []
+    for i, h in enumerate(leading):
+        others = [c for c, _ in change if c.label != h.label]
+        if i == 0:
+            fit, seen = _beside(problem, h, others, screening.size, noise)
+        elif quick:
+            here = Screening(built(problem, h.candidates), h.fit, screening.size)
+            fit, seen = here.fit, list(zip(others, here.changes(others), strict=True))
+        else:
+            fit, seen = grouped_fit(h.fit, len(screening.size), screening.group), list(change)
+        found += [(cost(h) - p.gain, p) for p in _with(h, fit, seen)]
+    found.sort(key=lambda pair: pair[0])
+    return distinct([p for _, p in found])[:PROMISES]
+
+
+def _beside(
+    problem: Problem, h: Hypothesis, others: Sequence[Candidate], size: Array, noise: Array
+) -> tuple[Fit, Changes]:
+    """The fit of a hypothesis as it is screened with its effect in the FMU, and the changes by all others.
+
+    These are in the shapes that what it leaves suggests.
+    """
+    here, builder, labels = built(problem, h.candidates), problem.builder, {c.label for c in others}
+    forces = missing_forces(here, h.theta, noise)
+    offered = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
+    partners = [c for c in offered if c.label in labels]
+    screening = Screening(here, h.fit, size, forces)
+    return screening.fit, list(zip(partners, screening.changes(partners), strict=True))
+
+
+def _with(h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
+    """A hypothesis with its most promising partners; fit: its own, as the changes are compared with it."""
+    own = {c.label for c in h.candidates}
+    promises = distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[:PROMISES]
+    return [Promise((*h.candidates, *p.candidates), p.gain, {**h.fit.theta, **p.start}) for p in promises]

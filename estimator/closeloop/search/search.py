@@ -1,0 +1,196 @@
+"""The search for what explains a residual: brief fits, long ones, pairs, and laws that look alike."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from estimator.closeloop.decision.detect import ONE_EFFECT
+from estimator.closeloop.fitting.rounds import (
+    briefly,
+    finished,
+    hypotheses,
+    to_the_end,
+)
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.onset import moment
+from estimator.closeloop.hypotheses.promise import Promise, distinct
+from estimator.closeloop.hypotheses.scores import best_by_label, ranked
+from estimator.closeloop.hypotheses.twins import twins, with_twins
+from estimator.closeloop.progress import Progress
+from estimator.closeloop.screening.onset_times import at_their_moments
+from estimator.closeloop.screening.regressors import Calibration, Changes
+from estimator.closeloop.search.dating import dated
+from estimator.closeloop.search.growing import from_the_beginning
+from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
+from estimator.closeloop.search.nomination import (
+    FAULTS,
+    LEADING,
+    NOMINEES,
+    nominated,
+    overlooked,
+)
+from estimator.closeloop.search.onset import since
+from estimator.closeloop.search.pairs import beside, try_pairs
+from estimator.closeloop.search.screened import Screened
+from estimator.closeloop.search.simpler import simpler
+
+SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside them
+LIKELY = 0.5  # of what is beyond noise: faults that could explain so much are fitted before all else
+RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain less are no rivals, but
+PLACEBOS = 3  # of them, so that there is a best wrong one
+OVERLOOKED = 0.2  # of what is beyond noise, where the form is open: if all leave so much, more are tried
+
+
+@dataclass(frozen=True)
+class Search:
+    """Fits what the screening promises; `tell` hears what is being done, `jobs` processes work at it."""
+
+    screened: Screened
+    tell: Progress
+    jobs: int
+
+    def run(self) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """Single hypotheses and pairs, best first."""
+        s = self.screened
+        brief, sudden = self._brief()
+        singles, pairs = self._finished(brief, sudden)
+        self.tell("simpler", "asking whether a simpler law would do, or one that looks like it")
+        ones = s.stages.done("simpler", lambda: self._replaced(singles))
+        if s.explained(ones[:1]):
+            pairs = [*pairs, *self._beside(ones[0])]
+        twos = s.stages.done("simpler pairs", lambda: self._replaced(pairs))
+        return ranked(s.problem, with_twins(ones, self._alike), s.size), twos
+
+    def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The single hypotheses with other laws over the motion of one, fitted from where it is."""
+        s = self.screened
+        promises = over_the_same(s.screening, Calibration.of(s.fit), h, s.change)
+        if not promises:
+            return list(singles)
+        self.tell("renamed", "fitting other laws over the same motion")
+        found = s.stages.done(
+            "renamed", lambda: finished(s.problem, s.base.fit.unknowns, promises, s.size, self.jobs)
+        )
+        better = with_twins([f for f in found if cost(f) < cost(h)], self._alike)
+        return ranked(s.problem, best_by_label([*better, *singles]), s.size) if better else list(singles)
+
+    @cached_property
+    def _alike(self) -> Mapping[str, tuple[str, ...]]:
+        """Labels of candidates that change the record as another one does."""
+        return twins(self.screened.change)
+
+    @cached_property
+    def _single(self) -> Changes:
+        """What each candidate changes, of twins one."""
+        doubled = {label for others in self._alike.values() for label in others}
+        return [(c, g) for c, g in self.screened.change if c.label not in doubled]
+
+    @cached_property
+    def _promises(self) -> list[Promise]:
+        """What the screening promises of them, best first, from the calibrated parameters."""
+        s, labels = self.screened, {c.label for c, _ in self._single}
+        promises = at_their_moments(s.screening, s.fit, s.promises, LEADING)
+        start = s.base.fit.theta
+        return [replace(p, start={**start, **p.start}) for p in promises if p.label in labels]
+
+    def _brief(self) -> tuple[list[Hypothesis], list[Promise]]:
+        """Brief fits, best first, and what may have set in at a moment that shows."""
+        s = self.screened
+        chosen = nominated(self._promises, NOMINEES if s.problem.builder.quick else NOMINEES // 2)
+        self.tell("faults", "fitting faults of sensors")
+        faults, rest = s.stages.done("faults", lambda: self._faults_first(chosen))
+        self.tell(
+            "brief fits",
+            f"fitting the {len(rest)} most promising effects inside the FMU, with the declared parameters",
+        )
+        brief = s.stages.done("brief", lambda: self._briefly(rest))
+        brief = best_by_label([*faults, *brief])
+        if s.problem.form_error > 0 and brief and brief[0].fit.beyond_noise > OVERLOOKED * s.beyond_noise:
+            further = overlooked(self._promises, rest, s.problem.calibrate)
+            self.tell("overlooked", f"fitting {len(further)} more, which calibration may have hidden")
+            more = s.stages.done("overlooked", lambda: self._briefly(further))
+            brief = best_by_label([*more, *brief])
+        if faults or not (s.open_to_form or any(sets_in(h) for h in brief[:LEADING])):
+            return brief, []
+        self.tell("onset", "looking for what set in during the record")
+        sudden, more = s.stages.done("sudden", self._sudden)
+        return best_by_label([*more, *brief]), sudden
+
+    def _finished(
+        self, brief: Sequence[Hypothesis], sudden: Sequence[Promise]
+    ) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """Leading hypotheses fitted to the end, and pairs of effects where none of them explains."""
+        s, jobs = self.screened, self.jobs
+        problem, base, size = s.problem, s.base, s.size
+        self.tell("long fits", "fitting the leading ones to the end")
+        finals = s.stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
+        alone = s.stages.done("dated", lambda: dated(problem, base.fit.unknowns, finals, size, jobs))
+        if s.floor_known and not s.explained(alone):
+            self.tell("growing", "fitting the leading ones to a growing part of the record")
+            found, hopes = alone, [*sudden, *self._promises]
+            alone = s.stages.done(
+                "growing", lambda: from_the_beginning(problem, base, found, hopes, size, jobs)
+            )
+        if s.explained(alone):
+            return alone, []
+        self.tell("pairs", "trying pairs of effects")
+        pairs, freed = s.stages.done(
+            "pairs", lambda: try_pairs(problem, base, s.screening, alone, self._single, s.noise, jobs)
+        )
+        return best_by_label([*alone, *freed]), pairs
+
+    def _beside(self, one: Hypothesis) -> list[Hypothesis]:
+        """Pairs of one effect that explains and a second."""
+        s = self.screened
+        self.tell("second", "looking at what is left for a second effect")
+        least = ONE_EFFECT if s.problem.form_error > 0 else 0.0
+        return s.stages.done(
+            "beside", lambda: beside(s.problem, s.base, one, s.screening, self._single, least, self.jobs)
+        )
+
+    def _briefly(self, promises: Sequence[Promise]) -> list[Hypothesis]:
+        """Brief fits, best first."""
+        s = self.screened
+        return briefly(s.problem, s.base, promises, s.size, self.jobs)
+
+    def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:
+        """Faults that account for the residual, fitted to the end, and what is still to be tried.
+
+        A fault is as linear as the screening: where one explains, effects that could gain clearly less are no
+        rivals. Where none does, all are tried together.
+        """
+        s = self.screened
+        likely = [p for p in chosen if p.candidates[0].is_fault and p.gain > LIKELY * s.beyond_noise]
+        if not likely or not s.floor_known:
+            return [], list(chosen)
+        faults = hypotheses(s.problem, s.base, likely, s.size, self.jobs, FAULTS)
+        if not s.explained(faults):
+            return [], list(chosen)
+        others = [p for p in chosen if p not in likely]
+        rivals = [p for i, p in enumerate(others) if i < PLACEBOS or p.gain > RIVAL * likely[0].gain]
+        return faults, rivals
+
+    def _sudden(self) -> tuple[list[Promise], list[Hypothesis]]:
+        """What may have set in at a moment that shows, and brief fits of the leading ones."""
+        s = self.screened
+        if not s.came:
+            return [], []
+        physical = [c for c, _ in self._single if not c.is_fault]
+        promises = since(s.problem, s.came, physical, s.size, self.jobs)
+        return promises, briefly(s.problem, s.base, promises[:SUDDEN], s.size, self.jobs, known=False)
+
+    def _replaced(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Hypotheses ranked, other laws in place of those of the best one where that may be the answer."""
+        s = self.screened
+        found = ranked(s.problem, best_by_label(found), s.size)
+        if not found or (s.floor_known and not s.explained(found[:1])):
+            return found
+        promises = simpler(found, [c for c, _ in s.change])
+        promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)
+        more = finished(s.problem, s.base.fit.unknowns, distinct(promises), s.size, self.jobs)
+        return ranked(s.problem, best_by_label([*found, *more]), s.size)
+
+
+def sets_in(h: Hypothesis) -> bool:
+    """Whether a hypothesis has an effect that is not there from the start."""
+    return any(moment(c) is not None for c in h.candidates)

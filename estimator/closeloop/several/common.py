@@ -1,0 +1,156 @@
+"""An effect with one value for several records: its estimate, and whether one value serves them all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from joblib import Parallel, delayed
+
+from estimator.closeloop.decision.verdict import explains
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.several.estimates import Estimates
+from estimator.closeloop.several.joint import (
+    Likeness,
+    Together,
+    fit_together,
+    likeness,
+)
+from estimator.closeloop.several.part import Part
+from estimator.closeloop.several.transfer import (
+    LEVEL,
+    Status,
+    Traced,
+    Transfer,
+    said_of,
+)
+from fmus.host.fmu import FmuError
+
+SHOWS: tuple[Status, ...] = ("confirmed", "agrees", "differs")  # where a record has a value of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Common:
+    """An effect (label) in several records, fitted to all of them and to each.
+
+    alone: each record's own fit, said: what it says of the machine's unknowns, and costs: its sum of squares;
+    samples: residuals that were fitted, of each record; accounted: whether the common value accounts for it.
+    """
+
+    label: str
+    names: tuple[str, ...]
+    together: Together
+    alone: tuple[Hypothesis, ...]
+    said: tuple[Estimates, ...]
+    costs: tuple[float, ...]
+    likeness: Likeness
+    samples: tuple[int, ...]
+    accounted: tuple[bool, ...]
+
+    @property
+    def serves(self) -> bool:
+        """Whether one value accounts for all records."""
+        return all(self.accounted)
+
+    @property
+    def chi2(self) -> tuple[float, ...]:
+        """Mean square of each record's weighted residual with the common value, 1 for noise."""
+        return tuple(c / n for c, n in zip(self.together.costs, self.samples, strict=True))
+
+    @property
+    def chi2_alone(self) -> tuple[float, ...]:
+        """The same with each record's own value."""
+        return tuple(c / n for c, n in zip(self.costs, self.samples, strict=True))
+
+    @property
+    def sentence(self) -> str:
+        """What it comes to."""
+        every, chance = " and ".join(self.names), f"p = {self.likeness.p_value:.2g}"
+        if not self.serves:
+            left = [n for n, ok in zip(self.names, self.accounted, strict=True) if not ok]
+            return (
+                f"no one value of {self.label} accounts for {every}; not for {' and '.join(left)} ({chance})"
+            )
+        if self.likeness.p_value < LEVEL:
+            return (
+                f"one value of {self.label} accounts for {every}, though their own values differ ({chance})"
+            )
+        return f"one value of {self.label} accounts for {every} ({chance})"
+
+
+def commons(
+    records: Sequence[Traced], found: Sequence[Transfer], wanted: Sequence[Hypothesis], jobs: int = 1
+) -> list[Common]:
+    """Joint fits of these effects, each to all the records of one FMU that it accounts for."""
+    by_name = {r.name: r for r in records}
+    alone = {
+        labels: {r.name: own for r in records if (own := _own(r, labels, found)) is not None}
+        for labels in dict.fromkeys(labels_of(h) for h in wanted)
+    }
+    several = {labels: owns for labels, owns in alone.items() if len(owns) > 1}
+    tasks = [
+        ([_part(by_name[n], h, labels) for n, h in owns.items()], list(owns.values()))
+        for labels, owns in several.items()
+    ]
+    fits = Parallel(n_jobs=jobs)(delayed(_fitted)(*task) for task in tasks)
+    return [
+        _compared([by_name[n] for n in owns], labels, list(owns.values()), *fit)
+        for (labels, owns), fit in zip(several.items(), fits, strict=True)
+        if fit is not None
+    ]
+
+
+def labels_of(h: Hypothesis) -> tuple[str, ...]:
+    """Its candidates' labels, in an order that does not depend on how they were found."""
+    return tuple(sorted(c.label for c in h.candidates))
+
+
+def _own(r: Traced, labels: Sequence[str], found: Sequence[Transfer]) -> Hypothesis | None:
+    """A record's own fit of an effect that it shows: as its chain or a transfer found it."""
+    fits = [h for h in r.members if labels_of(h) == labels]
+    for t in found:
+        if t.target == r.name and labels_of(t.member) == labels and t.status in SHOWS and t.own:
+            fits.append(t.own)
+    return min(fits, key=cost) if fits else None
+
+
+def _part(r: Traced, own: Hypothesis, labels: Sequence[str]) -> Part:
+    effects = tuple(sorted((c for c in own.candidates if c.label in labels), key=lambda c: c.label))
+    beside = tuple(c for c in own.candidates if c.label not in labels)
+    return Part(r.problem, effects, beside, r.found.base.fit.unknowns, r.found.size, own.fit.theta)
+
+
+def _fitted(parts: Sequence[Part], alone: Sequence[Hypothesis]) -> tuple[Together, tuple[float, ...]] | None:
+    """The joint fit, and the least sum of squares of each record by itself, also from the joint values on.
+
+    None where the FMU does not run with what was found.
+    """
+    try:
+        found = fit_together(parts)
+        again = [fit_together([replace(p, start=h.theta)]) for p, h in zip(parts, found.parts, strict=True)]
+    except FmuError:
+        return None
+    return found, tuple(min(a.costs[0], cost(h)) for a, h in zip(again, alone, strict=True))
+
+
+def _compared(
+    records: Sequence[Traced],
+    labels: Sequence[str],
+    alone: Sequence[Hypothesis],
+    together: Together,
+    costs: tuple[float, ...],
+) -> Common:
+    said = tuple(said_of(h, labels) for h in alone)
+    return Common(
+        " + ".join(labels),
+        tuple(r.name for r in records),
+        together,
+        tuple(alone),
+        said,
+        costs,
+        likeness(together, costs, said),
+        tuple(len(h.fit.residual) for h in alone),
+        tuple(_accounts(r, h) for r, h in zip(records, together.parts, strict=True)),
+    )
+
+
+def _accounts(r: Traced, h: Hypothesis) -> bool:
+    return explains(r.problem, h, r.found.base, r.found.noise, r.found.size)

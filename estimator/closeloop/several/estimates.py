@@ -1,0 +1,96 @@
+"""What records say of a machine's unknowns, and how far apart they are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from estimator.closeloop.hypotheses.fitted import Fit, sandwich
+from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.several.chart import Chart
+from estimator.record import Array
+
+LOOSE = 10.0  # times its scale: the standard deviation of an unknown before any record
+TELLS = 0.5  # of that: a record that leaves more of it tells nothing of the unknown
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What a record says of the machine's unknowns.
+
+    values: (n,); covariance: (n, n) of them, and `white`, what it would be in white noise.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    values: Array
+    covariance: Array
+    white: Array
+
+    @property
+    def figures(self) -> dict[str, tuple[float, float]]:
+        """Value and standard error by name."""
+        error = np.sqrt(np.diag(self.covariance))
+        return {
+            u.name: (float(v), float(e)) for u, v, e in zip(self.unknowns, self.values, error, strict=True)
+        }
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Names of those that the record says something of."""
+        error = np.sqrt(np.diag(self.covariance))
+        return tuple(u.name for u, e in zip(self.unknowns, error, strict=True) if e < TELLS * LOOSE * u.scale)
+
+    def only(self, names: Sequence[str]) -> "Estimates":
+        """Those of some names, in their order."""
+        at = [[u.name for u in self.unknowns].index(n) for n in names]
+        block = np.ix_(at, at)
+        some = tuple(self.unknowns[i] for i in at)
+        return Estimates(some, self.values[at], self.covariance[block], self.white[block])
+
+
+def widths(unknowns: Sequence[Unknown], loose: Sequence[Unknown]) -> Array:
+    """Widths (n,) between the bounds; of the `loose` ones no more than what is known of them beforehand."""
+    every = np.array([u.high - u.low for u in unknowns])
+    most = np.array([np.sqrt(12) * LOOSE * u.scale if u in loose else np.inf for u in unknowns])
+    least: Array = np.minimum(every, most)
+    return least
+
+
+def estimates(made: Chart, fit: Fit) -> Estimates:
+    """What a fit with the chart's effects says of the machine's unknowns."""
+    scale = np.array([u.scale for u in fit.unknowns])
+    width = widths(fit.unknowns, made.natives)
+    covariance = sandwich(fit.residual, fit.jacobian, scale, width)
+    white = sandwich(np.zeros_like(fit.residual), fit.jacobian, scale, width)
+    values = made.turned(fit.theta)
+    native = [u.name for u in fit.unknowns]
+    own = {n for w in made.waves for n in (w.sine, w.cosine)}
+    names = [n for n in native if n not in own] + [n for w in made.waves for n in (w.amplitude, w.phase)]
+    back = np.linalg.pinv(made.slopes(values, native, names))
+    at = [names.index(u.name) for u in made.machine]
+    rows = back[at]
+    found = np.array([values[u.name] for u in made.machine])
+    return Estimates(made.machine, found, rows @ covariance @ rows.T, rows @ white @ rows.T)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far apart two records are: in standard errors, over so many unknowns, and its chance."""
+
+    distance: float
+    unknowns: int
+    p_value: float
+
+
+def difference(a: Estimates, b: Estimates) -> Difference:
+    """Of the unknowns that both records tell; the Wald statistic of their equality."""
+    told = [n for n in a.told if n in b.told]
+    if not told:
+        return Difference(0.0, 0, 1.0)
+    one, other = a.only(told), b.only(told)
+    size = np.array([u.scale for u in one.unknowns])
+    apart = (one.values - other.values) / size
+    covariance = (one.covariance + other.covariance) / np.outer(size, size)
+    square = float(apart @ np.linalg.pinv(covariance, hermitian=True) @ apart)
+    return Difference(float(np.sqrt(square)), len(told), float(chi2.sf(square, len(told))))

@@ -1,0 +1,110 @@
+"""Parameters within bounds: a filter's own coordinate z on the whole line, and the parameter theta(z)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, inf, log
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.filters.algebra import compiled
+from estimator.record import Array
+from fmus.errors import BadInput
+
+Kind = Literal["free", "log", "logit", "clip"]
+KINDS: tuple[Kind, ...] = get_args(Kind)  # their places are the codes of compiled functions
+FREE, LOG, LOGIT, CLIP = range(len(KINDS))
+Whole: TypeAlias = NDArray[np.int64]
+LARGEST = 700.0  # of an exponent; beyond it a double overflows
+
+
+@compiled
+def grown(code: int, low: float, high: float, z: float) -> float:
+    """See Transform."""
+    if code == FREE:
+        return z
+    if code == CLIP:
+        return min(max(z, low), high)
+    e = np.exp(min(max(z, -LARGEST), LARGEST))
+    if code == LOG:
+        return float(low + e)
+    return float(low + (high - low) * (e / (1 + e)))
+
+
+@compiled
+def grow(codes: Whole, low: Array, high: Array, Z: Array, theta: Array) -> None:
+    """Parameters theta (k, p) at coordinates Z (k, p), of transforms with these codes and bounds (p,)."""
+    for i in range(len(codes)):
+        for k in range(len(Z)):
+            theta[k, i] = grown(codes[i], low[i], high[i], Z[k, i])
+
+
+@dataclass(frozen=True)
+class Transform:
+    """theta(z) of one parameter between low and high.
+
+    free: theta = z. log: theta = low + e^z. logit: theta = low + (high - low)/(1 + e^-z).
+    clip: theta = z cut off at the bounds, as the sources do it, for comparison.
+    """
+
+    kind: Kind
+    low: float = -inf
+    high: float = inf
+
+    def theta(self, z: Array) -> Array:
+        """The parameter at coordinates of any shape."""
+        given = np.asarray(z, dtype=float)
+        found = np.empty((given.size, 1))
+        grow(*coded([self]), given.reshape(-1, 1), found)
+        return found.reshape(given.shape)
+
+    def z(self, theta: float) -> float:
+        """The coordinate of a value; BadInput where it lies on or outside the bounds."""
+        if self.kind in ("free", "clip"):
+            return theta
+        if not self.low < theta < self.high:
+            raise BadInput(
+                f"{theta:g} is not between its bounds {self.low:g} and {self.high:g}; start within them"
+            )
+        if self.kind == "log":
+            return log(theta - self.low)
+        return log((theta - self.low) / (self.high - theta))
+
+    def slope(self, z: float) -> float:
+        """d theta / dz."""
+        if self.kind in ("free", "clip"):
+            return 1.0
+        if self.kind == "log":
+            return exp(min(z, LARGEST))
+        share = 1 / (1 + exp(min(-z, LARGEST)))
+        return (self.high - self.low) * share * (1 - share)
+
+    def spread(self, z: Array, std: Array) -> Array:
+        """Half the width of the band that one standard deviation of z opens about theta(z)."""
+        return (self.theta(z + std) - self.theta(z - std)) / 2
+
+    def settled(self, z: Array) -> Array:
+        """The coordinate that a filter goes on with: only clipping changes it."""
+        return self.theta(z) if self.kind == "clip" else z
+
+
+def coded(transforms: Sequence[Transform]) -> tuple[Whole, Array, Array]:
+    """Codes, lower and upper bounds (p,) of transforms, for `grow`."""
+    codes = [KINDS.index(t.kind) for t in transforms]
+    low, high = ([getattr(t, end) for t in transforms] for end in ("low", "high"))
+    return np.array(codes, dtype=np.int64), np.array(low, dtype=float), np.array(high, dtype=float)
+
+
+def bounded(bounds: tuple[float, float] | None) -> Transform:
+    """The transformation that keeps a parameter within bounds, infinite ones included; None is free."""
+    low, high = bounds or (-inf, inf)
+    if not low < high:
+        raise BadInput(f"bounds [{low:g}, {high:g}] do not increase; give [lower, upper]")
+    if low > -inf and high < inf:
+        return Transform("logit", low, high)
+    if low > -inf:
+        return Transform("log", low)
+    if high < inf:
+        raise BadInput(f"an upper bound {high:g} without a lower one; give both")
+    return Transform("free")

@@ -1,0 +1,98 @@
+"""A joint system with derivatives: the FMU's own with respect to its states, differences for the rest."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from estimator.access.copies import Refused
+from estimator.access.exchange import Exchange
+from estimator.access.probe import Dishonest
+from estimator.filters.linear import (
+    NUDGE,
+    central,
+    linearised,
+    slopes,
+)
+from estimator.filters.system import Joint
+from estimator.record import Array
+from fmus.errors import BadInput
+
+LEAST = 1e-4  # by which parameters' coordinates and unknown inputs are perturbed, of themselves or of one
+MOST_PARTS = 32  # of a step, beyond which the FMU is stiff
+AGREES = 1e-3  # of the largest entry, to which both ways must give the same
+
+
+class Differentiated:
+    """A Joint that an extended filter need not difference with respect to the FMU's states.
+
+    Made by `differentiated`. An unknown input acts over a step in the FMU, so it belongs to the rest.
+    """
+
+    def __init__(self, joint: Joint, exchange: Exchange) -> None:
+        self.joint, self._exchange = joint, exchange
+        self.names, self.outputs = joint.names, joint.outputs
+        self._n = len(joint.states)
+        self._own = [exchange.states.index(s.name) for s in joint.states]
+        self._seen = [exchange.get.index(name) for name in joint.outputs]
+
+    def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
+        """See System."""
+        return self.joint.f(X, u, t, dt, carried)
+
+    def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
+        """See System."""
+        return self.joint.h(X, u, t, carried)
+
+    def settled(self, x: Array) -> Array:
+        """See System."""
+        return self.joint.settled(x)
+
+    def dfdx(self, x: Array, u: Array, t: float, dt: float, carried: Array) -> Array:
+        """d f / dx, (n, n); for the states with the mean of inputs that act in parts."""
+        F = self._rest(lambda X: self.joint.f(X, u, t, dt, carried)[0], x)
+        held = u.mean(axis=0) if u.ndim == 2 else u
+        values = self.joint.rows(x[None], held, carried)[0]
+        own = self._exchange.jacobians(values, t, dt)[0]
+        F[: self._n, : self._n] = own[np.ix_(self._own, self._own)]
+        return F
+
+    def dhdx(self, x: Array, u: Array, t: float, carried: Array) -> Array:
+        """d h / dx, (m, n)."""
+        H = self._rest(lambda X: self.joint.h(X, u, t, carried), x)
+        values = self.joint.rows(x[None], u, carried)[0]
+        own = self._exchange.jacobians(values, t, 0.0)[1]
+        H[:, : self._n] = own[np.ix_(self._seen, self._own)]
+        return H
+
+    def _rest(self, of: Callable[[Array], Array], x: Array) -> Array:
+        """The Jacobian's columns of what is no state, by differences; those of the states stay zero."""
+        n = self._n
+        points, away = central(x[n:], np.maximum(np.abs(x[n:]), 1.0) * LEAST / NUDGE)
+        values = of(np.hstack([np.tile(x[:n], (len(points), 1)), points]))
+        return np.hstack([np.zeros((values.shape[1], n)), slopes(values, away)])
+
+
+def differentiated(joint: Joint, u: Array, t: float, dt: float) -> Differentiated | None:
+    """The joint system with the FMU's own derivatives, freed with it; None where they are not to be had.
+
+    They must agree with differences at the start, with inputs u (n_u,): no flag is believed. A stiff FMU
+    is left to differences too, which go through its own steps and not through many short ones.
+    """
+    try:
+        exchange = joint.exchange()
+    except (BadInput, Refused, Dishonest):
+        return None
+    joint.owns(exchange.close)
+    made = Differentiated(joint, exchange)
+    begun = joint.start(t)
+    x, carried = begun.x, begun.carried
+    line = linearised(joint, x, u, dt, np.sqrt(np.diag(begun.P)), t, carried)
+    try:
+        own = made.dfdx(x, u, t, dt, carried), made.dhdx(x, u, t, carried)
+    except Refused:
+        return None
+    agree = all(
+        np.allclose(found, expected, rtol=0.0, atol=AGREES * float(np.abs(expected).max()))
+        for found, expected in zip(own, (line.F, line.H), strict=True)
+    )
+    return made if agree and exchange.parts <= MOST_PARTS else None

@@ -1,0 +1,80 @@
+"""Extended Kalman filter: the system's own derivatives where it has them, else differences."""
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from estimator.filters.algebra import joseph, symmetric
+from estimator.filters.estimator import (
+    Adaptation,
+    Covariance,
+    Estimate,
+    Filter,
+    Gate,
+    System,
+)
+from estimator.filters.linear import central, slopes
+from estimator.record import Array, BoolArray
+
+LEAST = 1e-3  # of a value
+
+
+@runtime_checkable
+class Differentiable(Protocol):
+    """A system that knows its derivatives with respect to x."""
+
+    def dfdx(self, x: Array, u: Array, t: float, dt: float, carried: Array) -> Array:
+        """d f / dx, (n, n)."""
+
+    def dhdx(self, x: Array, u: Array, t: float, carried: Array) -> Array:
+        """d h / dx, (m, n)."""
+
+
+class Ekf(Filter):
+    """Moves the mean through the system and the covariance through its derivatives at the mean."""
+
+    def __init__(
+        self,
+        system: System,
+        start: Estimate,
+        Q: Covariance,
+        R: Array,
+        dt: float,
+        gate: Gate | None = None,
+        adapt: Adaptation | None = None,
+    ) -> None:
+        super().__init__(system, start, Q, R, dt, gate, adapt)
+        self._own = system if isinstance(system, Differentiable) else None
+        self._H = np.empty((len(self.R), len(start.x)))
+
+    def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
+        now = self.now
+        if self._own:
+            moved, carried = self.system.f(now.x[None], u, t, dt, now.carried)
+            F = self._own.dfdx(now.x, u, t, dt, now.carried)
+        else:
+            points, away = central(now.x, _scale(now.x, now.P))
+            moved, carried = self.system.f(points, u, t, dt, now.carried)
+            F = slopes(moved, away)
+        C = now.P @ F.T
+        return moved[0], symmetric(F @ C) + Q, C, carried
+
+    def _expect(self, x: Array, P: Array, u: Array, t: float, carried: Array) -> tuple[Array, Array]:
+        if self._own:
+            seen, self._H = self.system.h(x[None], u, t, carried), self._own.dhdx(x, u, t, carried)
+        else:
+            points, away = central(x, _scale(x, P))
+            seen = self.system.h(points, u, t, carried)
+            self._H = slopes(seen, away)
+        return seen[0], symmetric(self._H @ P @ self._H.T)
+
+    def _correct(
+        self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
+    ) -> tuple[Array, Array]:
+        found: tuple[Array, Array] = joseph(x, P, np.ascontiguousarray(self._H[used]), innovation, R)
+        return found
+
+
+def _scale(x: Array, P: Array) -> Array:
+    """What differences are small against: what is believed of x, and not less than rounding allows."""
+    return np.maximum(np.sqrt(np.diag(P)), LEAST * np.abs(x))

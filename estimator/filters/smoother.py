@@ -1,0 +1,36 @@
+"""Rauch-Tung-Striebel smoothing of any filter's estimates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.filters.algebra import symmetric
+from estimator.filters.estimator import Estimate
+from estimator.record import Array
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """What the whole record says about each sample."""
+
+    t: Array  # (N,) s
+    x: Array  # (N, n)
+    P: Array  # (N, n, n)
+
+
+def smoothed(estimates: Sequence[Estimate]) -> Smoothed:
+    """Backwards through a filter's consecutive estimates.
+
+    Exact for a linear system. After a UKF it is the unscented smoother of Särkkä, IEEE Trans. Autom.
+    Control 53 (2008) 845: the covariances over a step are those of the sigma points that made it.
+    """
+    t = np.array([e.t for e in estimates])
+    x = np.array([e.x for e in estimates])
+    P = np.array([e.P for e in estimates])
+    for k in range(len(estimates) - 2, -1, -1):
+        after = estimates[k + 1]
+        G = np.linalg.solve(after.P_prior, after.C.T).T
+        x[k] = x[k] + G @ (x[k + 1] - after.x_prior)
+        P[k] = symmetric(P[k] + G @ (P[k + 1] - after.P_prior) @ G.T)
+    return Smoothed(t, x, P)

@@ -1,0 +1,256 @@
+"""An FMU as the system of a filter: x holds chosen states, parameters, and inputs that are not known."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from estimator.access.copies import Copies, Refused
+from estimator.access.exchange import Exchange, continuous_states
+from estimator.access.probe import Access, by_exchange, probe
+from estimator.access.recipe import Way
+from estimator.filters.bounds import Transform
+from estimator.filters.estimator import Diverged, Estimate
+from estimator.filters.layout import layout
+from estimator.filters.unknown_input import UnknownInput
+from estimator.record import Array
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.archive import Archive
+
+KEPT = 256  # lengths of steps of which transition and noise are kept
+
+
+@dataclass(frozen=True)
+class UnknownParameter:
+    """A parameter to estimate: what is believed of it before, and how far it wanders.
+
+    start, std in its unit; walk: what it gains in a second, in its unit.
+    """
+
+    name: str
+    start: float
+    std: float
+    transform: Transform
+    walk: float = 0.0
+
+    @property
+    def z(self) -> float:
+        """Its coordinate at the start."""
+        return self.transform.z(self.start)
+
+    def in_z(self, std: float) -> float:
+        """A small deviation of the parameter at the start as one of its coordinate."""
+        return std / self.transform.slope(self.z)
+
+
+@dataclass(frozen=True)
+class UnknownState:
+    """A state to estimate: what is believed of its start, and the noise that drives it, unit/sqrt(s)."""
+
+    name: str
+    start: float
+    std: float
+    noise: float = 0.0
+
+
+class Joint:
+    """A System (see estimator.filters.estimator) through any FMU.
+
+    x = states, coordinates of the parameters (`transform`), states of the unknown inputs. The FMU's other
+    states are carried: they move with the mean. y = outputs. Close it after use.
+    way: forces an access that the probe would not choose, for comparison; compiled: False for Python only.
+    """
+
+    def __init__(
+        self,
+        fmu: str | Path | Archive,
+        outputs: Sequence[str],
+        states: Sequence[UnknownState],
+        parameters: Sequence[UnknownParameter] = (),
+        unknown: Sequence[UnknownInput] = (),
+        inputs: Sequence[str] = (),
+        constants: Mapping[str, float] | None = None,
+        dt: float = 1e-3,
+        t0: float = 0.0,
+        way: Way | None = None,
+        compiled: bool = True,
+    ) -> None:
+        self._stack = ExitStack()
+        self._steps: dict[float, tuple[Array, Array]] = {}
+        self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
+        self.outputs, self.inputs = tuple(outputs), tuple(inputs)
+        self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
+        fed = [n for w in unknown for n in w.feeds]
+        mine = [s.name for s in states]
+        self.names = (*mine, *(p.name for p in parameters), *(n for w in unknown for n in w.states))
+        known = self.archive.description.states or continuous_states(self.archive)
+        self.others = tuple(n for n in known if n not in mine)
+        self._constants = dict(constants or {})
+        put = [*mine, *self.others, *(p.name for p in parameters), *inputs, *fed]
+        get = [*mine, *self.others, *(n for n in outputs if n not in (*mine, *self.others))]
+        self._check(put, get)
+        self._places(get)
+        try:
+            self._open(put, get, dt, t0, way, compiled)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def start(self, t: float = 0.0) -> Estimate:
+        """What is believed before the first sample at t."""
+        x = [*(s.start for s in self.states), *(p.z for p in self.parameters)]
+        variance = [*(s.std**2 for s in self.states), *(p.in_z(p.std) ** 2 for p in self.parameters)]
+        for w in self.unknown:
+            x += [0.0] * len(w.states)
+            variance += w.variance.tolist()
+        return Estimate(t, np.array(x), np.diag(variance), carried=self._first_carried)
+
+    def noise(self, dt: float) -> Array:
+        """Covariance (n, n) of what comes into x in a step of dt [s]."""
+        return self._over(dt)[1]
+
+    def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
+        """See System. Unknown inputs act over a step with the mean of both its ends, as known ones do."""
+        if u.ndim == 2:
+            for part, held in enumerate(u):
+                X, carried = self.f(X, held, t + part * dt / len(u), dt / len(u), carried)
+            return X, carried
+        values, after = self.layout.rows(X, u, carried, self.transition(dt))
+        found = self._asked(self.copies.advance, values, t, dt)
+        n = len(self.states)
+        after[:, :n] = found[:, :n]
+        return after, found[0, n : n + len(self.others)].copy()
+
+    def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
+        """See System; the FMU is asked only for what is not a state."""
+        if self._direct is not None:
+            return X[:, self._direct]
+        values = self.rows(X, u, carried)
+        return self._asked(self.copies.evaluate, values, t)[:, self._seen]
+
+    def rows(self, X: Array, u: Array, carried: Array) -> Array:
+        """What the FMU is given at x of each row (k, n), unknown inputs of this moment, (k, n_put)."""
+        return self.layout.rows(X, u, carried, self._still)[0]
+
+    def transition(self, dt: float) -> Array:
+        """Of the unknown inputs' states over dt [s], (n_w, n_w)."""
+        return self._over(dt)[0]
+
+    def settled(self, x: Array) -> Array:
+        """See System: cuts off what is bounded by clipping."""
+        for i, p in enumerate(self.parameters, len(self.states)):
+            if p.transform.kind == "clip":
+                x = x.copy()
+                x[i] = p.transform.settled(x[i])
+        return x
+
+    def values(self, x: Array, std: Array) -> tuple[Array, Array]:
+        """What x (N, n) and its deviations (N, n) mean in the FMU's units, (N, n) each."""
+        x, std = x.copy(), std.copy()
+        for i, p in enumerate(self.parameters, len(self.states)):
+            std[:, i] = p.transform.spread(x[:, i], std[:, i])
+            x[:, i] = p.transform.theta(x[:, i])
+        return x, std
+
+    def exchange(self) -> Exchange:
+        """An instance by model exchange, the caller's to close; BadInput where the FMU offers none."""
+        told = self._put, self._get, self._fixed
+        access = self.access
+        if access.way is not Way.EXCHANGE:
+            access = by_exchange(self.archive, *told, self._first, self._t0, self._dt)
+        return Exchange(self.archive, *told, self._t0, access.parts)
+
+    def owns(self, close: Callable[[], None]) -> None:
+        """Call something when this is closed."""
+        self._stack.callback(close)
+
+    def close(self) -> None:
+        """Free the copies, and the unpacked file where it is this one's own."""
+        self._stack.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _over(self, dt: float) -> tuple[Array, Array]:
+        """Transition of the unknown inputs and covariance of all noise over dt."""
+        if dt not in self._steps:
+            if len(self._steps) >= KEPT:
+                self._steps.clear()
+            self._steps[dt] = self._worked_out(dt)
+        return self._steps[dt]
+
+    def _worked_out(self, dt: float) -> tuple[Array, Array]:
+        walks = np.array([*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)])
+        shaped = [w.discrete(dt) for w in self.unknown]
+        F = block_diag(*(F for F, _ in shaped)) if shaped else np.empty((0, 0))
+        Q = block_diag(np.diag(walks**2 * dt), *(Q for _, Q in shaped))
+        return np.ascontiguousarray(F, dtype=float), np.ascontiguousarray(Q, dtype=float)
+
+    def _places(self, get: list[str]) -> None:
+        """Where things stand in x, in the rows that go into the FMU and in those that come out of it."""
+        n, transforms = len(self.states), [p.transform for p in self.parameters]
+        self.layout = layout(n, len(self.others), transforms, len(self.inputs), self.unknown)
+        self._still = np.eye(len(self.names) - n - len(transforms))
+        self._seen = [get.index(name) for name in self.outputs]
+        self._direct: slice | list[int] | None = None
+        if all(i < n for i in self._seen):
+            row = self._seen == list(range(len(self._seen)))
+            self._direct = slice(0, len(self._seen)) if row else self._seen
+
+    def _open(
+        self, put: list[str], get: list[str], dt: float, t0: float, way: Way | None, compiled: bool
+    ) -> None:
+        variables = self.archive.description.variables
+        first = {n: variables[n].start or 0.0 for n in put} | {
+            n: v for n, v in self._constants.items() if n in put
+        }
+        first |= {s.name: s.start for s in self.states} | {p.name: p.start for p in self.parameters}
+        self._first_carried = np.array([first[n] for n in self.others])
+        constants = self._fixed = {n: v for n, v in self._constants.items() if n not in put}
+        self._t0, self._dt, self._first = t0, dt, first
+        self.access: Access = probe(self.archive, put, get, constants, first, t0, dt, compiled)
+        late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
+        if late:
+            raise BadInput(
+                f"{self.archive.path}: output '{late[0]}' is worked out in steps only, not from the states; "
+                "leave it out of [outputs] or measure a state"
+            )
+        if way is Way.EXCHANGE:
+            self.access = by_exchange(self.archive, put, get, constants, first, t0, dt)
+        chosen = self.access.way if way is None else way
+        self._put, self._get = tuple(put), tuple(get)
+        self.copies: Copies | Exchange
+        if chosen is Way.EXCHANGE:
+            self.copies = self.exchange()
+            self._stack.callback(self.copies.close)
+            return
+        free = self.access.free_time if chosen is self.access.way else False
+        self.copies = self._stack.enter_context(
+            Copies(self.archive, chosen, put, get, constants, t0, free, compiled)
+        )
+
+    def _check(self, put: list[str], get: list[str]) -> None:
+        d = self.archive.description
+        for name in (*put, *get, *self._constants):
+            if name not in d.variables:
+                raise BadInput(f"{d.name}: has no variable '{name}'; {did_you_mean(name, d.variables)}")
+        twice = sorted({n for n in put if put.count(n) > 1})
+        if twice:
+            raise BadInput(f"{d.name}: '{twice[0]}' is named twice among what is set; name it once")
+
+    @staticmethod
+    def _asked(call: Callable[..., Array], *arguments: Any) -> Array:
+        try:
+            return call(*arguments)
+        except Refused as error:
+            raise Diverged(str(error)) from error

@@ -1,0 +1,166 @@
+"""FMUs with effects built in, made when first asked for: one model or foreign FMU, many hypotheses."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from types import MappingProxyType
+from typing import ClassVar
+
+from fmus.effects import EFFECTS, offers
+from fmus.errors import BadInput
+from fmus.export.around.effects_alone import EffectsAlone
+from fmus.export.around.outside import Outside
+from fmus.export.builders.native.build import build_native
+from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container.coupled import build_coupled
+from fmus.export.provenance import Origin
+from fmus.host.archive import describe
+from fmus.host.description import FmuDescription, PortNames
+from fmus.model import Model
+from fmus.models import model_class
+
+Effects = tuple[tuple[str, str], ...]  # (kind, location)
+LONGEST = 100  # characters of a folder's name, well below what file systems take
+
+
+@dataclass(frozen=True)
+class ModelBuilder:
+    """Builds of one of our models, with its locations opened by probes; kept in a folder."""
+
+    model: str
+    folder: Path
+    quick: ClassVar[bool] = True  # with effects as without
+
+    @property
+    def form(self) -> Mapping[str, tuple[float, float]]:
+        """Bounds of the parameters that stand for what the model's form is uncertain in."""
+        return model_class(self.model).form
+
+    @property
+    def form_error(self) -> float:
+        """Share of an output that the model's form leaves open."""
+        return model_class(self.model).form_error
+
+    @property
+    def offers(self) -> Effects:
+        """Every effect at every location where it makes sense, and where another form would be none."""
+        model = model_class(self.model)
+        return tuple(e for e in offers(_bare(self.model)) if e[1] not in {*model.form, *model.form_alike})
+
+    @property
+    def ports(self) -> tuple[PortNames, ...]:
+        """The model's locations by the names of their probes."""
+        names = _bare(self.model).ports()
+        return tuple(PortNames(n, f"{n}_force", f"{n}_velocity", f"{n}_displacement") for n in names)
+
+    def outside(self) -> Outside:
+        """The FMU without effects as a site for them, seen from outside."""
+        return Outside(_described(self(())), self.ports, _bare(self.model))
+
+    def __call__(self, effects: Effects) -> Path:
+        """Path of the FMU with these effects, all off at their start values.
+
+        Native where a C compiler is at hand, since hypotheses are run many times; PythonFMU otherwise.
+        """
+        return _once(self.folder, effects, lambda path: _fastest(self._model(effects, probes=True), path))
+
+    def final(
+        self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
+    ) -> Path:
+        """Write the FMU with effects and start values that were found, for use elsewhere."""
+        model = self._found(effects, starts)
+        return build_python(model, out / f"{model.name}_augmented.fmu", origin)
+
+    def final_native(
+        self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
+    ) -> Path:
+        """The same as a native FMU; BadInput where no compiler is at hand."""
+        model = self._found(effects, starts)
+        return build_native(model, out / f"{model.name}_augmented_native.fmu", origin=origin)
+
+    def _found(self, effects: Effects, starts: Mapping[str, float]) -> Model:
+        model = self._model(effects, probes=False)
+        for name in starts.keys() & model.variables.keys():
+            model.variables[name] = replace(model.variables[name], start=starts[name])
+        return model
+
+    def _model(self, effects: Effects, probes: bool) -> Model:
+        return model_class(self.model)([(EFFECTS[k], at) for k, at in effects], probes)
+
+
+@dataclass(frozen=True)
+class ForeignBuilder:
+    """A foreign FMU with effects around it; kept in a folder."""
+
+    fmu: Path
+    ports: tuple[PortNames, ...]
+    folder: Path
+    quick: ClassVar[bool] = False
+    form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    form_error: ClassVar[float] = 0.0
+
+    @property
+    def offers(self) -> Effects:
+        """Every force law at every port, for only its owner knows what makes sense there; and what can
+        befall its tunable parameters and its inputs.
+        """
+        return offers(Outside(describe(self.fmu), self.ports))
+
+    def outside(self) -> Outside:
+        """The FMU without effects as a site for them, seen from outside."""
+        return Outside(_described(self(())), self.ports)
+
+    def __call__(self, effects: Effects) -> Path:
+        """Path of the FMU with these effects, all off at their start values.
+
+        Without an effect too it runs in the coupled build, so that all hypotheses take the same steps.
+        """
+        if not self.ports and not effects:
+            return self.fmu
+        return _once(self.folder, effects, lambda path: build_coupled(self.fmu, self.ports, effects, path))
+
+    def final(
+        self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
+    ) -> Path:
+        """Write the FMU with effects around it and start values that were found, for use elsewhere."""
+        target = out / f"{self.fmu.stem}_augmented.fmu"
+        return build_coupled(self.fmu, self.ports, effects, target, starts=starts, origin=origin)
+
+    def alone(self, effects: Effects, starts: Mapping[str, float], step: float) -> EffectsAlone:
+        """The effects as a model of their own, to be connected to the FMU every `step`, s.
+
+        BadInput where an effect changes a parameter while running.
+        """
+        return EffectsAlone(describe(self.fmu), self.ports, effects, starts, step)
+
+
+@cache
+def _bare(model: str) -> Model:
+    return model_class(model)()
+
+
+@cache
+def _described(fmu: Path) -> FmuDescription:
+    return describe(fmu)
+
+
+def _fastest(model: Model, path: Path) -> Path:
+    try:
+        return build_native(model, path)
+    except BadInput:  # no compiler
+        return build_python(model, path)
+
+
+def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:
+    name = "+".join(["base", *(f"{k}@{at}" for k, at in effects)])
+    if len(name) > LONGEST:
+        name = f"{len(effects)}_effects_{sha256(name.encode()).hexdigest()[:16]}"
+    target = folder / name / "model.fmu"
+    if not target.exists():
+        part = target.with_name(f"{os.getpid()}.fmu")
+        build(part)
+        part.replace(target)  # workers may build the same at once
+    return target

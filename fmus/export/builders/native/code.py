@@ -1,0 +1,88 @@
+"""The C sources of a model: CasADi's code for its functions, a header of its tables, the wrapper's files."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as cs
+import fmpy
+from jinja2 import Environment, FileSystemLoader
+
+from fmus.export.builders.native.dependencies import stacked
+from fmus.export.builders.native.table import Table
+from fmus.model import Equations
+from fmus.variables import Expr
+
+HERE = Path(__file__).parent
+WRAPPER = ("fmu.c", "instance.h", "instance.c", "values.c", "stepping.c", "states.c", "derivatives.c")
+INTERFACE = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
+STANDARD = {  # headers of the standard, under its 2-clause BSD licence, as FMPy brings them
+    2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
+    3: ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
+}
+
+
+@dataclass(frozen=True)
+class Work:
+    """Lengths of the work vectors that suit every function."""
+
+    arg: int
+    res: int
+    iw: int
+    w: int
+
+
+def sources(table: Table, made: Equations, fmi: int, token: str) -> dict[str, str]:
+    """Text of each source file by name; `fmu.c` includes the others."""
+    code, work = _equations(table.name, made)
+    wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
+    headers = Path(fmpy.__file__).parent / "c-code"
+    standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
+    return {**wrapper, **standard, "equations.c": code, "model.h": _header(table, work, fmi, token)}
+
+
+def _equations(name: str, made: Equations) -> tuple[str, Work]:
+    """C code of f, h, step and of the derivatives of [x', y] by [x, u, p] along a direction and back."""
+    functions = [made.f, made.h, made.step, *_derivatives(made)]
+    # the name begins that of every helper, so that two models can be linked together
+    generator = cs.CodeGenerator(f"{name}_equations.c", {"casadi_int": "int"})
+    for function in functions:
+        generator.add(function)
+    sizes = ([getattr(f, f"sz_{part}")() for f in functions] for part in ("arg", "res", "iw", "w"))
+    return generator.dump(), Work(*(max(size) for size in sizes))
+
+
+def _derivatives(made: Equations) -> list[cs.Function]:
+    """Derivatives of [x', y] by [x, u, p], from a seed of one to a tangent of the other.
+
+    forward(x, u, p, seed of [x, u, p]) -> of [x', y]; reverse(x, u, p, seed of [x', y]) -> of [x, u, p].
+    """
+    whole = stacked(made)
+    kind: type[Expr] = cs.SX if whole.is_a("SXFunction") else cs.MX
+    x, u, p = (kind.sym(n, made.f.size1_in(i)) for i, n in enumerate(("x", "u", "p")))
+    found = []
+    for name, seeds in (("forward", whole.size1_in(0)), ("reverse", whole.size1_out(0))):
+        known, seed = kind.sym("known", whole.size1_in(0)), kind.sym("seed", seeds)
+        product = cs.jtimes(whole(known), known, seed, name == "reverse")
+        result: Expr = cs.Function("along", [known, seed], [product])(cs.vertcat(x, u, p), seed)
+        result = cs.cse(result) if kind is cs.SX else result
+        found.append(cs.Function(name, [x, u, p, seed], [cs.densify(result)]))
+    return found
+
+
+def _header(table: Table, work: Work, fmi: int, token: str) -> str:
+    templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
+    facts = {
+        "settable": table.entries[: sum(table.sizes[:3])],
+        "nominals": [e.nominal or 1.0 for e in table.entries[: table.sizes[0]]],
+        "c": _c,
+        "inf": math.inf,
+    }
+    template = templates.get_template("model.h.j2")
+    return template.render(table=table, work=work, fmi=fmi, token=token, **facts)
+
+
+def _c(value: float | None, missing: float = math.nan) -> str:
+    """A number in C, read back to the last bit."""
+    number = missing if value is None else value
+    return repr(float(number)) if math.isfinite(number) else ("-HUGE_VAL" if number < 0 else "HUGE_VAL")

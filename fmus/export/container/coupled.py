@@ -1,0 +1,111 @@
+"""Pack a foreign FMU together with effects around it, as one FMU of its own.
+
+The carried FMU stays a black box: at every coupling step the laws read the motion at its ports and set
+its inputs and tunable parameters, explicitly, as any master would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fmus.effects import EFFECTS
+from fmus.export.around.outside import Laws, laws
+from fmus.export.builders.pythonfmu import Content, documentation, pack
+from fmus.export.provenance import Origin, record_around
+from fmus.export.table import row, unit_table
+from fmus.host.archive import describe
+from fmus.host.description import FmuDescription, FmuVariable, PortNames
+
+COUPLING_STEP = 1e-3  # s, the longest between two readings of a port
+
+
+def build_coupled(
+    base: Path,
+    ports: Sequence[PortNames],
+    effects: Sequence[tuple[str, str]],
+    out: Path,
+    name: str | None = None,
+    starts: Mapping[str, float] | None = None,
+    origin: Origin | None = None,
+) -> Path:
+    """Write an FMU with `base` inside and effects (kind, location) around it; returns its path.
+
+    A location is the name of a port, of an input or of a tunable parameter.
+    starts: start values that replace those of the carried FMU and of the effects; origin: what they rest on.
+    """
+    description = describe(base)
+    made = laws(description, ports, effects)
+    groups = _groups(description)
+    rows = [[_foreign_row(v) for v in group] for group in groups]
+    rows[0] += [row(s) for s in made.states]
+    rows[2] += [row(p) for p in made.parameters]
+    table = [r for group in rows for r in group]
+    for r in table:
+        r["start"] = float((starts or {}).get(r["name"], r["start"]))
+    order, names = [r["name"] for r in table], [f"{kind}@{location}" for kind, location in effects]
+    restarted = [order.index(n) for n in starts or {} if n in description.variables]
+    card = {
+        "description": f"{description.name} with {', '.join(names) or 'no effect'}",
+        "step_size": COUPLING_STEP,
+        "sizes": [len(group) for group in rows],
+        "units": unit_table(r["unit"] for r in table if r["unit"]),
+        "variables": table,
+        "base": {**_base_card(description, ports, order, made), "restarted": restarted},
+    }
+    functions = {"push": made.push, "go_on": made.go_on}
+    files = {f"{name}.casadi": f.serialize().encode() for name, f in functions.items()}
+    files["base.fmu"] = base.read_bytes()
+    title = name or f"{description.identifier}WithEffects"
+    needs = "It carries another FMU and runs it with the package fmpy, which the importing process needs too."
+    page = documentation(title, card, names, needs)
+    values = {r["name"]: (r["start"], r["unit"]) for r in table if r["causality"] == "parameter"}
+    about = record_around(base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
+    return pack(Content(title, card, ("coupled", "carried"), files, page, False, about), out)
+
+
+def _groups(description: FmuDescription) -> list[list[FmuVariable]]:
+    """States, inputs, parameters, outputs of a foreign FMU."""
+    states = [description.variables[n] for n in description.states]
+    outputs = [v for n in description.outputs if (v := description.variables[n]) not in states]
+    return [
+        states,
+        [description.variables[n] for n in description.inputs],
+        [description.variables[n] for n in description.parameters],
+        outputs,
+    ]
+
+
+def _foreign_row(v: FmuVariable) -> dict[str, Any]:
+    is_state = v.causality == "output" and v.initial == "exact"
+    initial = {"output": "exact" if is_state else "calculated", "parameter": "exact"}.get(v.causality)
+    return {
+        "name": v.name,
+        "unit": v.unit,
+        "causality": v.causality,
+        "variability": v.variability,
+        "initial": initial,
+        "start": v.start or 0.0,
+        "starts": initial != "calculated",
+        "min": v.min,
+        "max": v.max,
+        "nominal": v.nominal,
+        "description": v.description,
+        "source": "",
+    }
+
+
+def _base_card(
+    description: FmuDescription, ports: Sequence[PortNames], order: list[str], made: Laws
+) -> dict[str, Any]:
+    references = [description.variables[n].reference if n in description.variables else -1 for n in order]
+    return {
+        "fmi": description.fmi_version,
+        "guid": description.guid,
+        "identifier": description.identifier,
+        "references": references,
+        "motion": [order.index(n) for port in ports for n in (port.displacement, port.velocity)],
+        "told": [order.index(n) for n in made.told],
+        "states": len(made.states),
+    }

@@ -1,0 +1,82 @@
+"""Grade an FMU for use here: what an estimator relies on is tried out, not believed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from fmus.errors import BadInput
+from fmus.host.archive import describe
+from fmus.host.grading.trials import TRIALS
+
+PATIENCE = 120.0  # s, for all trials together
+
+
+@dataclass(frozen=True)
+class Check:
+    """One trial's outcome; passed is None where the FMU does not offer what was tried."""
+
+    title: str
+    passed: bool | None
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Grade:
+    """All outcomes of one FMU, in the order of `fmus.host.grading.trials.TRIALS`."""
+
+    name: str
+    checks: tuple[Check, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing failed."""
+        return all(check.passed is not False for check in self.checks)
+
+
+def grade(path: str | Path, patience: float = PATIENCE) -> Grade:
+    """Try an FMU out, for at most `patience` seconds a process; BadInput where the file is no usable FMU.
+
+    It runs in a process of its own, so that an FMU that crashes or hangs fails its trial and nothing else.
+    """
+    name = describe(path).name
+    checks: list[Check] = []
+    while len(checks) < len(TRIALS):
+        checks += _tried(Path(path), len(checks), patience)
+    return Grade(name, tuple(checks))
+
+
+def _tried(path: Path, first: int, patience: float) -> list[Check]:
+    """Outcomes from trial number `first` on, to the last or to the one that ended the process."""
+    with tempfile.TemporaryDirectory(prefix="railfmi_check_") as folder:
+        results = Path(folder) / "results.jsonl"
+        results.touch()
+        end = _process([str(path), str(results), str(first)], patience)
+        lines = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
+    for line in lines:
+        if "unusable" in line:
+            raise BadInput(line["unusable"])
+        if "traceback" in line:
+            raise RuntimeError(f"{path}: the check itself failed:\n{line['traceback']}")
+    done = [Check(**line) for line in lines]
+    missing = list(TRIALS)[first + len(done) :]
+    if missing:
+        done.append(Check(missing[0], False, end or "It ended the process that ran it."))
+    return done
+
+
+def _process(arguments: list[str], patience: float) -> str:
+    """Run the trials; a sentence where they did not come to their end."""
+    command = [sys.executable, "-P", "-m", "fmus.host.grading.trials", *arguments]
+    paths = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    quiet = subprocess.DEVNULL  # FMUs may print
+    try:
+        ended = subprocess.run(command, env=paths, stdout=quiet, stderr=quiet, timeout=patience, check=False)
+    except subprocess.TimeoutExpired:
+        return f"It did not come to an end within {patience:g} s."
+    how = signal.strsignal(-ended.returncode) if ended.returncode < 0 else f"exit code {ended.returncode}"
+    return f"It brings down the process that runs it ({how}); keep it out of processes that must live."

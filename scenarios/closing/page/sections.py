@@ -1,0 +1,148 @@
+"""What stands in the report's sections: numbers and names, ready to print."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.record import BoolArray, Run
+from fmus.host.description import PortNames
+from scenarios.closing.page.case import Case
+from scenarios.closing.page.glossary import (
+    effect_words,
+    hypothesis_words,
+    law,
+    parameter_name,
+    place_words,
+    traits,
+)
+from scenarios.closing.result import effects_of
+from scenarios.drawing.typography import (
+    NOTHING,
+    capital,
+    short,
+    symbol,
+    unit,
+    with_error,
+)
+
+AT_BOUND = 1e-3  # of the distance of the bounds, within which an estimate stands at one of them
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class LawText:
+    """A fitted law: its formula, what its symbols mean, its parameters, and where such laws come from."""
+
+    title: str
+    formula: Markup
+    remark: str
+    motion: str
+    causes: str
+    shows: str
+    parameters: list[Row]
+
+
+def channels(case: Case) -> Iterator[Row]:
+    """Outputs, then inputs: name, part, meaning, unit, range, noise."""
+    record = case.problem.record
+    y, u = (np.vstack([getattr(run, part) for run in record.runs]) for part in ("y", "u"))
+    for j, name in enumerate(record.outputs):
+        how = "estimated" if np.isnan(record.noise_std[j]) else "declared"
+        noise = f"{short(case.found.noise[j], 3)} ({how})"
+        yield _channel(case, name, "output", y[:, j].min(), y[:, j].max(), noise)
+    for j, name in enumerate(record.inputs):
+        yield _channel(case, name, "input", u[:, j].min(), u[:, j].max(), NOTHING)
+
+
+def _channel(case: Case, name: str, part: str, low: float, high: float, noise: str) -> Row:
+    reach = f"{short(low)} to {short(high)}" if high > low else f"{short(low)}, constant"
+    row = {"name": name, "part": part, "range": reach, "noise": noise}
+    return row | {"meaning": case.words.meaning(name), "unit": unit(case.words.unit(name)) or "1"}
+
+
+def runs(case: Case) -> list[Row]:
+    """Duration, sampling and split of each run."""
+    return [_run(run) for run in case.problem.record.runs]
+
+
+def _run(run: Run) -> Row:
+    step = float(np.median(np.diff(run.t)))
+    return {
+        "duration": f"{short(run.t[-1] - run.t[0])} s",
+        "samples": f"{len(run.t)} at {short(1 / step)} Hz",
+        "identify": _window(run, run.fit),
+        "choose": _window(run, run.choose),
+        "test": _window(run, run.test),
+    }
+
+
+def _window(run: Run, mask: BoolArray) -> str:
+    if not mask.any():
+        return NOTHING
+    t = run.t[mask]
+    return f"{short(t[0], 5)} to {short(t[-1], 5)} s ({mask.sum()} samples)"
+
+
+def laws(case: Case) -> Iterator[tuple[str, list[LawText]]]:
+    """Each member of the verdict's class: in words, and its laws."""
+    for h in case.found.judgement.members:
+        yield hypothesis_words(h), [_law(case, h, c) for c in h.candidates]
+
+
+def _law(case: Case, h: Hypothesis, c: Candidate) -> LawText:
+    equation, remark = law(c.kind)
+    causes, shows = map(capital, traits(c.kind))
+    motion = next((_motion(case, p) for p in case.problem.ports if p.name == c.location), "")
+    return LawText(
+        f"{capital(effect_words(c.kind))} {place_words(c)}",
+        equation,
+        remark,
+        motion,
+        causes,
+        shows,
+        list(_parameters(case, h, c)),
+    )
+
+
+def _motion(case: Case, port: PortNames) -> str:
+    of = {n: unit(case.words.unit(n)) or "1" for n in (port.force, port.velocity, port.displacement)}
+    return (
+        f"F acts at the port “{port.name}” in {of[port.force]}, positive in the direction of motion; "
+        f"v is {port.velocity} in {of[port.velocity]}, q is {port.displacement} in {of[port.displacement]}."
+    )
+
+
+def _parameters(case: Case, h: Hypothesis, c: Candidate) -> Iterator[Row]:
+    effect = effects_of(h)[h.candidates.index(c)]
+    for name, figure in effect.parameters.items():
+        full = f"{c.kind}_{c.location}_{name}"
+        yield {
+            "symbol": symbol(parameter_name(c, name)),
+            "value": with_error(*figure),
+            "unit": unit(case.words.unit_of_parameter(c, name)) or "1",
+            "meaning": case.words.meaning_of_parameter(c, name),
+            "variable": full if full in case.words.variables else "",
+        }
+
+
+def calibrated(case: Case) -> Iterator[Row]:
+    """Calibrated parameters: declared, bounds, estimate without and with the effect."""
+    base, with_effect = case.found.base.fit, case.found.chosen is not None
+    for name, (low, high) in case.problem.calibrate.items():
+        value, error = case.result.calibrated[name]
+        margin = AT_BOUND * (high - low)
+        yield {
+            "name": name,
+            "meaning": case.words.meaning(name),
+            "unit": unit(case.words.unit(name)) or "1",
+            "declared": short(case.problem.declared[name]),
+            "bounds": f"{short(low)} to {short(high)}",
+            "before": with_error(base.theta[name], base.std[name]) if with_effect else NOTHING,
+            "estimate": with_error(value, error),
+            "at_bound": not low + margin <= value <= high - margin,
+        }

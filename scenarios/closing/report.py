@@ -1,0 +1,144 @@
+"""The report of close-loop: one self-contained page, and its figures as files."""
+
+import base64
+from collections.abc import Iterable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from estimator.closeloop.outcome import Outcome
+from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.search.free_form import curve_of
+from estimator.sensor_faults.sensor_faults import KINDS
+from fmus.host.archive import describe
+from scenarios.closing.figures.channels import record_plots, residual_plots, spectrum_plots
+from scenarios.closing.figures.errors import error_plot
+from scenarios.closing.figures.forces import OTHERS, force_plots, laws_found
+from scenarios.closing.figures.free_form import free_form_plot
+from scenarios.closing.figures.headline import headline_plot
+from scenarios.closing.page import error_table, sections
+from scenarios.closing.page.case import Case
+from scenarios.closing.page.glossary import effect_words, glossary, hypothesis_words
+from scenarios.closing.page.power_table import power_rows
+from scenarios.closing.page.rejected import (
+    chance_words,
+    detection_words,
+    rejected,
+    tried,
+)
+from scenarios.closing.page.wording import missed_words, story
+from scenarios.closing.result import Result, best_wrong
+from scenarios.drawing.sheet import Plot
+from scenarios.drawing.typography import number, unit
+
+HERE = Path(__file__).parent
+ROWS = 15  # of the table of rejected hypotheses
+Values = dict[str, Any]
+
+
+def write_report(folder: Path, problem: Problem, found: Outcome, result: Result) -> None:
+    """Write report.html and the figures into a folder.
+
+    The page holds its figures and its style and asks for nothing else.
+    """
+    free = (found.free_form,) if found.free_form else ()
+    case = Case(problem, found, result, glossary(problem, (*found.judgement.members, *free)))
+    env = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    parts = {
+        **_figures(case, folder),
+        **_measured(case),
+        **_law(case),
+        **_rejection(case),
+        **_use(case, folder),
+    }
+    page = env.get_template("report.html.j2").render(result=result, story=story(case), **parts)
+    part = folder / "report.part"
+    part.write_text(page, encoding="utf-8")
+    part.replace(folder / "report.html")
+
+
+def _figures(case: Case, folder: Path) -> Values:
+    """Draw all figures, write them, and embed them."""
+    problem, found, words, free = case.problem, case.found, case.words, case.found.free_form
+
+    errors = error_table.error_values(case)
+
+    def embed(plots: Iterable[Plot]) -> list[Values]:
+        data = [(p.caption, base64.b64encode(p.write(folder)).decode()) for p in plots]
+        return [{"caption": c, "source": f"data:image/png;base64,{d}"} for c, d in data]
+
+    return {
+        "headline_figure": embed([headline_plot(problem, found, words, free)]),
+        "record_figures": embed(record_plots(problem, words)),
+        "force_figures": embed(force_plots(found, words)),
+        "free_form_figures": embed([free_form_plot(found, free, words)] if free else []),
+        "error_figures": embed([error_plot(errors, words, free is not None)] if found.singles else []),
+        "residual_figures": embed(residual_plots(problem, found, words, free)),
+        "spectrum_figures": embed(spectrum_plots(problem, found, words, free)),
+    }
+
+
+def _measured(case: Case) -> Values:
+    return {
+        "cards": error_table.gap_cards(case),
+        "channels": list(sections.channels(case)),
+        "runs": sections.runs(case),
+        "free_states": case.problem.free_states,
+    }
+
+
+def _law(case: Case) -> Values:
+    shown = len(laws_found(case.found)) + OTHERS
+    return {
+        "missed": missed_words(case),
+        "ports_left_out": [m.port.name for m in case.found.forces[shown:]],
+        "laws": list(sections.laws(case)),
+        "calibrated": list(sections.calibrated(case)),
+        "has_effect": case.found.chosen is not None,
+        "has_after": case.found.built_in is not None,
+        "curve": curve_of(case.found.free_form) if case.found.free_form else None,
+    }
+
+
+def _rejection(case: Case) -> Values:
+    rows, wrong = rejected(case.problem, case.found), best_wrong(case.found)
+    return {
+        "errors": error_table.error_rows(case),
+        "wrong": hypothesis_words(wrong) if wrong else "",
+        "rejected": rows[:ROWS],
+        "more_rejected": max(0, len(rows) - ROWS),
+        "best": hypothesis_words(case.found.chosen or case.found.base),
+        "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
+        "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
+        "detection": detection_words(case.found),
+        "chance": chance_words(case.found, case.honesty) if case.honesty else "",
+        "black_box": case.honesty.black_box if case.honesty else None,
+        "power": power_rows(case),
+        "tried": [(at, ", ".join(map(effect_words, kinds))) for at, kinds in tried(case.problem).items()],
+        "faults": ", ".join(map(effect_words, KINDS)),
+        "known_noise": not any(c["noise"].endswith("(estimated)") for c in sections.channels(case)),
+    }
+
+
+def _use(case: Case, folder: Path) -> Values:
+    """How to run the augmented FMU and how to repeat the run."""
+    chosen, fmu = case.found.built_in, folder / case.result.augmented_fmu
+    effects = [c for c in (chosen.candidates if chosen else ()) if not c.is_fault]
+    theta = chosen.fit.theta if chosen else {}
+    known = describe(fmu).variables if fmu.is_file() else {}
+    others = {
+        n: v
+        for n, v in case.problem.declared.items()
+        if n in known and known[n].start != v and n not in theta
+    }
+    return {
+        "effect_values": {u.name: f"{theta[u.name]:.6g}" for c in effects for u in c.unknowns},
+        "switches": [u.name for c in effects for u in c.amplitudes],
+        "settings": {n: float(f"{v:.9g}") for n, v in others.items()},
+        "stop_time": f"{case.problem.record.runs[0].t[-1]:g}",
+        "version": version("railfmi"),
+    }

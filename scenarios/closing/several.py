@@ -1,0 +1,166 @@
+"""Close the loop on several experiments: each by itself, then what they say of one another, in one table."""
+
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from joblib import cpu_count
+
+from estimator.closeloop.checkpoints import Stages
+from estimator.closeloop.several.common import commons
+from estimator.closeloop.several.standing import standing
+from estimator.closeloop.several.transfer import Traced, transfers
+from estimator.plant import PLANTS
+from fmus.errors import BadInput
+from fmus.export.provenance import checksum
+from scenarios.closing.closing import (
+    Posed,
+    Tell,
+    builder_for,
+    closed,
+    experiment_of,
+    pose,
+    stages_of,
+)
+from scenarios.closing.page.glossary import glossary
+from scenarios.closing.result import Result
+from scenarios.closing.several_page import write_page
+from scenarios.closing.several_results import (
+    Carried,
+    Joint,
+    Results,
+    carried,
+    joint,
+    together,
+)
+from scenarios.experiment.experiment import Experiment
+from scenarios.output import writable
+
+Done = Callable[[Result], None]
+OURS = ("index.html", "table.csv", "results.json")  # files beside the folders of the experiments
+
+
+def close_loops(
+    experiments: Sequence[str | Path],
+    out: str | Path | None = None,
+    data_dir: str | Path | None = None,
+    tell: Tell = lambda _: None,
+    done: Done = lambda _: None,
+    jobs: int | None = None,
+    seed: int = 0,
+    resume: bool = False,
+) -> Results:
+    """What `railfmi close-loop` does with several experiments; see close_loop for what it does with one.
+
+    Each is written to `out`/ID, and index.html, table.csv and results.json of all to `out`. Where experiments
+    use the same FMU, each effect found is carried to the others, and fitted to all that show it. done: gets
+    each result as soon as it is there. Ctrl-C keeps what is finished; the result says so. Raises BadInput for
+    a wrong experiment, before the first one is run.
+    """
+    declared = [experiment_of(e, data_dir) for e in experiments]
+    _check_ids(declared)
+    with tempfile.TemporaryDirectory(prefix="railfmi_loops_") as work:
+        posed = [_posed(e, Path(work) / f"{i}") for i, e in enumerate(declared)]
+        campaign = _Campaign(posed, None if out is None else writable(Path(out)), jobs or cpu_count())
+        try:
+            campaign.run(tell, done, seed, resume)
+        except KeyboardInterrupt:
+            campaign.interrupted = True
+        finally:
+            PLANTS.close()
+            found = campaign.results()
+            if campaign.folder is not None and found.results:
+                found.write(campaign.folder)
+                write_page(campaign.folder, found)
+    return found
+
+
+def _check_ids(declared: Sequence[Experiment]) -> None:
+    if not declared:
+        raise BadInput("no experiment given; name at least one experiment.toml")
+    files: dict[str, Path] = {}
+    for e in declared:
+        if e.id in files:
+            raise BadInput(
+                f"{e.file}: id '{e.id}' is also that of {files[e.id]}; give each experiment an id of its own"
+            )
+        if Path(e.id).name != e.id or e.id in (*OURS, ".."):
+            raise BadInput(
+                f"{e.file}: id '{e.id}' cannot name a folder beside {', '.join(OURS)}; choose another id"
+            )
+        files[e.id] = e.file
+
+
+def _posed(e: Experiment, work: Path) -> Posed:
+    """Read all files of an experiment; models share their builds."""
+    folder = work if e.model is None else work.parent / e.model
+    folder.mkdir(exist_ok=True)
+    builder = builder_for(e, folder)
+    return Posed(e, builder, pose(e, builder))
+
+
+def fmu_of(e: Experiment) -> str:
+    """What two experiments with the same FMU have in common: the model's name, or the file's checksum."""
+    return checksum(e.fmu_path) if e.fmu_path else (e.model or "").lower()
+
+
+@dataclass
+class _Campaign:
+    """Experiments on their way; what is finished is kept whatever happens next."""
+
+    posed: Sequence[Posed]
+    folder: Path | None
+    jobs: int
+    finished: list[Result] = field(default_factory=list)
+    carried: list[Carried] = field(default_factory=list)
+    joint: list[Joint] = field(default_factory=list)
+    together: dict[str, str] = field(default_factory=dict)
+    units: dict[str, dict[str, str]] = field(default_factory=dict)
+    interrupted: bool = False
+
+    def run(self, tell: Tell, done: Done, seed: int, resume: bool) -> None:
+        """Each experiment, then each group of the same FMU."""
+        groups: dict[str, list[Traced]] = {}
+        kept: list[Stages] = []
+        for p in self.posed:
+            e, folder, begun = p.declared, self.folder, time.monotonic()
+            here = None if folder is None else writable(folder / e.id)
+            kept.append(stages_of(e, here, seed, resume))
+            outcome, result = closed(p, here, _prefixed(tell, e.id), self.jobs, seed, begun, kept[-1])
+            groups.setdefault(fmu_of(e), []).append(Traced(e.id, p.problem, outcome))
+            self.finished.append(result)
+            words = glossary(p.problem, ())
+            self.units[e.id] = {o: words.unit(o) for o in p.problem.record.outputs}
+            done(result)
+        for records in groups.values():
+            if len(records) > 1:
+                self._compare(records, tell)
+        for stages in kept:
+            stages.forget()
+
+    def _compare(self, records: Sequence[Traced], tell: Tell) -> None:
+        """Carry each effect to the other records, and fit those that stand to all that show them."""
+        found = []
+        for a in records:
+            for b in records:
+                if a is not b and a.members:
+                    tell(f"carrying what {a.name} shows to {b.name}")
+                    new = transfers(a, b, self.jobs)
+                    found += new
+                    self.carried += [carried(t, b) for t in new]
+        standings = [standing(a, found) for a in records]
+        self.together |= together(standings)
+        tell("fitting what several experiments show to all of them")
+        left = [h for s in standings for h in s.left]
+        by_name = {r.name: r for r in records}
+        self.joint += [joint(c, by_name[c.names[0]]) for c in commons(records, found, left, self.jobs)]
+
+    def results(self) -> Results:
+        """All that is finished."""
+        return Results(self.finished, self.carried, self.joint, self.together, self.units, self.interrupted)
+
+
+def _prefixed(tell: Tell, name: str) -> Tell:
+    return lambda said: tell(f"{name}: {said}")

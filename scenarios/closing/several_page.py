@@ -1,0 +1,127 @@
+"""The page of several closed loops: a table that leads to the single reports, and what they say together."""
+
+import base64
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from scenarios.closing.figures.common_values import common_plot
+from scenarios.closing.page.glossary import effect_words
+from scenarios.closing.result import Effect, Result
+from scenarios.closing.several_results import Carried, Joint, Results
+from scenarios.drawing.typography import (
+    NOTHING,
+    number,
+    percent,
+    short,
+    unit,
+    with_error,
+)
+
+HERE = Path(__file__).parent
+Values = dict[str, Any]
+
+
+def write_page(folder: Path, found: Results) -> None:
+    """Write index.html and its figures into the folder that holds the folders of the experiments."""
+    env = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    page = env.get_template("several_page.html.j2").render(
+        headline=_headline(found),
+        interrupted=found.interrupted,
+        rows=[_row(r, found) for r in found.results],
+        together=found.together,
+        transfers=[row for c in found.transfers for row in _transfer(c, found)],
+        joints=[_joint(j, folder) for j in found.joint],
+    )
+    part = folder / "index.part"
+    part.write_text(page, encoding="utf-8")
+    part.replace(folder / "index.html")
+
+
+def _headline(found: Results) -> str:
+    counts = Counter(r.verdict.replace("_", " ") for r in found.results)
+    every = len(found.results)
+    said = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+    return f"{every} experiment{'s' if every != 1 else ''}: {said}"
+
+
+def _row(r: Result, found: Results) -> Values:
+    row = next(t for t in found.table if t["experiment"] == r.experiment)
+    of, error = str(row["unit"]), r.error[str(row["output"])]
+    return {
+        "experiment": r.experiment,
+        "link": quote(str(row["report"])),
+        "verdict": r.verdict,
+        "effects": [words_of(e) for e in r.effects],
+        "output": row["output"],
+        "unit": unit(of),
+        "before": number(error["before"]),
+        "after": number(error["after"]),
+        "noise": short(error["noise"], 3),
+        "gap": percent(float(row["gap_closed"])) if row["gap_closed"] != "" else NOTHING,
+        "seconds": f"{r.wall_seconds:.0f}",
+    }
+
+
+def words_of(e: Effect) -> str:
+    """An effect in words with its parameters."""
+    values = ", ".join(f"{n} = {with_error(v, s)}" for n, (v, s) in e.parameters.items())
+    return f"{effect_words(e.kind)} at {e.location}: {values}"
+
+
+def label_words(label: str) -> str:
+    """A label, kind@location or several joined by "+", in words."""
+    return " and ".join(
+        f"{effect_words(k)} at {at}" for k, _, at in (p.partition("@") for p in label.split(" + "))
+    )
+
+
+def _transfer(c: Carried, found: Results) -> Iterator[Values]:
+    """One line an output; one without figures where the effect could not be carried over."""
+    free = [n.removeprefix(f"{_prefix(c.effect)}_") for n in c.free]
+    shared: Values = {k: getattr(c, k) for k in ("source", "target", "status", "reason")}
+    shared |= {"effect": label_words(c.effect), "lines": max(1, len(c.error)), "free": ", ".join(free)}
+    apart = NOTHING if c.distance is None else number(c.distance, 2)
+    if not c.error:
+        yield {**shared, "first": True, "figures": None, "apart": apart}
+    units = found.units.get(c.target, {})
+    for i, (output, e) in enumerate(c.error.items()):
+        figures = {k: number(e[k]) for k in ("before", "transferred", "own")}
+        figures |= {"output": output, "unit": unit(units.get(output)), "noise": short(e["noise"], 3)}
+        gap = percent(c.gap_closed[output])
+        yield {**shared, "first": i == 0, "apart": apart, "figures": figures, "gap": gap}
+
+
+def _prefix(label: str) -> str:
+    """How the names of an effect's parameters begin in the FMU; of several effects a name for all."""
+    return label.replace("@", "_").replace(" + ", "_")
+
+
+def _joint(j: Joint, folder: Path) -> Values:
+    prefix = _prefix(j.effect)
+    plot = common_plot(prefix, label_words(j.effect), j.parameters, j.alone, j.units)
+    return {
+        "words": label_words(j.effect),
+        "reason": j.reason,
+        "experiments": j.experiments,
+        "parameters": [
+            {
+                "name": n.removeprefix(f"{prefix}_"),
+                "unit": unit(j.units.get(n)),
+                "alone": [with_error(*j.alone[e][n]) if n in j.alone[e] else NOTHING for e in j.experiments],
+                "together": with_error(v, s),
+            }
+            for n, (v, s) in j.parameters.items()
+        ],
+        "chi2": [(number(j.chi2_alone[e]), number(j.chi2[e])) for e in j.experiments],
+        "rise": number(j.rise),
+        "chance": number(j.p_value, 2),
+        "caption": plot.caption,
+        "figure": "data:image/png;base64," + base64.b64encode(plot.write(folder)).decode(),
+    }

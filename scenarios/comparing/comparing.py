@@ -1,0 +1,197 @@
+"""Two FMUs side by side on the inputs and parameters of an experiment: where they differ, and by how much."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from estimator.record import Array, Record, Run
+from fmus.errors import BadInput
+from fmus.export.provenance import checksum
+from fmus.host.apart import FreeRun, simulate_apart
+from fmus.host.archive import describe
+from fmus.host.description import FmuDescription, FmuVariable
+from fmus.units import conversion
+from scenarios.comparing.figure import difference_plot
+from scenarios.comparing.result import (
+    SMALLEST,
+    Comparison,
+    Difference,
+    Mismatch,
+)
+from scenarios.experiment.experiment import Experiment, check_names, load_experiment
+from scenarios.experiment.record import load_record
+from scenarios.output import writable
+
+Tell = Callable[[str], None]
+TOLERANCE = 1e-9  # relative, of builds of one model: see docs/native.md
+SAID = ("unit", "start", "min", "max", "causality", "variability")
+
+
+def compare(
+    a: str | Path,
+    b: str | Path,
+    experiment: str | Path,
+    out: str | Path | None = None,
+    tolerance: float = TOLERANCE,
+    data_dir: str | Path | None = None,
+    tell: Tell = lambda _: None,
+) -> Comparison:
+    """What `railfmi compare` does; returns what is written to `out`/result.json beside its figure.
+
+    experiment: path of an experiment.toml or its folder; of it count inputs, parameters, initial states and
+    declared noise. A measured state that is not declared starts at its first sample, any other at the
+    FMU's own start value. tolerance: of the largest difference over the rms of a's output.
+    Raises BadInput for wrong input, FmuError where an FMU refuses a call.
+    """
+    if not (isfinite(tolerance) and tolerance >= 0):
+        raise BadInput(f"tolerance {tolerance:g}: give a number from 0 on")
+    path = Path(experiment)
+    declared = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
+    folder = None if out is None else writable(Path(out))
+    tell("reading the record")
+    about = describe(a), describe(b)
+    record = load_record(declared, about[0])
+    _check_second(declared, about[1])
+    names, unfit = _common(*about, f"{a} and {b}")
+    tell(f"running {Path(a).name} and {Path(b).name}, the second FMU, over {_length(record):g} s")
+    with ThreadPoolExecutor(2) as pool:  # each waits for a process
+        files = zip((a, b), about, strict=True)
+        asked = [pool.submit(_simulated, Path(f), own, about[0], record, declared, names) for f, own in files]
+        both = [answer.result() for answer in asked]
+    outputs = _differences(record, names, both, about[0], tolerance)
+    found = Comparison(
+        experiment=declared.id,
+        a=Path(a).name,
+        b=Path(b).name,
+        a_sha256=checksum(Path(a)),
+        b_sha256=checksum(Path(b)),
+        tolerance=tolerance,
+        outputs=outputs,
+        only_a=tuple(n for n in about[0].variables if n not in about[1].variables),
+        only_b=tuple(n for n in about[1].variables if n not in about[0].variables),
+        mismatches=tuple(_mismatches(*about)),
+        not_compared=unfit,
+    )
+    if folder is not None:
+        tell("drawing")
+        found.write(folder / "result.json")
+        difference_plot(found, record, names, both).write(folder)
+    return found
+
+
+def _length(record: Record) -> float:
+    """s, of all runs."""
+    return float(sum(run.t[-1] - run.t[0] for run in record.runs))
+
+
+def _check_second(e: Experiment, fmu: FmuDescription) -> None:
+    """The experiment is about the first FMU; the second one must know its names too."""
+    try:
+        check_names(e, fmu)
+    except BadInput as error:
+        raise BadInput(f"{error} (in the second FMU)") from error
+
+
+def _common(a: FmuDescription, b: FmuDescription, both: str) -> tuple[list[str], tuple[str, ...]]:
+    """Outputs of both FMUs, and those among them whose units do not fit."""
+    common = [n for n in a.outputs if n in b.outputs]
+    unfit = []
+    for name in common:
+        try:
+            _scale(b, a, name)
+        except BadInput:
+            unfit.append(name)
+    names = [n for n in common if n not in unfit]
+    if not names:
+        raise BadInput(f"{both} have no output that can be compared; give two FMUs of one model")
+    return names, tuple(unfit)
+
+
+def _scale(source: FmuDescription, target: FmuDescription, name: str) -> tuple[float, float]:
+    """Factor and offset from a variable's number in one FMU to that in another; units not said are alike."""
+    units = [d.variables[name].unit for d in (source, target)]
+    if units[0] is None or units[1] is None:
+        return 1.0, 0.0
+    return conversion(units[0], units[1], f"'{name}' of {target.name}")
+
+
+def _simulated(
+    file: Path, own: FmuDescription, of: FmuDescription, record: Record, e: Experiment, names: list[str]
+) -> Array:
+    """Free runs of an FMU through all runs of a record one after the other, (N, n), in the units of `of`."""
+    scales = np.array([_scale(of, own, n) for n in record.inputs]).reshape(-1, 2)
+    runs = []
+    for run in record.runs:
+        start = {}
+        for name, value in {**_measured(run, record, of), **e.parameters, **e.initial}.items():
+            factor, offset = _scale(of, own, name)
+            start[name] = factor * value + offset
+        u = run.u * scales[:, 0] + scales[:, 1]
+        runs.append(FreeRun(run.t, {n: u[:, j] for j, n in enumerate(record.inputs)}, start))
+    found = np.concatenate(simulate_apart(file, runs, names))
+    back = np.array([_scale(own, of, n) for n in names])
+    into: Array = found * back[:, 0] + back[:, 1]
+    return into
+
+
+def _measured(run: Run, record: Record, fmu: FmuDescription) -> dict[str, float]:
+    """States that are measured, at their first sample, within the limits that the FMU states."""
+    found = {}
+    for j, name in enumerate(record.outputs):
+        if name in fmu.states:
+            v = fmu.variables[name]
+            low, high = -np.inf if v.min is None else v.min, np.inf if v.max is None else v.max
+            found[name] = float(np.clip(run.y[0, j], low, high))
+    return found
+
+
+def _differences(
+    record: Record, names: Sequence[str], both: Sequence[Array], a: FmuDescription, tolerance: float
+) -> dict[str, Difference]:
+    """By output, the largest relative one first."""
+    t = np.concatenate([run.t for run in record.runs])
+    noise = dict(zip(record.outputs, record.noise_std.tolist(), strict=True))
+    found = {
+        n: _difference(t, both[0][:, j], both[1][:, j], a.variables[n], noise.get(n), tolerance)
+        for j, n in enumerate(names)
+    }
+    return dict(sorted(found.items(), key=lambda item: -_rank(item[1])))
+
+
+def _rank(d: Difference) -> float:
+    return d.relative if d.relative is not None else np.inf * d.largest if d.largest else 0.0
+
+
+def _difference(
+    t: Array, a: Array, b: Array, v: FmuVariable, noise: float | None, tolerance: float
+) -> Difference:
+    """Two courses (N,) of an output; what is the same, also if it is no number, does not differ."""
+    with np.errstate(invalid="ignore"):
+        gap = np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, np.abs(b - a))
+    gap[np.isnan(gap)] = np.inf
+    finite = a[np.isfinite(a)]
+    size = max(float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0, SMALLEST * abs(v.nominal or 0.0))
+    largest, rms = float(gap.max()), float(np.sqrt(np.mean(gap**2)))
+    return Difference(
+        unit=v.unit,
+        largest=largest,
+        time=float(t[gap.argmax()]),
+        rms=rms,
+        relative=largest / size if size else None,
+        rms_relative=rms / size if size else None,
+        in_noise=rms / noise if noise is not None and noise > 0 else None,
+        agrees=largest <= tolerance * size,
+    )
+
+
+def _mismatches(a: FmuDescription, b: FmuDescription) -> Iterator[Mismatch]:
+    """What both FMUs say of a variable of one name, differently."""
+    for name, v in a.variables.items():
+        if name in b.variables:
+            for what in SAID:
+                said: tuple[str | float | None, ...] = (getattr(v, what), getattr(b.variables[name], what))
+                if said[0] != said[1]:
+                    yield Mismatch(name, what, *said)

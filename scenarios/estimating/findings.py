@@ -1,0 +1,148 @@
+"""The work of estimate: noise that is not declared, what the data can tell, the filter's run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.filters.derivatives import differentiated
+from estimator.filters.dual import Dual
+from estimator.filters.ekf import Ekf
+from estimator.filters.estimator import (
+    Adaptation,
+    Diverged,
+    Estimate,
+    Gate,
+)
+from estimator.filters.history import History, Steps, filtered
+from estimator.filters.identifiability import (
+    Identifiability,
+    afterwards,
+    before,
+    information,
+)
+from estimator.filters.process_noise import LEARNT_FROM, likeliest
+from estimator.filters.smoother import smoothed
+from estimator.filters.system import Joint
+from estimator.filters.ukf import Spread, Ukf
+from estimator.record import Array
+from fmus.errors import BadInput
+from fmus.host.archive import Archive
+from fmus.host.fmu import Fmu, FmuError
+from scenarios.estimating.setup import Setup, finely
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All that the run of a filter left behind, for the result and the page."""
+
+    setup: Setup
+    joint: Joint
+    history: History
+    value: Array  # (N, n) in the FMU's units
+    std: Array  # (N, n)
+    before: Identifiability | None
+    after: Identifiability | None
+    share: float | None  # of the states' motion that is noise, where it was found from the data
+
+
+def find(s: Setup, archive: Archive, tell: Tell) -> Findings:
+    """Run everything; the joint system of the findings is the caller's to close."""
+    share = None
+    if set(s.options.process_std) < {state.name for state in s.states}:
+        tell("finding how much of the states' motion is noise")
+        share = _noise_share(s, archive)
+    joint = s.joint(archive, share or 0.0)
+    try:
+        tell("weighing what the data can tell")
+        known = _before(s, archive, joint)
+        start = joint.start(float(s.samples.t[0]))
+        keep = s.options.smooth
+        filter = filter_of(s, joint, start)
+        history = filtered(filter, s.samples, lambda done: tell(f"filtering, {done:.0%} done"), keep)
+        if keep:
+            history = _smoothed(history)
+        value, std = joint.values(history.x, history.std)
+        unknown = len(joint.names) - len(s.states)
+        learnt = afterwards(joint.names, start.P, history.last.P, unknown) if unknown else None
+    except BaseException:
+        joint.close()
+        raise
+    return Findings(s, joint, history, value, std, known, learnt, share)
+
+
+def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
+    """The filter that the options ask for."""
+    o, R = s.options, np.diag(s.noise**2)
+    dt = float(np.median(np.diff(s.samples.t)))
+    spread = Spread(o.alpha, o.beta, o.kappa)
+    if o.filter == "dual":
+        if o.gate or o.adapt:
+            raise BadInput("[estimate.options] gate and adapt are not for filter = 'dual'; leave them out")
+        return Dual(joint, len(joint.states), start, joint.noise, R, dt, spread)
+    gate = None if o.gate is None else Gate(o.gate)
+    adapt = (
+        Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None
+    )
+    if o.filter == "ekf":
+        own = differentiated(joint, s.samples.u[0], float(s.samples.t[0]), dt)
+        return Ekf(own or joint, start, joint.noise, R, dt, gate, adapt)
+    return Ukf(joint, start, joint.noise, R, dt, gate, adapt, spread)
+
+
+def _noise_share(s: Setup, archive: Archive) -> float:
+    """By maximum likelihood over the first samples."""
+    first = s.samples.first(LEARNT_FROM)
+
+    def log_likelihood(part: float) -> float:
+        with s.joint(archive, part) as joint:
+            try:
+                found = filtered(filter_of(s, joint, joint.start(float(first.t[0]))), first)
+            except Diverged:
+                return -np.inf
+            return -np.inf if found.broken else found.log_likelihood
+
+    return likeliest(log_likelihood)
+
+
+def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:
+    """By free simulations over the record; None without unknown parameters, or where the FMU fails."""
+    n = len(s.states)
+    if not s.parameters:
+        return None
+    names = joint.names[: n + len(s.parameters)]
+    start = joint.start()
+    z, std = start.x[: len(names)], np.sqrt(np.diag(start.P))[: len(names)]
+    (t, inputs), parts = finely(s.samples, s.inputs), s.samples.held.shape[1]
+    with Fmu(archive) as fmu:
+
+        def simulate(at: Array) -> Array:
+            values = dict(zip(names[:n], at[:n].tolist(), strict=True))
+            for p, coordinate in zip(s.parameters, at[n:], strict=True):
+                values[p.name] = float(p.transform.theta(coordinate))
+            y = fmu.simulate(t, inputs, s.outputs, {**s.constants, **values})[::parts]
+            return np.where(np.isfinite(s.samples.y), y, np.nan)
+
+        try:
+            return before(names, information(simulate, z, std, s.noise), std, len(s.parameters))
+        except FmuError:
+            return None
+
+
+def _smoothed(h: History) -> History:
+    """With what the whole record says in place of what was known at each sample."""
+    whole = smoothed(h.estimates)
+    std = np.sqrt(np.maximum(np.diagonal(whole.P, axis1=1, axis2=2), 0.0))
+    return replace(h, x=whole.x, std=std, estimates=())
+
+
+def informed(found: Findings) -> dict[str, bool]:
+    """Whether the data say anything about each unknown, before and after filtering."""
+    both: dict[str, bool] = {}
+    for i in (found.before, found.after):
+        if i is not None:
+            for name, said in zip(i.names, i.informed, strict=True):
+                both[name] = both.get(name, True) and said
+    return both

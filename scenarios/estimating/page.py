@@ -1,0 +1,137 @@
+"""The page of estimate: one self-contained file with its figures, which lie beside it too."""
+
+import base64
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from estimator.record import Array
+from scenarios.drawing.sheet import Plot
+from scenarios.drawing.typography import (
+    NOTHING,
+    number,
+    percent,
+    quantity,
+    short,
+    unit,
+    with_error,
+)
+from scenarios.estimating.findings import Findings
+from scenarios.estimating.page_figures import band_plots, correlation_plots, innovation_plots
+from scenarios.estimating.result import EstimateResult
+
+HERE = Path(__file__).parent
+Row = dict[str, Any]
+Truth = Mapping[str, tuple[Array, Array]]
+
+
+def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Truth) -> None:
+    """Write estimate.html and its figures into a folder; it asks for nothing else."""
+    env = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    page = env.get_template("page.html.j2").render(
+        result=result,
+        headline=headline(result),
+        quantities=list(quantities(found, result)),
+        channels=list(channels(result)),
+        alarms=list(raised(result)),
+        unknowns=list(unknowns(result)),
+        noise=list(noise(found, result)),
+        nis={name: _number(value) for name, value in result.nis.items()},
+        bands=_embedded(band_plots(found, truth), folder),
+        innovations=_embedded(innovation_plots(found), folder),
+        correlations=_embedded(correlation_plots(found), folder),
+        version=version("railfmi"),
+    )
+    (folder / "estimate.html").write_text(page, encoding="utf-8")
+
+
+def headline(result: EstimateResult) -> str:
+    """What was found, in a sentence."""
+    if result.diverged:
+        return "The filter diverged; what it had until then is shown."
+    wanted = {n: e for n, e in result.estimated.items() if e["kind"] == "parameter"} or result.estimated
+    said = [f"{n} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}" for n, e in wanted.items()]
+    return ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
+
+
+def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
+    """Last values, one row a quantity, parameters and inputs first."""
+    variables = found.joint.archive.description.variables
+    for name, e in sorted(result.estimated.items(), key=lambda pair: pair[1]["kind"] == "state"):
+        low, high = e["band_95"]
+        error = result.rms_error.get(name)
+        yield {
+            "name": name,
+            "kind": e["kind"],
+            "meaning": variables[name].description if name in variables else "rate of the input before",
+            "value": with_error(e["value"], e["std_error"]),
+            "unit": unit(e["unit"]),
+            "band": " to ".join(short(v, _digits(v, e["std_error"])) for v in (low, high)),
+            "informed": e.get("informed_by_data", True),
+            "error": NOTHING if error is None else number(error),
+        }
+
+
+def channels(result: EstimateResult) -> Iterator[Row]:
+    """One row an output: how well it was foreseen."""
+    for name, c in result.innovations.items():
+        gated = c["gated_share"]
+        yield {
+            "name": name,
+            "noise": _number(c["noise"]),
+            "rms": _number(c["rms_over_expected"]),
+            "mean": _number(c["mean_over_expected"]),
+            "correlation": f"{_number(c['largest_correlation'])} ({_number(c['white_below'])})",
+            "p": _number(c["p_white"]),
+            "gated": NOTHING if gated is None else percent(gated),
+        }
+
+
+def raised(result: EstimateResult) -> Iterator[Row]:
+    """One row an alarm."""
+    for a in result.alarms:
+        end = "the end" if a.end is None else f"{short(a.end)} s"
+        yield {
+            "what": f"{a.name} {a.limit}", "begin": f"{short(a.begin)} s", "end": end,
+            "probability": percent(a.probability),
+        }  # fmt: skip
+
+
+def unknowns(result: EstimateResult) -> Iterator[Row]:
+    """One row an unknown: how much of its first deviation is left, before and after."""
+    left = {when: told["deviation_left"] for when, told in result.identifiability.items()}
+    for name in left.get("after", left.get("before", {})):
+        yield {"name": name} | {
+            when: percent(left[when][name]) if name in left.get(when, {}) else NOTHING
+            for when in ("before", "after")
+        }
+
+
+def noise(found: Findings, result: EstimateResult) -> Iterator[Row]:
+    """One row a state: the noise that drives it."""
+    variables = found.joint.archive.description.variables
+    for name, value in result.process_noise.items():
+        of = unit(variables[name].unit)
+        yield {"name": name, "value": number(value), "unit": f"{of}/√s" if of else "1/√s"}
+
+
+def _digits(value: float, std: float) -> int:
+    """Significant digits of a value of which the second digit of its deviation is still shown."""
+    if not (value and std > 0):
+        return 4
+    return min(max(3, math.floor(math.log10(abs(value))) - math.floor(math.log10(std)) + 2), 12)
+
+
+def _number(value: float | None) -> str:
+    return NOTHING if value is None else number(value)
+
+
+def _embedded(plots: Iterable[Plot], folder: Path) -> list[Row]:
+    made = [(plot.caption, base64.b64encode(plot.write(folder)).decode()) for plot in plots]
+    return [{"caption": c, "source": f"data:image/png;base64,{data}"} for c, data in made]

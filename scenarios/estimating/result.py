@@ -1,0 +1,183 @@
+"""What estimate found, as it is written to result.json and estimate.csv."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from estimator.filters.consistency import mean_band, share_within, whiteness
+from estimator.filters.history import History
+from estimator.filters.identifiability import Identifiability
+from estimator.filters.system import Joint
+from estimator.record import Array
+from scenarios.experiment.declaration import Alarm, Options
+
+BAND = 1.959964  # deviations of the 95 % band
+CLEAR = 0.5  # probability below which an alarm ends
+
+
+@dataclass(frozen=True)
+class Raised:
+    """A stretch of time [s] in which a quantity was beyond its limit with the probability asked for."""
+
+    name: str
+    limit: str
+    begin: float
+    end: float | None  # None where it lasts to the end of the record
+    probability: float  # the highest
+
+
+@dataclass(frozen=True)
+class EstimateResult:
+    """The result of estimate. `estimated` holds, by name, kind, value, standard error, band of 95 %, ...
+
+    innovations, by output: noise, rms over what is expected of it (1 where all is right), largest
+    correlation, p value of whiteness, share gated. rms_error: where a truth was given.
+    """
+
+    experiment: str
+    filter: str
+    estimated: dict[str, dict[str, Any]]
+    innovations: dict[str, dict[str, float | None]]
+    nis: dict[str, float | None]
+    log_likelihood: float
+    identifiability: dict[str, Any]
+    alarms: list[Raised]
+    process_noise: dict[str, float]
+    process_noise_share: float | None
+    access: str
+    refused: dict[str, str]
+    samples: int
+    seconds_of_record: float
+    wall_seconds: float
+    diverged: bool
+    reason: str
+    rms_error: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def write(self, path: Path) -> None:
+        """Write as JSON."""
+        path.write_text(json.dumps(asdict(self), indent=1, allow_nan=False), encoding="utf-8")
+
+
+def estimated(joint: Joint, h: History, informed: dict[str, bool]) -> dict[str, dict[str, Any]]:
+    """The last value of each quantity in the FMU's units."""
+    if not len(h.t):
+        return {}
+    kinds = ["state"] * len(joint.states) + ["parameter"] * len(joint.parameters)
+    kinds += ["input"] * (len(h.names) - len(kinds))
+    value, std = joint.values(h.x[-1:], h.std[-1:])
+    low, high = (joint.values(h.x[-1:] + s * BAND * h.std[-1:], h.std[-1:])[0][0] for s in (-1, 1))
+    variables = joint.archive.description.variables
+    return {
+        name: {
+            "kind": kind,
+            "unit": variables[name].unit if name in variables else None,
+            "value": float(value[0, i]),
+            "std_error": float(std[0, i]),
+            "band_95": [float(low[i]), float(high[i])],
+            **({"informed_by_data": informed[name]} if name in informed else {}),
+        }
+        for i, (name, kind) in enumerate(zip(h.names, kinds, strict=True))
+    }
+
+
+def innovations(h: History, outputs: tuple[str, ...], noise: Array) -> dict[str, dict[str, float | None]]:
+    """How well each output was foreseen."""
+    found = {}
+    for j, name in enumerate(outputs):
+        e = h.innovation[:, j]
+        seen = e[np.isfinite(e)]
+        white = whiteness(e)
+        found[name] = {
+            "noise": finite(float(noise[j])),
+            "rms_over_expected": finite(float(np.sqrt(np.mean(seen**2))) if len(seen) else np.nan),
+            "mean_over_expected": finite(float(np.mean(seen)) if len(seen) else np.nan),
+            "largest_correlation": finite(white.largest),
+            "white_below": finite(white.limit),
+            "p_white": finite(white.p_value),
+            "gated_share": finite(float(h.gated[:, j].sum()) / len(seen) if len(seen) else np.nan),
+        }
+    return found
+
+
+def nis(h: History) -> dict[str, float | None]:
+    """Normalised innovations squared, against their 95 % band."""
+    used = h.freedom > 0
+    band = mean_band(h.nis[used], h.freedom[used])
+    share = share_within(h.nis[used], h.freedom[used])
+    freedom = float(np.mean(h.freedom[used])) if used.any() else np.nan
+    figures = {
+        "mean": band.value, "low_95": band.low, "high_95": band.high, "freedom": freedom,
+        "share_within_95": share,
+    }  # fmt: skip
+    return {name: finite(value) for name, value in figures.items()}
+
+
+def identified(before: Identifiability | None, after: Identifiability | None) -> dict[str, Any]:
+    """What the data tell of each unknown parameter and input, before and after filtering."""
+    found: dict[str, Any] = {}
+    for when, i in (("before", before), ("after", after)):
+        if i is not None:
+            found[when] = {
+                "deviation_left": dict(zip(i.names, map(float, i.left), strict=True)),
+                "correlation": [[round(float(c), 4) for c in row] for row in i.correlation],
+                "alike": [[a, b, round(c, 4)] for a, b, c in i.alike],
+            }
+    return found
+
+
+def alarms(joint: Joint, h: History, options: Options) -> list[Raised]:
+    """When each quantity with a limit was beyond it."""
+    found = []
+    for name, alarm in options.alarms.items():
+        if name in h.names:
+            i = h.names.index(name)
+            for side, limit in (("below", alarm.below), ("above", alarm.above)):
+                if limit is not None:
+                    p = probability(joint, h, i, limit, side == "below")
+                    found += stretches(name, f"{side} {limit:g}", h.t, p, alarm)
+    return found
+
+
+def probability(joint: Joint, h: History, i: int, limit: float, below: bool) -> Array:
+    """Of quantity number i being beyond its limit, (N,); parameters are normal in their own coordinate."""
+    at = i - len(joint.states)
+    if 0 <= at < len(joint.parameters):
+        transform = joint.parameters[at].transform
+        if not transform.low < limit < transform.high:
+            limit = -np.inf if limit <= transform.low else np.inf
+        else:
+            limit = transform.z(limit)
+    p: Array = np.asarray(norm.cdf((limit - h.x[:, i]) / h.std[:, i]), dtype=np.float64)
+    return p if below else 1 - p
+
+
+def stretches(name: str, limit: str, t: Array, p: Array, alarm: Alarm) -> list[Raised]:
+    """From where the probability reaches that of the alarm and stays there, to where it is even again."""
+    likely = p >= alarm.probability
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))
+    found: list[Raised] = []
+    for begin, after in edges.reshape(-1, 2):
+        known = not found or (found[-1].end is not None and t[begin] >= found[-1].end)
+        if known and t[after - 1] - t[begin] >= alarm.hold:
+            even = after + np.flatnonzero(~(p[after:] >= CLEAR))
+            last = even[0] if len(even) else len(t)
+            end = float(t[last]) if last < len(t) else None
+            found.append(Raised(name, limit, float(t[begin]), end, float(p[begin:last].max())))
+    return found
+
+
+def finite(value: float) -> float | None:
+    """A number that JSON can hold."""
+    return value if np.isfinite(value) else None
+
+
+def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: Array) -> None:
+    """Columns time, then NAME and NAME_std of each quantity."""
+    columns = np.column_stack([t, np.stack([value, std], axis=2).reshape(len(t), 2 * len(names))])
+    header = ",".join(["time", *(c for n in names for c in (n, f"{n}_std"))])
+    np.savetxt(path, columns, fmt="%.9g", delimiter=",", header=header, comments="")

@@ -1,0 +1,188 @@
+"""From an experiment to the system of its filter: samples, unknowns, noise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.access.copies import Copies
+from estimator.access.recipe import Way
+from estimator.filters.history import Samples, samples
+from estimator.filters.observability import needed
+from estimator.filters.process_noise import motion
+from estimator.filters.system import Joint, UnknownParameter, UnknownState
+from estimator.filters.unknown_input import UnknownInput
+from estimator.noise import DIFFERENCE
+from estimator.record import Array, Record
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.archive import Archive
+from fmus.host.fmu import Fmu, FmuError
+from scenarios.estimating.unknowns import (
+    check_options,
+    inputs_of,
+    parameters_of,
+    states_of,
+    usual,
+)
+from scenarios.experiment.declaration import Options
+from scenarios.experiment.experiment import Experiment
+
+MIN_SAMPLES = 10
+MOST_PARTS = 16  # of a step
+TOLD_APART = 0.1  # of the noise: a smaller change of the outputs is none
+
+
+@dataclass(frozen=True)
+class Setup:
+    """An experiment as a filter sees it. scale: (n_states,) motion per sqrt(s), for noise not declared."""
+
+    experiment: Experiment
+    options: Options
+    samples: Samples
+    noise: Array  # (m,) deviations of the measured outputs
+    declared_noise: tuple[bool, ...]
+    constants: dict[str, float]
+    states: tuple[UnknownState, ...]
+    parameters: tuple[UnknownParameter, ...]
+    unknown: tuple[UnknownInput, ...]
+    scale: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    free_run: Array  # (N, m) outputs with the values that the filter starts from, nan where it fails
+
+    def joint(self, archive: Archive, part: float) -> Joint:
+        """The system, with states driven by `part` of their motion where no noise is declared for them."""
+        given = self.options.process_std
+        states = [
+            replace(s, noise=given.get(s.name, part * scale))
+            for s, scale in zip(self.states, self.scale.tolist(), strict=True)
+        ]
+        s = self.samples
+        return Joint(
+            archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,
+            dt=float(np.median(np.diff(s.t))), t0=float(s.t[0]),
+        )  # fmt: skip
+
+
+def set_up(e: Experiment, options: Options, record: Record, archive: Archive) -> Setup:
+    """Everything that is to be known before filtering; BadInput where names or values do not fit."""
+    d = archive.description
+    run = record.runs[0]
+    check_options(e, options, d)
+    every = 1
+    if e.estimate and e.estimate.rate:
+        every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
+    s = samples(run.t, run.u, run.y, every)
+    if len(s.t) < MIN_SAMPLES:
+        raise BadInput(f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher one")
+    _check_measured(e, record, s)
+    noise = noise_of(record)
+    constants = {**e.parameters, **e.initial}
+    parameters = tuple(parameters_of(e, options, d))
+    unknown = tuple(inputs_of(e, options))
+    values = constants | {p.name: p.start for p in parameters}
+    names = tuple(e.estimate.states) if e.estimate else ()
+    states = names or _needed(archive, values, s, record)
+    _check_alarms(e, options, (*states, *(u.name for u in (*parameters, *unknown))))
+    s, run_of = _fine_enough(archive, values, record, states, noise, every, options.input_parts)
+    nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
+    return Setup(
+        e, options, s, noise, tuple(np.isfinite(record.noise_std)), constants,
+        tuple(states_of(e, options, d, record, noise, states)), parameters, unknown,
+        motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
+        record.inputs, record.outputs, run_of[:, : len(record.outputs)],
+    )  # fmt: skip
+
+
+def _check_measured(e: Experiment, record: Record, s: Samples) -> None:
+    """Each output needs measurements among the samples, and enough of them to show noise not declared."""
+    for j, name in enumerate(record.outputs):
+        if not np.isfinite(s.y[:, j]).any():
+            raise BadInput(
+                f"{e.file}: [estimate] rate leaves no measurement of output '{name}'; use a higher one"
+            )
+        found = int(np.isfinite(record.runs[0].y[:, j]).sum())
+        if np.isnan(record.noise_std[j]) and found < MIN_SAMPLES:
+            raise BadInput(
+                f"{e.file}: [outputs.{name}] has {found} measurements, too few to tell its noise; "
+                "add noise_std = ..."
+            )
+
+
+def _check_alarms(e: Experiment, options: Options, estimated: tuple[str, ...]) -> None:
+    """Alarms that were asked for must be about something that is estimated."""
+    for name in options.alarms if "alarms" in options.model_fields_set else ():
+        if name not in estimated:
+            where = f"{e.file}: [estimate.options] alarms '{name}'"
+            raise BadInput(f"{where} is not estimated; {did_you_mean(name, estimated)}")
+
+
+def noise_of(record: Record) -> Array:
+    """Deviation of each output's noise (m,): as declared, else what third differences of it leave."""
+    found = record.noise_std.copy()
+    for j in np.flatnonzero(np.isnan(found)):
+        seen = record.runs[0].y[:, j]
+        seen = seen[np.isfinite(seen)]
+        rough = np.convolve(seen, DIFFERENCE, "valid")
+        measured = 1.4826 * float(np.median(np.abs(rough))) / float(np.linalg.norm(DIFFERENCE))
+        found[j] = max(measured, 1e-9 * float(np.std(seen)), 1e-300)
+    return found
+
+
+def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: Record) -> tuple[str, ...]:
+    """The states that the measured outputs depend on, by plain restarts."""
+    d = archive.description
+    states = d.states
+    if not states:
+        return ()
+    scale = np.array([usual(d.variables[n], values.get(n)) for n in states])
+    put = [*states, *record.inputs]
+    first = [values.get(n, d.variables[n].start or 0.0) for n in states]
+    constants = {n: v for n, v in values.items() if n not in put}
+    get = [*states, *(n for n in record.outputs if n not in states)]
+    with Copies(archive, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
+        row = np.array([*first, *s.u[0].tolist()])
+        dt = float(np.median(np.diff(s.t)))
+        return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), dt))
+
+
+def _fine_enough(
+    archive: Archive, values: Mapping[str, float], record: Record, states: tuple[str, ...], noise: Array,
+    every: int, parts: int | None,
+) -> tuple[Samples, Array]:  # fmt: skip
+    """Samples with inputs in as many parts as the outputs' noise can tell apart, and their free run.
+
+    A step with a held input ends in another slip than one with a running input where physics is stiff.
+    """
+    run = record.runs[0]
+    found = samples(run.t, run.u, run.y, every, parts or 1)
+    free = _free_run(archive, values, found, record, states)
+    while parts is None and found.held.shape[1] < MOST_PARTS:
+        finer = samples(run.t, run.u, run.y, every, 2 * found.held.shape[1])
+        other = _free_run(archive, values, finer, record, states)
+        off = np.sqrt(np.mean((other - free)[:, : len(noise)] ** 2, axis=0))
+        if not np.any(off > TOLD_APART * noise):
+            break
+        found, free = finer, other
+    return found, free
+
+
+def _free_run(
+    archive: Archive, values: Mapping[str, float], s: Samples, record: Record, states: tuple[str, ...]
+) -> Array:
+    """Outputs and states (N, m + n) of a run with what is believed at the start; nan where the FMU fails."""
+    names, parts = [*record.outputs, *states], s.held.shape[1]
+    with Fmu(archive) as fmu:
+        try:
+            found = fmu.simulate(*finely(s, record.inputs), names, dict(values))
+        except FmuError:
+            return np.full((len(s.t), len(names)), np.nan)
+    return found[::parts]
+
+
+def finely(s: Samples, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
+    """Times (M,) at which the parts of the steps meet, and inputs by name at them, (M,) each."""
+    parts = s.held.shape[1]
+    share = np.arange(parts) / parts
+    t = np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * share).ravel(), s.t[-1])
+    return t, {name: np.interp(t, s.t, s.u[:, j]) for j, name in enumerate(names)}

@@ -1,0 +1,107 @@
+"""The unknowns of an experiment with what is believed of them before: parameters, inputs, states."""
+
+from collections.abc import Iterator
+from math import inf, sqrt
+
+import numpy as np
+
+from estimator.filters.bounds import Transform, bounded
+from estimator.filters.system import UnknownParameter, UnknownState
+from estimator.filters.unknown_input import (
+    DAMPING,
+    Shaped,
+    UnknownInput,
+    Wandering,
+)
+from estimator.record import Array, Record
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.description import FmuDescription, FmuVariable
+from scenarios.experiment.declaration import EstimatedParameter, Options
+from scenarios.experiment.experiment import Experiment
+
+FIRST = 10.0  # noise deviations: what is known of the start of a measured state
+ROUGH = 0.1  # of what is usual of a state that is not measured but declared
+
+
+def check_options(e: Experiment, o: Options, d: FmuDescription) -> None:
+    """Names in the options must be among what is estimated, or states of the FMU."""
+    chosen = e.estimate
+    parameters = set(chosen.parameters) if chosen else set()
+    inputs = set(chosen.inputs) if chosen else set()
+    states = set(chosen.states) if chosen and chosen.states else set(d.states)
+    for key, table, known in (
+        ("process_std", o.process_std, states), ("initial_std", o.initial_std, states),
+        ("walk", o.walk, parameters), ("clip", o.clip, parameters),
+        ("damping", o.damping, inputs), ("random_walk", o.random_walk, inputs),
+    ):  # fmt: skip
+        for name in table:
+            if name not in known:
+                where = f"{e.file}: [estimate.options] {key} '{name}'"
+                raise BadInput(f"{where} is not estimated; {did_you_mean(name, known)}")
+
+
+def parameters_of(e: Experiment, o: Options, d: FmuDescription) -> Iterator[UnknownParameter]:
+    """The unknown parameters; BadInput where one has no start or deviation, or starts on its bounds."""
+    for name, wanted in (e.estimate.parameters if e.estimate else {}).items():
+        v = d.variables[name]
+        start = wanted.start if wanted.start is not None else e.parameters.get(name, v.start)
+        where = f"{e.file}: [estimate.parameters] {name}"
+        if start is None:
+            raise BadInput(f"{where}: neither the experiment nor {d.name} gives it a start; add start = ...")
+        transform = _transform(wanted, v, name in o.clip, where)
+        std = wanted.std or _std(wanted, start)
+        if std == 0:
+            raise BadInput(f"{where}: what is known of its start is not declared; add std = ... or bounds")
+        try:
+            transform.z(start)
+        except BadInput as error:
+            raise BadInput(f"{where}: start {error}") from error
+        yield UnknownParameter(name, start, std, transform, o.walk.get(name, 0.0))
+
+
+def _transform(wanted: EstimatedParameter, v: FmuVariable, clip: bool, where: str) -> Transform:
+    low, high = wanted.bounds or (-inf if v.min is None else v.min, inf if v.max is None else v.max)
+    if clip:
+        return Transform("clip", low, high)
+    try:
+        return bounded((low, high))
+    except BadInput as error:
+        raise BadInput(f"{where}: {error}") from error
+
+
+def _std(wanted: EstimatedParameter, start: float) -> float:
+    """A quarter of the bounds, or of the value."""
+    return (wanted.bounds[1] - wanted.bounds[0]) / 4 if wanted.bounds else abs(start) / 4
+
+
+def inputs_of(e: Experiment, o: Options) -> Iterator[UnknownInput]:
+    """The unknown inputs."""
+    for name, w in (e.estimate.inputs if e.estimate else {}).items():
+        if name in o.random_walk:
+            yield Wandering(name, w.std * sqrt(w.frequency), w.std)
+        else:
+            yield Shaped(name, w.std, w.frequency, w.rate_input, o.damping.get(name, DAMPING))
+
+
+def states_of(
+    e: Experiment, o: Options, d: FmuDescription, record: Record, noise: Array, names: tuple[str, ...]
+) -> Iterator[UnknownState]:
+    """Where states start: as declared, else as first measured, else as the FMU does."""
+    y = record.runs[0].y
+    for name in names:
+        v = d.variables[name]
+        size = usual(v, e.initial.get(name))
+        start, std = e.initial.get(name, v.start or 0.0), size * (ROUGH if name in e.initial else 1.0)
+        if name in record.outputs:
+            j = record.outputs.index(name)
+            seen = y[np.isfinite(y[:, j]), j]
+            std = FIRST * float(noise[j])
+            if len(seen):
+                start = e.initial.get(name, float(seen[0]))
+                std = max(std, abs(start - float(seen[0])))
+        yield UnknownState(name, start, o.initial_std.get(name, std))
+
+
+def usual(v: FmuVariable, declared: float | None) -> float:
+    """What is usual of a variable, in its unit."""
+    return v.nominal or abs(declared or 0.0) or abs(v.start or 0.0) or 1.0

@@ -1,0 +1,134 @@
+"""An experiment: measured data and what is declared about it, read from its experiment.toml.
+
+`load_experiment` turns a file into an Experiment, `check_names` holds it against the FMU. All that is
+wrong with a file is a BadInput of one line.
+"""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.description import FmuDescription, FmuVariable
+from scenarios.experiment.declaration import Declaration
+from scenarios.experiment.validation import and_more, read_file
+
+
+class Experiment(Declaration):
+    """A declaration with its place: the file it was read from and the folder its data are read from."""
+
+    file: Path
+    data_dir: Path
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the experiment file."""
+        return self.file.parent
+
+    @property
+    def fmu_path(self) -> Path | None:
+        """The foreign FMU, relative to the experiment file."""
+        return self.folder / self.fmu if self.fmu else None
+
+    @property
+    def data_files(self) -> tuple[Path, ...]:
+        """One file, or one for each part of the split: to identify, to choose if it is given, to test."""
+        if self.split and self.split.files:
+            return tuple(self.data_dir / file for file in self.split.files.values())
+        return (self.data_dir / (self.data or ""),)
+
+
+def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
+    """The experiment in a file; data are read from `data_dir`, by default the file's own folder.
+
+    Raises BadInput, one line that names the file, the key and the way out.
+    """
+    file = Path(path)
+    declared = read_file(Declaration, file, "an experiment.toml")
+    if declared.model is not None:
+        _check_model(file, declared.model)
+    place: dict[str, Any] = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
+    return Experiment.model_construct(**dict(declared), **place)
+
+
+def _check_model(file: Path, name: str) -> None:
+    from fmus.models import model_class  # here because it loads CasADi, which a foreign FMU does without
+
+    try:
+        model_class(name)
+    except BadInput as error:
+        raise BadInput(f"{file}: key 'model': {error}") from error
+
+
+def check_names(experiment: Experiment, description: FmuDescription) -> None:
+    """Hold the names and values of an experiment against the FMU's own; BadInput for the first that fails."""
+    names, values = [*_wrong_names(experiment, description)], [*_wrong_values(experiment, description)]
+    problems = names + values
+    if problems:
+        raise BadInput(f"{experiment.file}: {problems[0]}{and_more(len(problems))}")
+
+
+def _wrong_names(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
+    """Names that are not in the FMU or play another part there."""
+    for where, names, known, part in _parts(e, fmu):
+        for name in names:
+            if name in fmu.variables and name not in known:
+                causality = fmu.variables[name].causality
+                yield f"{where} '{name}' of {fmu.name} is not {part} (it is of causality {causality})"
+            elif name not in known:
+                yield f"{where} '{name}' is not {part} of {fmu.name}; {did_you_mean(name, known)}"
+
+
+Part = tuple[str, Iterable[str], list[str], str]
+
+
+def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
+    """Where names stand, these names, those valid there, and the part these play in the FMU."""
+    states = [v.name for v in fmu.variables.values() if _start_can_be_set(v)]
+    yield "[parameters]", e.parameters, fmu.parameters, "a parameter"
+    yield "[calibrate]", e.calibrate, fmu.parameters, "a parameter"
+    yield "[initial]", e.initial, states, "a state whose start can be set"
+    yield "[inputs]", e.inputs, fmu.inputs, "an input"
+    yield "[outputs]", e.outputs, fmu.outputs, "an output"
+    for port in e.ports:
+        yield f"[[ports]] '{port.name}' force", [port.force], fmu.inputs, "an input"
+        yield f"[[ports]] '{port.name}'", [port.velocity, port.displacement], fmu.outputs, "an output"
+    if e.estimate:
+        yield "[estimate] states", e.estimate.states, states, "a state whose start can be set"
+        yield "[estimate.parameters]", e.estimate.parameters, fmu.parameters, "a parameter"
+        yield "[estimate.inputs]", e.estimate.inputs, fmu.inputs, "an input"
+        rates = [i.rate_input for i in e.estimate.inputs.values() if i.rate_input]
+        yield "[estimate.inputs] rate_input", rates, fmu.inputs, "an input"
+
+
+def _start_can_be_set(v: FmuVariable) -> bool:
+    return v.causality in ("output", "local") and v.initial in ("exact", "approx", None)
+
+
+def _wrong_values(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
+    """Declared numbers and bounds outside the FMU's limits, and declared numbers outside their bounds."""
+    constants = {name: c for name, c in e.inputs.items() if not isinstance(c, str)}
+    for where, table in (("parameters", e.parameters), ("initial", e.initial), ("inputs", constants)):
+        for name, value in table.items():
+            yield from _outside(f"[{where}] {name} = {value:g}", (value, value), fmu.variables.get(name))
+    for name, (low, high) in e.calibrate.items():
+        variable = fmu.variables.get(name)
+        where = f"[calibrate] {name} = [{low:g}, {high:g}]"
+        yield from _outside(where, (low, high), variable)
+        declared = e.parameters.get(name, variable.start if variable else None)
+        if declared is not None and not low <= declared <= high:
+            yield f"{where} leaves out the declared value {declared:g}; widen the bounds or correct the value"
+    for name, unknown in (e.estimate.parameters if e.estimate else {}).items():
+        if unknown.bounds:
+            where = "[estimate.parameters] {} bounds = [{:g}, {:g}]".format(name, *unknown.bounds)
+            yield from _outside(where, unknown.bounds, fmu.variables.get(name))
+
+
+def _outside(where: str, interval: tuple[float, float], variable: FmuVariable | None) -> Iterator[str]:
+    """The sentence about an interval that exceeds the limits of its variable, if it does."""
+    if variable is None:
+        return
+    low = float("-inf") if variable.min is None else variable.min
+    high = float("inf") if variable.max is None else variable.max
+    if interval[0] < low or interval[1] > high:
+        yield f"{where} is outside the FMU's limits {low:g} to {high:g}; keep it within them"

@@ -1,0 +1,66 @@
+"""MDF files of measuring and bus-logging systems, version 4 and before: groups of channels over a master."""
+
+from collections.abc import Collection, Iterator
+from functools import partial
+from hashlib import blake2b
+from pathlib import Path
+from traceback import walk_tb
+from typing import Any, BinaryIO, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.experiment.readers.channels import Channel, sheet_of
+from scenarios.experiment.readers.reader import Reader, library
+from scenarios.experiment.readers.sheet import Sheet
+
+
+class Mdf(Reader):
+    """Channels share their rows where their masters are equal, in one group or in several."""
+
+    kind: ClassVar[str] = "MDF"
+    suffixes: ClassVar[tuple[str, ...]] = (".mf4", ".mdf")
+
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+        """Masters are read to be compared, of the other channels only those wanted."""
+        asammdf = library("asammdf", "asammdf", file)
+        with file.open("rb") as stream, _opened(asammdf, stream) as source:
+            groups = range(len(source.groups))
+            return sheet_of(file, [c for g in groups for c in _channels(source, g)], time, columns)
+
+
+def _opened(asammdf: Any, stream: BinaryIO) -> Any:
+    """The library's object of a file."""
+    try:
+        return asammdf.MDF(stream)
+    except Exception as error:
+        # its object of a broken file fails once more when it is collected, and says so on the screen
+        for frame, _ in walk_tb(error.__traceback__):
+            half: Any = frame.f_locals.get("self")
+            if type(half).__name__ == "MDF4":
+                half.header = half.identification = None
+        raise
+
+
+def _channels(source: Any, g: int) -> Iterator[Channel]:
+    """The channels of group number g, its master among them."""
+    master = source.get_master(g)
+    if not len(master):
+        return
+    raster = blake2b(master.tobytes()).digest()
+    # version 3 has no names of groups, and in version 4 they may be left out
+    group = getattr(source.groups[g].channel_group, "acq_name", None) or f"group {g}"
+    for i, channel in enumerate(source.groups[g].channels):
+        unit = source.get_channel_unit(group=g, index=i) or None
+        load = partial(_values, source, g, i)
+        yield Channel(channel.name, len(master), frozenset({raster}), load, group, unit)
+
+
+def _values(source: Any, g: int, i: int) -> NDArray[Any]:
+    """The samples of channel i in group g (N,), nan where the file calls them invalid."""
+    # unless they are ignored there, the library leaves invalid samples out
+    signal = source.get(group=g, index=i, ignore_invalidation_bits=True)
+    values = np.asarray(signal.samples)
+    if signal.invalidation_bits is None or values.dtype.kind not in "biuf":
+        return values
+    return np.where(signal.invalidation_bits, np.nan, values)

@@ -1,0 +1,34 @@
+"""Parquet files; a column's unit is its metadata `unit`."""
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import ClassVar
+
+from fmus.errors import BadInput
+from scenarios.experiment.readers.reader import Reader, library
+from scenarios.experiment.readers.sheet import Sheet
+
+UNIT_KEYS = (b"unit", b"units")  # of a field's metadata; runs are recorded with the first
+
+
+class Parquet(Reader):
+    """Flat columns; an index that pandas stored is a column like any other."""
+
+    kind: ClassVar[str] = "Parquet"
+    suffixes: ClassVar[tuple[str, ...]] = (".parquet",)
+
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+        """Only the columns wanted are read from the disk."""
+        parquet = library("pyarrow.parquet", "pyarrow", file)
+        with parquet.ParquetFile(file) as source:
+            schema = source.schema_arrow
+            twice = [name for name in schema.names if schema.names.count(name) > 1]
+            if twice:
+                raise BadInput(f"{file}: column '{twice[0]}' occurs twice; rename one")
+            wanted = [name for name in schema.names if columns is None or name in columns]
+            cells = source.read(columns=wanted).to_pandas(ignore_metadata=True)
+        switches = {name: "float64" for name in cells.columns if cells[name].dtype == bool}
+        units = {
+            f.name: f.metadata[key].decode() for f in schema for key in UNIT_KEYS if key in (f.metadata or {})
+        }
+        return Sheet(file, cells.astype(switches), tuple(schema.names), units)

@@ -1,0 +1,57 @@
+"""What reads a format of data files."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import ClassVar
+
+import pandas as pd
+
+from fmus.errors import BadInput
+from scenarios.experiment.readers.sheet import Sheet
+
+
+class Reader(ABC):
+    """A format: `kind` is what its files are called, `suffixes` what their names end in, lower case."""
+
+    kind: ClassVar[str]
+    suffixes: ClassVar[tuple[str, ...]]
+
+    def read(self, file: Path, time: str | None = None, columns: Collection[str] | None = None) -> Sheet:
+        """See scenarios.experiment.readers.read_sheet."""
+        try:
+            with file.open("rb"):
+                pass
+        except OSError as error:
+            reason = f"data file cannot be read ({error.strerror}); correct its path"
+            raise BadInput(f"{file}: {reason}") from error
+        try:
+            return self.sheet(file, time, columns)
+        except (BadInput, Warning):  # warnings are errors where somebody made them so
+            raise
+        except Exception as error:  # a library may trip over a broken file in any way
+            said = " ".join(f"{type(error).__name__}: {error}".split())[:140]
+            raise BadInput(
+                f"{file}: is not a sound {self.kind} file ({said}); record or export it again"
+            ) from error
+
+    def __call__(self, file: Path) -> pd.DataFrame:
+        """All columns of a file whose columns share their rows."""
+        return self.read(file).cells
+
+    @abstractmethod
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+        """Read a file that is there; what its library raises is turned into BadInput by `read`."""
+
+
+def library(module: str, package: str, file: Path) -> ModuleType:
+    """A library that only this format needs, loaded when it is; BadInput where it is not installed."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise BadInput(
+            f"{file}: needs the package '{package}' to be read, which is not installed; "
+            f"run 'pip install {package}', or convert the file to CSV"
+        ) from error

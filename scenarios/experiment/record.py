@@ -1,0 +1,233 @@
+"""Measured data: from the files of an experiment to a checked Record in the FMU's units."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from estimator.record import (
+    Array,
+    BoolArray,
+    Note,
+    Record,
+    Run,
+)
+from fmus.errors import BadInput, did_you_mean
+from fmus.host.description import FmuDescription
+from fmus.units import conversion
+from scenarios.experiment.checks import (
+    check_cells,
+    check_gaps,
+    check_time,
+    output_notes,
+    time_notes,
+)
+from scenarios.experiment.experiment import Experiment, check_names
+from scenarios.experiment.readers import read_sheet
+from scenarios.experiment.readers.units import StatedUnits
+
+CHOOSE = 0.2  # of the samples that identify: on these an answer is chosen, if no others are given
+PIECES = 5  # in which they lie
+GRID = 15  # samples: pieces begin at multiples of it, so that screening may take 3 or 5 samples as one
+MIN_SAMPLES = 50  # in each part; fewer cannot show an error beyond its own scatter
+MIN_MEASURED = 2  # of an output in each file; fewer have no motion
+
+
+def load_record(experiment: Experiment, description: FmuDescription, missing: bool = False) -> Record:
+    """The measured inputs and outputs of an experiment in the FMU's units, checked.
+
+    Without [split] all samples are fitted and none is held out. missing: whether cells of outputs may
+    be empty; they become nan. Raises BadInput where names, units or data forbid the use; what is merely odd
+    stands in the notes.
+    """
+    check_names(experiment, description)
+    scale, notes = _conversions(experiment, description)
+    runs = []
+    for part, file in enumerate(experiment.data_files):
+        run, found = _run(experiment, description, part, file, scale, missing)
+        runs.append(run)
+        notes += found
+    std = [output.noise_std or np.nan for output in experiment.outputs.values()]
+    return Record(
+        runs=tuple(runs),
+        inputs=tuple(experiment.inputs),
+        outputs=tuple(experiment.outputs),
+        noise_std=np.array(std) * np.abs(scale[:, 0]),
+        notes=tuple(notes),
+    )
+
+
+def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]:
+    """Factor and offset of each output's column, (n_y, 2), and what was converted."""
+    scale, notes = [], []
+    for name, output in e.outputs.items():
+        unit = fmu.variables[name].unit
+        factor, offset = 1.0, 0.0
+        if unit is None:
+            said = f"{fmu.name} states no unit for '{name}'; column '{output.column}' is taken as it is"
+            notes.append(Note("unit", output.column, said))
+        else:
+            factor, offset = conversion(output.unit, unit, f"{e.file}: [outputs.{name}]")
+        if (factor, offset) != (1.0, 0.0):
+            said = f"column '{output.column}' is converted from {output.unit} to {unit}"
+            notes.append(Note("unit", output.column, said))
+        scale.append((factor, offset))
+    return np.array(scale), notes
+
+
+def _run(
+    e: Experiment, fmu: FmuDescription, part: int, file: Path, scale: Array, missing: bool
+) -> tuple[Run, list[Note]]:
+    """One file as a run with its notes, from its start to the last sample of the split."""
+    data, stated = _read(e, file)
+    fit, choose, test = _masks(e, part, file, data[e.time])
+    used = slice(int(np.flatnonzero(fit | choose | test)[-1]) + 1)
+    data = {column: values[used] for column, values in data.items()}
+    t = data[e.time]
+    notes = _checked(e, file, data, missing)
+    for name, derived in e.derived.items():
+        data[name] = _derivative(t, data[derived.derivative])
+    u = np.empty((t.size, len(e.inputs)))
+    for j, (name, channel) in enumerate(e.inputs.items()):
+        u[:, j] = _input(e, fmu, name, data[channel], stated) if isinstance(channel, str) else channel
+    outputs = np.column_stack([data[output.column] for output in e.outputs.values()])
+    y = outputs * scale[:, 0] + scale[:, 1]
+    masks = {"fit": fit[used], "choose": choose[used], "test": test[used]}
+    return Run(t=t, u=u, y=y, **masks), [*notes, *stated.notes]
+
+
+def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated: StatedUnits) -> Array:
+    """An input in the FMU's unit (N,): taken as it is, unless the file states another unit."""
+    channel = str(e.inputs[name])
+    if channel in e.derived:
+        return values
+    factor, offset = stated.to(channel, fmu.variables[name].unit, f"{e.file}: [inputs] {name}")
+    return values * factor + offset
+
+
+def _check_units(e: Experiment, stated: StatedUnits) -> None:
+    """The units declared of the outputs against those that the file states."""
+    for name, output in e.outputs.items():
+        column, times = _source(e, output.column)
+        stated.check(column, times, output.unit, f"{e.file}: [outputs.{name}]")
+
+
+def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -> list[Note]:
+    """What is odd about the columns of a file, (N,) each; BadInput for gaps and for numbers that must be."""
+    t = data[e.time]
+    check_gaps(str(file), t)
+    measured = dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values())
+    needed = {_source(e, c)[0] for c in e.inputs.values() if isinstance(c, str)}
+    for column, values in data.items():
+        may_miss = missing and column in measured and column not in needed
+        check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
+        if np.isfinite(values).sum() < MIN_MEASURED:
+            raise BadInput(f"{file}: column '{column}' has no numbers to speak of; leave its output out")
+    notes = list(time_notes(file.name, t))
+    for column in measured:
+        notes += output_notes(file.name, column, data[column][np.isfinite(data[column])])
+    return notes
+
+
+def _derivative(t: Array, x: Array) -> Array:
+    """Time derivative (N,) of a column (N,) by central differences over the numbers it has, nan elsewhere."""
+    there = np.isfinite(x)
+    found = np.full(t.size, np.nan)
+    found[there] = np.gradient(x[there], t[there])
+    return found
+
+
+def _source(e: Experiment, column: str) -> tuple[str, int]:
+    """The column of the file behind one that may be derived, and how many times it is differentiated."""
+    times = 0
+    while column in e.derived:
+        column, times = e.derived[column].derivative, times + 1
+    return column, times
+
+
+def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Which samples are fitted, which choose among the fits, and which test, t: (N,) s -> (N,) each."""
+    every, none = np.ones(t.size, dtype=np.bool_), np.zeros(t.size, dtype=np.bool_)
+    if e.split is None:
+        _check_enough(e, f"file {file}", every)
+        return every, none, none
+    if e.split.files:
+        _check_enough(e, f"file {file}", every)
+        whole = list(e.split.files)[part]
+        masks = {key: every if key == whole else none for key in ("identify", "choose", "test")}
+    else:
+        masks = {"choose": none} | _windows(e, e.split.windows, file, t)
+    if "choose" not in {**e.split.files, **e.split.windows}:
+        masks["choose"] = spread(masks["identify"])
+    return masks["identify"] & ~masks["choose"], masks["choose"], masks["test"]
+
+
+def spread(identify: BoolArray) -> BoolArray:
+    """The samples (N,) of the identify part that choose where none are given: the end of each of its pieces.
+
+    Spread over the record, since what sets in late must be seen both to be fitted and to be chosen, and in
+    few long pieces, so that neighbours in time do not tell one part of the other (hold-out of blocks:
+    J. Racine, Journal of Econometrics 99 (2000), 39-61).
+    """
+    index, found = np.flatnonzero(identify), np.zeros_like(identify)
+    whole = GRID if len(index) > 20 * PIECES * GRID else 1  # else rounding would change the share
+    for piece in range(PIECES):
+        first, last = (
+            round((piece + part) * len(index) / PIECES / whole) * whole for part in (1 - CHOOSE, 1)
+        )
+        found[index[first:last]] = True
+    return found
+
+
+def _windows(
+    e: Experiment, windows: Mapping[str, tuple[float, float]], file: Path, t: Array
+) -> dict[str, BoolArray]:
+    """The samples (N,) in each window of one file; a sample on the edge of two belongs to the first."""
+    step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
+    masks: dict[str, BoolArray] = {}
+    for key, window in windows.items():
+        if window[0] < t[0] - step or window[1] > t[-1] + step:
+            raise BadInput(
+                f"{e.file}: [split] {key} = {list(window)} leaves the record {file.name}, which runs from "
+                f"{t[0]:.9g} to {t[-1]:.9g} s; keep it within"
+            )
+        slack = 1e-6 * step  # for times printed with few digits
+        mask = (t >= window[0] - slack) & (t <= window[1] + slack)
+        masks[key] = mask & ~np.any([*masks.values()], axis=0) if masks else mask
+        _check_enough(e, f"[split] {key} = {list(window)}", masks[key])
+    return masks
+
+
+def _check_enough(e: Experiment, where: str, mask: BoolArray) -> None:
+    if mask.sum() < MIN_SAMPLES:
+        raise BadInput(f"{e.file}: {where} holds {mask.sum()} samples; at least {MIN_SAMPLES} are needed")
+
+
+def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
+    """The columns an experiment uses, (N,) each, the time in seconds and checked, and the units stated."""
+    wanted = _wanted(e)
+    sheet = read_sheet(file, e.time, wanted)
+    for name in e.derived:
+        if name in sheet.known:
+            raise BadInput(f"{e.file}: [derived.{name}] has the name of a column of {file}; take another one")
+    for column, where in wanted.items():
+        if column in sheet.apart:
+            raise BadInput(f"{e.file}: {where}: column '{column}' of {file} {sheet.apart[column]}")
+        if column not in sheet.cells:
+            known = did_you_mean(column, [*sheet.known, *e.derived])
+            raise BadInput(f"{e.file}: {where}: column '{column}' is not in {file}; {known}")
+    stated = StatedUnits(sheet)
+    _check_units(e, stated)
+    columns = {column: sheet.numbers(column) for column in wanted if column != e.time}
+    t = stated.seconds(e.time, f"{e.file}: key 'time'")
+    check_time(str(file), e.time, t, np.arange(t.size) + sheet.first, sheet.row)
+    return {e.time: t, **columns}, stated
+
+
+def _wanted(e: Experiment) -> dict[str, str]:
+    """The columns that must be in a file, and where the experiment names them."""
+    named = {e.time: "key 'time'"}
+    named |= {c: f"[inputs] {name}" for name, c in e.inputs.items() if isinstance(c, str)}
+    named |= {output.column: f"[outputs.{name}]" for name, output in e.outputs.items()}
+    named |= {derived.derivative: f"[derived.{name}]" for name, derived in e.derived.items()}
+    return {column: where for column, where in named.items() if column not in e.derived}

@@ -1,0 +1,76 @@
+"""A filter led through a record, and how far off it was."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+
+from estimator.filters.estimator import Diverged, Filter
+from estimator.record import Array
+
+
+class Named(Protocol):
+    """A system whose coordinates have names, and values in units of their own."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates."""
+
+    def values(self, x: Array, std: Array) -> tuple[Array, Array]:
+        """What x (N, n) and its deviations (N, n) mean, (N, n) each."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Estimates through a record, in the FMU's units; nan from where the filter gave up, and why it did."""
+
+    t: Array  # (N,), s
+    value: Mapping[str, Array]  # (N,)
+    std: Mapping[str, Array]  # (N,)
+    log_likelihood: float  # of all innovations; -inf where it gave up
+    nis: float  # mean over the samples
+    seconds: float  # it took
+    reason: str = ""
+
+    @property
+    def times_real(self) -> float:
+        """How many times faster than the record's time."""
+        return float((self.t[-1] - self.t[0]) / self.seconds)
+
+
+def follow(filter: Filter, joint: Named, t: Array, u: Array, y: Array) -> Followed:
+    """Lead a filter on that system through inputs u (N, k) and outputs y (N, m) at times t (N,)."""
+    x, spread = np.full((2, len(t), len(joint.names)), np.nan)
+    likelihood, nis, reason = 0.0, 0.0, ""
+    begun = perf_counter()
+    for k, (told, seen) in enumerate(zip(u, y, strict=True)):
+        try:
+            belief = filter.step(told, seen)
+        except Diverged as error:
+            likelihood, reason = -np.inf, str(error)
+            break
+        x[k], spread[k] = belief.x, np.sqrt(np.diag(belief.P))
+        likelihood += belief.log_likelihood
+        nis += belief.nis
+    took = perf_counter() - begun
+    return Followed(t, *named(joint, x, spread), likelihood, nis / len(t), took, reason)
+
+
+def named(joint: Named, x: Array, std: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Coordinates (N, n) and their deviations (N, n) by name, in the FMU's units."""
+    value, spread = (dict(zip(joint.names, c.T, strict=True)) for c in joint.values(x, std))
+    return value, spread
+
+
+def rmse(found: Array, true: Array) -> float:
+    """Root of the mean squared error; inf where an estimate is missing."""
+    error = float(np.sqrt(np.mean(np.square(found - true))))
+    return error if np.isfinite(error) else np.inf
+
+
+def first_below(t: Array, x: Array, limit: float, since: float) -> float:
+    """Time [s] from `since` to the first sample below a limit; inf where none is."""
+    hit = (t >= since) & (x < limit)
+    return float(t[int(np.argmax(hit))] - since) if hit.any() else np.inf

@@ -1,0 +1,209 @@
+"""Wheel and rail profile by grey-box recursive least squares in bins of the shift (Ward et al. 2010)."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.filters.estimator import Estimate
+from estimator.filters.rls import Rls
+from estimator.record import Array
+from fmus.contact import contact_table
+from scenarios.drawing.sheet import (
+    AFTER,
+    CLOUD,
+    INK,
+    Plot,
+    legend,
+    name_axes,
+    sheet,
+)
+from scenarios.literature.case import Case, Record
+from scenarios.literature.outcome import Finding, Outcome
+from scenarios.literature.row import Measured, Row, Tell
+
+F11, F22, F23, F33 = 7.44e6, 6.79e6, 13.7e3, 0.0  # N, N, N.m, N.m2; this and what follows: its Table A.1
+F_Y, K_Y, K_PSI = 50e3, 0.23e6, 2.5e6  # N.s/m, N/m, N.m
+M_W, M_M, I_W, I_WY = 1250.0, 8000.0, 700.0, 200.0  # kg, kg, kg.m2, kg.m2
+HALF, W, R0, V = 0.7452, 12263.0, 0.45, 20.0  # m, N, m, m/s
+DEVIATION = 2e-3  # m, of alignment and of gauge, its section 5
+BIN = 0.25e-3  # m of shift
+ENOUGH = 100  # samples in a bin before it counts
+FLANGE = 5.5e-3  # m of shift, beyond which the flange comes into it
+COMBINATIONS = ("r_L + r_R", "r_L - r_R", "delta_L + delta_R", "delta_L - delta_R")
+SLOPES = ("r_L - r_R, slope", "delta_L - delta_R, slope")  # within a bin, where both change fastest
+KNOWN_TO = np.array([5e-3, 5e-3, 0.5, 0.5, 1.0, 100.0])  # m, m, rad, rad, 1, rad/m: what is believed before
+NOISE = {  # ideal sensors, as the source has them; the accelerometers' noise is ours
+    **dict.fromkeys(("y", "psi", "phi", "y_dot", "psi_dot", "phi_dot", "y_m", "y_m_dot"), 0.0),
+    "y_ddot": 1e-3, "psi_ddot": 1e-3,
+}  # fmt: skip
+DT = 2e-3  # s
+SLACK = 0.02  # of a range, by which a bin may be off the region
+
+ALONE = Case(
+    "alignment", "wheelset", 120.0, DT, V, ("y_irr", "y_irr_dot", "gauge_irr"), NOISE,
+    {"alignment_sd": DEVIATION, "gauge_sd": 0.0},
+)  # fmt: skip
+CASES = (ALONE, replace(ALONE, name="gauge too", true={"alignment_sd": DEVIATION, "gauge_sd": DEVIATION}))
+
+
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Curves:
+    """The four combinations (n, 4) at shifts (n,), m, their standard errors, and samples in each bin (n,)."""
+
+    shift: Array
+    value: Array
+    std: Array
+    samples: Array
+
+
+def geometry() -> Curves:
+    """The true ones, by the contact table, which is not what made the records."""
+    table = contact_table(r0=R0)
+    shift = table.index.to_numpy(dtype=np.float64)
+    left, right = table["r_left"].to_numpy(), table["r_right"].to_numpy()
+    on_left, on_right = table["delta_left"].to_numpy(), table["delta_right"].to_numpy()
+    value = np.column_stack([left + right, left - right, on_left + on_right, on_left - on_right])
+    return Curves(shift, value, np.zeros_like(value), np.zeros(len(shift)))
+
+
+def regression(record: Record) -> tuple[Array, Array]:
+    """Regressors (N, 2, 6) of combinations and slopes, and what they must explain in both equations (N, 2).
+
+    Its eq. 1 and 2, linear in the combinations; r_L + r_R stands for what it has beyond 2 r0.
+    """
+    c = record.columns
+    zero = np.zeros_like(record.t)
+    slip = 2 * (c["y_dot"] + R0 * c["phi_dot"] - V * c["psi"]) / V
+    lateral = M_W * c["y_ddot"] + F22 * slip + 2 * F23 * c["psi_dot"] / V + W * c["phi"]
+    lateral += K_Y * (c["y"] - c["y_m"]) + F_Y * (c["y_dot"] - c["y_m_dot"])
+    yaw = I_W * c["psi_ddot"] + I_WY * V / R0 * c["phi_dot"] - F23 * slip
+    yaw += 2 * (HALF**2 * F11 + F33) * c["psi_dot"] / V + K_PSI * c["psi"]
+    sum_lateral = F11 * c["psi"] / R0 - F22 * c["phi_dot"] / V
+    one = np.ones_like(zero)
+    inside = _shift(record) - BIN * _place(record)
+    first = [sum_lateral, zero, zero, (F23 / R0 - W / 2) * one, zero, (F23 / R0 - W / 2) * inside]
+    second = [
+        F23 * c["phi_dot"] / V,
+        -HALF * F11 / R0 * one,
+        HALF * W / 2 * c["psi"],
+        F33 / R0 * one,
+        -HALF * F11 / R0 * inside,
+        F33 / R0 * inside,
+    ]
+    X = np.stack([np.column_stack(first), np.column_stack(second)], axis=1)
+    return X, np.column_stack([lateral, yaw])
+
+
+def _shift(record: Record) -> Array:
+    """Of the wheelset over the track, (N,), m."""
+    shift: Array = record.columns["y"] - record.columns["y_irr"]
+    return shift
+
+
+def _place(record: Record) -> IntArray:
+    """Number of the bin (N,)."""
+    return np.round(_shift(record) / BIN).astype(np.int64)
+
+
+def identified(record: Record) -> Curves:
+    """Recursive least squares in each bin of the shift, sample by sample."""
+    X, rest = regression(record)
+    place = _place(record)
+    noise = np.diag(np.square([M_W * NOISE["y_ddot"], I_W * NOISE["psi_ddot"]]))
+    start = Estimate(0.0, np.zeros(6), np.diag(KNOWN_TO**2))
+    bins: dict[int, Rls] = {}
+    for i, at in enumerate(place.tolist()):
+        if at not in bins:
+            bins[at] = Rls((*COMBINATIONS, *SLOPES), start, noise)
+        bins[at].step(X[i], rest[i])
+    counts = {at: int(np.sum(place == at)) for at in bins}
+    order = [at for at in sorted(bins) if counts[at] >= ENOUGH]
+    offset = np.array([2 * R0, 0.0, 0.0, 0.0])
+    middle = BIN * np.array(order)
+    value = np.array([bins[at].now.x[:4] + offset for at in order])
+    std = np.array([np.sqrt(np.diag(bins[at].now.P)[:4]) for at in order])
+    return Curves(middle, value, std, np.array([counts[at] for at in order], dtype=np.float64))
+
+
+def region(true: Curves, gauge: float) -> tuple[Array, Array]:
+    """Least and greatest combinations (n, 4) for gauge errors up to `gauge` [m] to either side.
+
+    The left wheel is at its shift less half of the error, the right one mirrored.
+    """
+    r, delta = (true.value[:, i] + true.value[:, i + 1] for i in (0, 2))
+    r, delta = r / 2, delta / 2
+    every = []
+    for g in np.linspace(-gauge, gauge, 41):
+        left, right = true.shift - g / 2, -true.shift - g / 2
+        a, b = (np.interp(x, true.shift, r) for x in (left, right))
+        d, e = (np.interp(x, true.shift, delta) for x in (left, right))
+        every.append(np.column_stack([a + b, a - b, d + e, d - e]))
+    return np.min(every, axis=0), np.max(every, axis=0)
+
+
+def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
+    """See Row; no FMU is needed, the equations are the source's."""
+    true = geometry()
+    findings: list[Finding] = []
+    plots: list[Plot] = []
+    for case, record in measured:
+        tell(f"{case.name}: least squares in bins")
+        found = identified(record)
+        gauge = float(np.abs(record.columns["gauge_irr"]).max())
+        low, high = region(true, gauge)
+        findings += [f for i in range(4) for f in _judged(case, true, found, low, high, i)]
+        plots.append(_figure(case, true, found, low, high))
+    return Outcome(ROW.name, findings, plots, NOTES)
+
+
+def _judged(case: Case, true: Curves, found: Curves, low: Array, high: Array, i: int) -> list[Finding]:
+    """Of one combination: how far off nominal gauge, and how many bins lie in the region."""
+    used = np.abs(found.shift) <= FLANGE
+    span = float(np.ptp(true.value[np.abs(true.shift) <= FLANGE, i]))
+    at, seen = found.shift[used], found.value[used, i]
+    wanted, lower, upper = (np.interp(at, true.shift, x[:, i]) for x in (true.value, low, high))
+    error = float(np.sqrt(np.mean((seen - wanted) ** 2))) / span
+    slack = SLACK * span
+    inside = float(np.mean((seen >= lower - slack) & (seen <= upper + slack)))
+    return [
+        Finding(case.name, f"{COMBINATIONS[i]}: RMSE over its range", "1", error),
+        Finding(case.name, f"{COMBINATIONS[i]}: share of bins in the region", "1", inside),
+    ]
+
+
+def _figure(case: Case, true: Curves, found: Curves, low: Array, high: Array) -> Plot:
+    layout = [["0", "1"], ["2", "3"]]
+    figure, axes = sheet(4.6, layout)
+    part = np.abs(true.shift) <= FLANGE
+    seen = np.abs(found.shift) <= FLANGE
+    for i, name in enumerate(COMBINATIONS):
+        ax = axes[f"{i}"]
+        scale, unit = (1e3, "mm") if i < 2 else (1.0, "rad")
+        x, ends = 1e3 * true.shift[part], (scale * low[part, i], scale * high[part, i])
+        ax.fill_between(x, *ends, color=CLOUD, alpha=0.5, label="region of the gauge")
+        ax.plot(x, scale * true.value[part, i], color=INK, linewidth=1.0, label="nominal gauge")
+        dots = scale * found.value[seen, i]
+        ax.plot(1e3 * found.shift[seen], dots, ".", color=AFTER, markersize=4, label="found in a bin")
+        name_axes(ax, "y - d [mm]", f"{name} [{unit}]".replace("delta", "δ"))
+    legend(figure, axes["0"])
+    return Plot(f"profile_{case.name.replace(' ', '_')}", figure, "Contact geometry over the shift.")
+
+
+NOTES = (
+    "Profiles are S1002 on 60E1 1:40; the source has a worn P8 on a 113A rail, which are not public.",
+    "Alignment is known, as in the source; gauge is not, and what it does makes the region.",
+)
+
+ROW = Row(
+    "profile_rls",
+    "Wheel and rail profile by recursive least squares in bins",
+    "Ward et al. 2010, Fig. 6 and 7",
+    "wheelset",
+    CASES,
+    rebuilt,
+)

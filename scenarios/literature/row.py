@@ -1,0 +1,26 @@
+"""The contract of a row: what it asks to be measured, and what it makes of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenarios.literature.case import Case, Record
+from scenarios.literature.outcome import Outcome
+
+Tell = Callable[[str], None]
+Measured = Sequence[tuple[Case, Record]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One estimate of the literature, rebuilt. model: of the FMU that its filters use.
+
+    rebuilt(cases with their records, FMU, tell) makes the outcome; tell gets a line of progress.
+    """
+
+    name: str
+    title: str
+    source: str
+    model: str
+    cases: tuple[Case, ...]
+    rebuilt: Callable[[Measured, Path, Tell], Outcome]

@@ -1,0 +1,116 @@
+"""Records made by the FMU itself: for trying a row, not for judging it, since nothing in them is unknown."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from estimator.record import Array
+from fmus.errors import BadInput
+from fmus.host.archive import Archive
+from fmus.host.fmu import Fmu
+from scenarios.literature.case import (
+    TIME,
+    TRUE,
+    Case,
+    Record,
+    Source,
+)
+from scenarios.track.spectra import SPECTRA, Spectrum
+from scenarios.track.statistics import CHOCEN_DOBRIKOV
+
+BAND = (2 * np.pi / 60.0, 2 * np.pi / 3.0)  # rad/m, wavelengths of 3 to 60 m
+RUN_IN = 40.0  # m, over which irregularities grow from nothing
+LINES = 160
+AXLES = 19.0  # m between the bogie centres
+TORQUE = 852.0  # N.m, thesis 4.5
+REST = 5.0  # s without torque at the beginning and the end, there
+
+
+def twin(fmu: Path) -> Source:
+    """Makes a case's record by a free run of the FMU, with noise."""
+
+    def make(case: Case) -> Record:
+        _check(case, fmu)
+        rng, t = np.random.default_rng(case.seed), case.times
+        inputs = INPUTS[case.model](case, t, rng)
+        edges = [0, *(round(when / case.dt) for when, _ in case.jumps), len(t) - 1]
+        start = {**({"V": case.speed} if case.model == "wheelset" else {}), **case.true}
+        found = []
+        with Fmu(fmu) as plant:
+            states = list(plant.description.states)
+            wanted = [*case.noise, *case.judged, *states]
+            for i, (first, last) in enumerate(pairwise(edges)):
+                start = {**start, **(case.jumps[i - 1][1] if i else {})}
+                part = slice(first, last + 1)
+                y = plant.simulate(t[part], {n: u[part] for n, u in inputs.items()}, wanted, start)
+                found.append(y[min(i, 1) :])
+                start |= dict(zip(states, y[-1, -len(states) :].tolist(), strict=True))
+        y = np.vstack(found)
+        seen = {n: y[:, i] + rng.normal(0.0, std, len(t)) for i, (n, std) in enumerate(case.noise.items())}
+        at = len(case.noise)
+        true = {n + TRUE: y[:, at + i] for i, n in enumerate(case.judged)}
+        return Record({TIME: t, **inputs, **seen, **true})
+
+    return make
+
+
+def _check(case: Case, fmu: Path) -> None:
+    """BadInput where the FMU is not what a case was measured on."""
+    with Archive(fmu) as archive:
+        known = archive.description.variables
+    for name in (*case.inputs, *case.noise, *case.judged, *case.true):
+        if name not in known:
+            raise BadInput(f"case '{case.name}': the FMU has no '{name}' to make a record with; give records")
+
+
+def _waves(spectrum: Spectrum, s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Height and slope at distances s (N,) m: waves of a spectrum with random phases, from rest at s = 0."""
+    edges = np.geomspace(*BAND, LINES + 1)
+    size = np.sqrt(2 * spectrum.variance(edges[:-1], edges[1:]))
+    wave = (edges[1:] + edges[:-1]) / 2
+    phase = rng.uniform(0, 2 * np.pi, LINES)
+    z, slope = np.zeros_like(s), np.zeros_like(s)
+    for a, w, p in zip(size, wave, phase, strict=True):
+        z += a * np.cos(w * s + p)
+        slope -= a * w * np.sin(w * s + p)
+    part = np.clip(s / RUN_IN, 0.0, 1.0)
+    grown, growing = part**3 * (10 - 15 * part + 6 * part**2), 30 * part**2 * (1 - part) ** 2 / RUN_IN
+    return grown * z, grown * slope + growing * z
+
+
+def _alignment(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    z, slope = _waves(SPECTRA["erri_low"]["alignment"], case.speed * t, rng)
+    scale = CHOCEN_DOBRIKOV["alignment"].sd / z.std()
+    return {"y_irr": scale * z, "y_irr_dot": scale * case.speed * slope}
+
+
+def _rails(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    s = case.speed * t
+    both = np.concatenate([s, s - AXLES])
+    level, tilt = (_waves(SPECTRA["erri_high"][q], both, rng) for q in ("level", "cross_level"))
+    found = {}
+    for side, sign in (("l", 0.5), ("r", -0.5)):
+        z, slope = (a + sign * b for a, b in zip(level, tilt, strict=True))
+        for bogie, part in (("f", slice(None, len(s))), ("r", slice(len(s), None))):
+            found[f"u_{bogie}{side}"] = z[part]
+            found[f"u_{bogie}{side}_dot"] = case.speed * slope[part]
+    return {name: found[name] for name in case.inputs}
+
+
+def _torque(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    quarter = (t[-1] - 2 * REST) / 4
+    knots, values = [0.0], [0.0]
+    for i, share in enumerate((0.5, -0.5, 1.0, 0.7)):
+        begin = REST + i * quarter
+        knots += [begin, begin + 1.0, begin + quarter - 1.5, begin + quarter - 0.5]
+        values += [0.0, share * TORQUE, share * TORQUE, 0.0]
+    return {"T_P": np.interp(t, knots, values), "f_sync": np.full_like(t, case.speed)}
+
+
+INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
+    "wheelset": _alignment,
+    "vehicle7dof": _rails,
+    "testrig": _torque,
+}

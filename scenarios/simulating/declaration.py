@@ -1,0 +1,185 @@
+"""What a scenario file may say: one class a table, one field a key."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from scenarios.experiment.declaration import (
+    Interval,
+    Number,
+    Positive,
+    Table,
+)
+from scenarios.simulating.friction import Condition
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+Whole = Annotated[int, Field(strict=True, ge=0)]
+
+
+class Member(Table):
+    """An FMU: our model built on the fly, a PythonFMU source built on the fly, or a file.
+
+    contact: profiles of a wheelset, by the fields of fmus.wheelset.curves.Track; friction: a row of the
+    thesis's Table 4.1, on which `parameters` have the last word; step: s, where not the common one.
+    """
+
+    model: str | None = None
+    source: str | None = None
+    fmu: str | None = None
+    effects: tuple[str, ...] = ()
+    contact: dict[str, str | Number] = Field(default_factory=dict)
+    kind: Literal["python", "native"] = "python"
+    friction: Condition | None = None
+    parameters: dict[str, Number] = Field(default_factory=dict)
+    initial: dict[str, Number] = Field(default_factory=dict)
+    step: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Self:
+        if [self.model, self.source, self.fmu].count(None) != 2:
+            raise ValueError("needs exactly one of the keys 'model', 'source' and 'fmu'")
+        if self.model is None and (self.effects or self.contact or self.kind != "python"):
+            raise ValueError("has 'effects', 'contact' or 'kind', which go with 'model' only")
+        return self
+
+
+class Wire(Table):
+    """A connection; see fmus.host.master.connections.Connection."""
+
+    source: str = Field(alias="from")
+    target: str = Field(alias="to")
+    gain: Number = 1.0
+    offset: Number = 0.0
+    gain_unit: str = "1"
+    delayed: bool = False
+
+
+class Ride(Table):
+    """Who runs over the track at what speed [m/s]: FMUs with their geometry, and as which model they feel.
+
+    V: a number, or {times, speeds}.
+    """
+
+    V: Any
+    on: Annotated[dict[Name, dict[str, str | Number]], Field(min_length=1)]
+
+
+class Moment(Table):
+    """Parameters that change at a time [s]; friction: the condition that an FMU's contact gets."""
+
+    time: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+    set: dict[str, Number] = Field(default_factory=dict)
+    friction: dict[Name, Condition] = Field(default_factory=dict)
+
+
+class Recorded(Table):
+    """What is written: names 'fmu.variable' (by default all outputs), how often [s], and how."""
+
+    names: tuple[str, ...] | None = None
+    step: Positive | None = None
+    format: Literal["parquet", "csv"] = "parquet"
+
+
+class Geometry(Table):
+    """A contact table over the wheelset's shift, in place of FMUs; see fmus.contact.contact_table."""
+
+    wheel: str = "S1002"
+    rail: str = "60E1"
+    cant: Number = 1 / 40
+    gauge: Positive = 1.435
+    r0: Positive = 0.46
+    N: Positive = 55e3
+    search: str = "quasi_elastic"
+    patch: str = "hertz"
+    reach: Positive = 0.01
+    points: Annotated[int, Field(strict=True, ge=3)] = 401
+
+
+class Expectation(Table):
+    """What must come true, and why; for some variants or, where it names none, for each."""
+
+    that: str
+    because: str
+    variants: tuple[Name, ...] = ()
+
+
+class Panel(Table):
+    """Curves on common axes: expressions over x, in the units that the axes show."""
+
+    draw: Annotated[tuple[str, ...], Field(min_length=1)]
+    names: tuple[str, ...] = ()
+    label: str
+    unit: str | None = None
+    x: str | None = None
+    x_label: str | None = None
+    x_unit: str | None = None
+    window: Interval | None = None
+    height: Positive = 1.0
+    variants: tuple[Name, ...] = ()
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        if self.names and len(self.names) != len(self.draw):
+            raise ValueError(f"has {len(self.names)} 'names' for {len(self.draw)} curves; give one each")
+        if (self.x is None) != (self.x_label is None):
+            raise ValueError("'x' and 'x_label' go together")
+        return self
+
+
+class Picture(Table):
+    """A figure: panels below one another."""
+
+    name: FileName
+    title: str
+    panels: Annotated[tuple[Panel, ...], Field(min_length=1)]
+
+
+class Declaration(Table):
+    """The keys of a scenario file; `variants` holds keys of the same kind that take the place of these."""
+
+    id: FileName
+    question: str
+    duration: Positive | None = None
+    step: Positive | None = None
+    order: Literal["jacobi", "gauss_seidel"] = "jacobi"
+    extrapolation: Literal["hold", "linear"] = "hold"
+    seed: Whole = 0
+    fmus: dict[Name, Member] = Field(default_factory=dict)
+    connections: tuple[Wire, ...] = ()
+    track: dict[str, Any] | None = None
+    ride: Ride | None = None
+    inputs: dict[str, Any] = Field(default_factory=dict)
+    events: tuple[Moment, ...] = ()
+    sensors: dict[str, Any] = Field(default_factory=dict)
+    record: Recorded = Recorded()
+    contact: Geometry | None = None
+    variants: tuple[dict[str, Any], ...] = ()
+    expect: Annotated[tuple[Expectation, ...], Field(min_length=1)]
+    figure: tuple[Picture, ...] = ()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for problem in _contradictions(self):
+            raise ValueError(problem)
+        return self
+
+
+MOTION = ("fmus", "connections", "track", "ride", "inputs", "events", "sensors", "duration", "step")
+
+
+def _contradictions(d: Declaration) -> Iterator[str]:
+    """What each key for itself does not show."""
+    given = [key for key in MOTION if key in d.model_fields_set]
+    if d.contact and given:
+        yield f"[contact] is a table without motion, and key '{given[0]}' belongs to FMUs; keep one of them"
+    if not d.contact:
+        for key in ("fmus", "duration", "step"):
+            if key not in d.model_fields_set:
+                yield f"key '{key}' is missing"
+    if (d.track is None) != (d.ride is None):
+        yield "[track] and [ride], who runs over it, go together"
+    names = [p.name for p in d.figure]
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        yield f"[[figure]] name '{name}' is used twice"

@@ -1,0 +1,213 @@
+"""Expressions over signals as text, as 'max(abs(wet.wheelset.y)) < 2e-3'; no other code runs."""
+
+import ast
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from fmus.errors import BadInput, did_you_mean
+from scenarios.simulating.functions import EXTREMES, FUNCTIONS, NUMBERS
+from scenarios.simulating.value import (
+    Value,
+    alike,
+    combined,
+    power,
+    product,
+    quotient,
+)
+
+Lookup = Callable[[str], Value]
+CONSTANTS = MappingProxyType({"pi": np.pi, "e": np.e})
+ARITHMETIC: Mapping[type[ast.AST], tuple[Callable[..., Any], Callable[[Value, Value], str | None]]] = (
+    MappingProxyType(
+        {
+            ast.Add: (np.add, lambda a, b: alike([a, b])),
+            ast.Sub: (np.subtract, lambda a, b: alike([a, b])),
+            ast.Mult: (np.multiply, product),
+            ast.Div: (np.divide, quotient),
+            ast.Pow: (np.power, power),
+        }
+    )
+)
+SIGNS: Mapping[type[ast.AST], Callable[[Any], Any]] = MappingProxyType(
+    {ast.USub: operator.neg, ast.UAdd: operator.pos}
+)
+COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = MappingProxyType(
+    {ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge}
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a statement holds, and the numbers on the sides of its comparisons, in order."""
+
+    holds: bool
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula; `names` are the signals in it. Errors begin with `where`."""
+
+    text: str
+    where: str
+    tree: ast.expr
+    names: tuple[str, ...]
+
+    def value(self, lookup: Lookup) -> Value:
+        """Its value with the signals that `lookup` gives by name."""
+        return _value(self.tree, lookup, self.where)
+
+
+@dataclass(frozen=True)
+class Statement(Expression):
+    """A comparison of numbers, or several joined by and, or, not."""
+
+    def verdict(self, lookup: Lookup) -> Verdict:
+        """Whether it holds."""
+        values: list[float] = []
+        return Verdict(_holds(self.tree, lookup, self.where, values), tuple(values))
+
+
+def expression(text: str, where: str) -> Expression:
+    """A formula from text; `where` begins the message of the BadInput."""
+    tree = _parsed(text, where)
+    return Expression(text, where, tree, tuple(dict.fromkeys(_names(tree, where))))
+
+
+def statement(text: str, where: str) -> Statement:
+    """A comparison from text; `where` begins the message of the BadInput."""
+    tree = _parsed(text, where)
+    sides = list(_sides(tree, where))
+    names = [name for side in sides for name in _names(side, where)]
+    for side in sides:
+        if _is_signal(side):
+            raise BadInput(f"{where}: '{ast.unparse(side)}' is a signal; compare its max, rms, last ...")
+    return Statement(text, where, tree, tuple(dict.fromkeys(names)))
+
+
+def _parsed(text: str, where: str) -> ast.expr:
+    try:
+        return ast.parse(" ".join(text.split()), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise BadInput(f"{where}: '{text[:80]}' is no formula, such as 'max(abs(rig.F_x)) < 3e3'") from None
+
+
+def _sides(node: ast.expr, where: str) -> Iterator[ast.expr]:
+    """The formulas that a statement compares."""
+    match node:
+        case ast.BoolOp(values=parts):
+            for part in parts:
+                yield from _sides(part, where)
+        case ast.UnaryOp(op=ast.Not(), operand=part):
+            yield from _sides(part, where)
+        case ast.Compare(left=left, ops=ops, comparators=rest) if all(type(op) in COMPARISONS for op in ops):
+            yield from (left, *rest)
+        case _:
+            raise BadInput(f"{where}: '{ast.unparse(node)}' compares nothing; write it with < <= > >=")
+
+
+def _names(node: ast.expr, where: str) -> Iterator[str]:
+    """Signals in a formula; BadInput for anything that is not a formula's."""
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return
+        case ast.Name(id=name) if name in CONSTANTS:
+            return
+        case ast.Name() | ast.Attribute():
+            yield _dotted(node, where)
+        case ast.UnaryOp(op=op, operand=inner) if type(op) in SIGNS:
+            yield from _names(inner, where)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
+            yield from _names(left, where)
+            yield from _names(right, where)
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+            _check_call(name, len(arguments), where)
+            for argument in arguments:
+                yield from _names(argument, where)
+        case _:
+            raise BadInput(
+                f"{where}: '{ast.unparse(node)}' may not stand in a formula; use numbers, signals, "
+                "functions and + - * / **"
+            )
+
+
+def _dotted(node: ast.expr, where: str) -> str:
+    match node:
+        case ast.Name(id=name):
+            return name
+        case ast.Attribute(value=inner, attr=name):
+            return f"{_dotted(inner, where)}.{name}"
+    raise BadInput(f"{where}: '{ast.unparse(node)}' is no name of a signal, as 'rig.omega_w'")
+
+
+def _check_call(name: str, count: int, where: str) -> None:
+    if name not in FUNCTIONS:
+        raise BadInput(f"{where}: function '{name}' is not known; {did_you_mean(name, FUNCTIONS)}")
+    counts = FUNCTIONS[name][1]
+    if count not in counts:
+        wanted = " or ".join(map(str, counts))
+        raise BadInput(f"{where}: '{name}' takes {wanted} arguments, not {count}; give these")
+
+
+def _is_signal(node: ast.expr) -> bool:
+    """Whether a formula gives a signal, not a number."""
+    match node:
+        case ast.Constant() | ast.Name() | ast.Attribute():
+            return not (isinstance(node, ast.Constant) or getattr(node, "id", "") in CONSTANTS)
+        case ast.UnaryOp(operand=inner):
+            return _is_signal(inner)
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            is_number = name in NUMBERS or (name in EXTREMES and len(arguments) == 1)
+            return not is_number and any(map(_is_signal, arguments))
+        case ast.BinOp(left=left, right=right):
+            return _is_signal(left) or _is_signal(right)
+    return False
+
+
+def _value(node: ast.expr, lookup: Lookup, where: str) -> Value:
+    """The value of a formula that `_names` has gone through."""
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return Value(float(number))
+        case ast.Name(id=name) if name in CONSTANTS:
+            return Value(CONSTANTS[name])
+        case ast.Name() | ast.Attribute():
+            return lookup(_dotted(node, where))
+    try:
+        match node:
+            case ast.UnaryOp(op=op, operand=inner):
+                part = _value(inner, lookup, where)
+                return combined(SIGNS[type(op)], [part], part.unit)
+            case ast.BinOp(left=left, op=op, right=right):
+                a, b = _value(left, lookup, where), _value(right, lookup, where)
+                function, unit = ARITHMETIC[type(op)]
+                return combined(function, [a, b], unit(a, b))
+            case ast.Call(func=ast.Name(id=name), args=arguments):
+                return FUNCTIONS[name][0](*(_value(a, lookup, where) for a in arguments))
+    except ValueError as error:
+        said = str(error)
+        raise BadInput(
+            said if said.startswith(where) else f"{where}: '{ast.unparse(node)}' {said}"
+        ) from error
+    raise BadInput(f"{where}: '{ast.unparse(node)}' may not stand in a formula")
+
+
+def _holds(node: ast.expr, lookup: Lookup, where: str, values: list[float]) -> bool:
+    """Whether a statement holds; all sides of its comparisons are worked out, none is left out."""
+    match node:
+        case ast.BoolOp(op=op, values=parts):
+            found = [_holds(part, lookup, where, values) for part in parts]
+            return all(found) if isinstance(op, ast.And) else any(found)
+        case ast.UnaryOp(op=ast.Not(), operand=part):
+            return not _holds(part, lookup, where, values)
+        case ast.Compare(left=left, ops=ops, comparators=rest):
+            numbers = [_value(side, lookup, where).number() for side in (left, *rest)]
+            values += numbers
+            pairs = zip(numbers[:-1], ops, numbers[1:], strict=True)
+            return all(COMPARISONS[type(op)](a, b) for a, op, b in pairs)
+    raise BadInput(f"{where}: '{ast.unparse(node)}' compares nothing")

@@ -1,0 +1,191 @@
+"""Run scenarios: their variants, what must come true, their figures and recordings."""
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from fmus.errors import BadInput
+from fmus.host.fmu import FmuError
+from scenarios.experiment.validation import of_file
+from scenarios.output import writable
+from scenarios.simulating.asking import (
+    Asked,
+    asked,
+    lookup,
+    wanted,
+)
+from scenarios.simulating.building import Builder
+from scenarios.simulating.case import (
+    Case,
+    Progress,
+    Run,
+    prepared,
+)
+from scenarios.simulating.contact_sheet import write_contact_sheet
+from scenarios.simulating.drawing import write_figure
+from scenarios.simulating.reading import SINGLE, Scenario, load_scenario
+from scenarios.simulating.result import (
+    Finding,
+    Result,
+    RunSummary,
+    finite,
+)
+
+Tell = Callable[[str], None]
+Done = Callable[[Result], None]
+
+
+def run(
+    scenario: str | Path, out: str | Path, tell: Tell = lambda _: None, builder: Builder | None = None
+) -> Result:
+    """What `railfmi run` does with one scenario: result.json, recordings and figures in `out`.
+
+    tell: gets a line on what is being done, with the simulated time and its speed, now and then.
+    builder: of the FMUs, where scenarios share it. Ctrl-C keeps what was recorded; the result says so, and
+    judges nothing. Raises BadInput for a wrong scenario, FmuError where an FMU refuses a call.
+    """
+    begun = perf_counter()
+    read = load_scenario(scenario)
+    folder = writable(Path(out))
+    with ExitStack() as stack:
+        if builder is None:
+            builder = Builder(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_run_"))))
+        with of_file(read.file):
+            questions = asked(read)
+            cases = _all_prepared(read, questions, builder, stack, tell)
+            runs, summaries = _run_all(cases, read, folder, tell)
+            result = _judged(read, questions, runs, summaries, folder, begun)
+            result.write(folder / "result.json")  # now, as a figure may ask for what cannot be drawn
+            if result.interrupted_at is not None:
+                return result
+            tell(f"{read.id}: drawing")
+            pictures = enumerate(read.declared.figure)
+            figures = tuple(write_figure(p, i, questions, runs, folder) for i, p in pictures)
+    result = replace(result, figures=figures, wall_seconds=perf_counter() - begun)
+    result.write(folder / "result.json")
+    return result
+
+
+def run_all(
+    files: Sequence[str | Path], out: str | Path, tell: Tell = lambda _: None, done: Done = lambda _: None
+) -> list[Result]:
+    """Run scenarios one after the other, one alone into `out`, several each into a folder of its id.
+
+    Several get a contact sheet of their figures, `out`/contact-sheet.png. done: gets each result as soon
+    as it is there. All files are read before the first one runs; after Ctrl-C no further one does.
+    """
+    if not files:
+        raise BadInput("no scenario given; name at least one file")
+    read = [load_scenario(file) for file in files]
+    ids = [s.id for s in read]
+    for twice in sorted({i for i in ids if ids.count(i) > 1}):
+        raise BadInput(f"id '{twice}' occurs twice among the scenarios; their folders would be the same")
+    folder = writable(Path(out))
+    results = []
+    with tempfile.TemporaryDirectory(prefix="railfmi_run_") as built:
+        builder = Builder(Path(built))
+        for scenario in read:
+            target = folder if len(read) == 1 else folder / scenario.id
+            results.append(run(scenario.file, target, tell, builder))
+            done(results[-1])
+            if results[-1].interrupted_at is not None:
+                break
+    if len(results) > 1:
+        write_contact_sheet(results, folder / "contact-sheet.png")
+    return results
+
+
+def _called(variant: str, scenario: Scenario) -> str:
+    return "its run" if variant == SINGLE and not scenario.declared.variants else f"variant '{variant}'"
+
+
+def _all_prepared(
+    scenario: Scenario, questions: Asked, builder: Builder, stack: ExitStack, tell: Tell
+) -> dict[str, Case]:
+    """All variants, checked before the first one runs."""
+    cases: dict[str, Case] = {}
+    for name, declared in scenario.variants.items():
+        tell(f"{scenario.id}: preparing {_called(name, scenario)}")
+        formulas = wanted(questions, name, scenario)
+        try:
+            cases[name] = prepared(declared, scenario.file, formulas, builder, stack)
+        except BadInput as error:
+            said = str(error).removeprefix(f"{scenario.file}: ")
+            which = f"variant '{name}': " if scenario.declared.variants else ""
+            raise BadInput(f"{which}{said}") from error
+    return cases
+
+
+def _run_all(
+    cases: Mapping[str, Case], scenario: Scenario, folder: Path, tell: Tell
+) -> tuple[dict[str, Run], dict[str, RunSummary]]:
+    """Run the variants in turn and write their recordings, until all are done or one is broken off."""
+    runs: dict[str, Run] = {}
+    summaries: dict[str, RunSummary] = {}
+    for name, case in cases.items():
+        begun = perf_counter()
+        try:
+            runs[name] = case.run(_progress(case, name, scenario, tell))
+        except FmuError as error:
+            raise FmuError(f"{scenario.file}: {_called(name, scenario)}: {error}") from error
+        took = perf_counter() - begun
+        summaries[name] = _written(runs[name], name, case, scenario, folder, took)
+        if summaries[name].interrupted_at is not None:
+            break
+    return runs, summaries
+
+
+def _progress(case: Case, name: str, scenario: Scenario, tell: Tell) -> Progress:
+    what = f"{scenario.id}: {_called(name, scenario)}"
+
+    def progress(time: float, speed: float) -> None:
+        tell(f"{what}, {time:.2f} of {case.duration:g} s, {speed:.1f} times real time")
+
+    return progress
+
+
+def _written(run: Run, name: str, case: Case, scenario: Scenario, folder: Path, took: float) -> RunSummary:
+    """Write a variant's recording, and what its sensors measured."""
+    ending = scenario.variants[name].record.format
+    target = folder / f"{name}.{ending}"
+    recording, measured = run.recording, None
+    (recording.to_csv if ending == "csv" else recording.to_parquet)(target)
+    if run.measured is not None:
+        measured = f"{name}-measured.{ending}"
+        (run.measured.to_csv if ending == "csv" else run.measured.to_parquet)(folder / measured)
+    stopped = recording.interrupted_at
+    simulated = case.duration if stopped is None else stopped
+    return RunSummary(target.name, measured, simulated, took, stopped)
+
+
+def _judged(
+    scenario: Scenario,
+    questions: Asked,
+    runs: Mapping[str, Run],
+    summaries: Mapping[str, RunSummary],
+    folder: Path,
+    begun: float,
+) -> Result:
+    """The result without figures; a run that was broken off is not judged."""
+    stopped = next((s.interrupted_at for s in summaries.values() if s.interrupted_at is not None), None)
+    findings = tuple(_findings(questions, runs)) if stopped is None else ()
+    d = scenario.declared
+    took = perf_counter() - begun
+    return Result(d.id, d.question, folder, findings, dict(summaries), (), took, stopped)
+
+
+def _findings(questions: Asked, runs: Mapping[str, Run]) -> Iterator[Finding]:
+    """The answer to each expectation; what the signals do not allow to be worked out has not come true."""
+    for expectation, question in questions.expectations:
+        for variant in question.asked():
+            which = variant if len(runs) > 1 else None
+            asked_for = expectation.that, expectation.because, which
+            try:
+                verdict = question.formula.verdict(lookup(runs, variant))
+            except BadInput as error:
+                yield Finding(*asked_for, False, (), str(error))
+            else:
+                yield Finding(*asked_for, verdict.holds, finite(verdict.values))

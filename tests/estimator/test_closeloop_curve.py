@@ -1,0 +1,214 @@
+"""A law that is named is the curve that the force follows, not one that comes near it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.closeloop.checkpoints import Stages
+from estimator.closeloop.decision.law_form import (
+    FASTEST,
+    another,
+    confirmed,
+    curvature,
+    misnamed,
+)
+from estimator.closeloop.decision.verdict import Judgement
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.scores import CURVE
+from estimator.closeloop.progress import Progress
+from estimator.closeloop.search.screened import screened
+from estimator.closeloop.search.search import Search
+from estimator.closeloop.several.transfer import Traced
+from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.carriage import (
+    Force,
+    coulomb,
+    looked_at,
+    problem,
+    record,
+    to_and_fro,
+    viscous,
+)
+
+
+def root(bump: float, rebound: float) -> Force:
+    """A damper with a square-root law, softer one way."""
+    return lambda t, q, v: (bump if v > 0 else rebound) * float(np.sign(v) * np.sqrt(abs(v)))
+
+
+def cubic(size: float) -> Force:
+    return lambda t, q, v: size * q**3
+
+
+def bowl(size: float) -> Force:
+    """A spring that pushes one way alone, more and more."""
+    return lambda t, q, v: size * max(q, 0.0) ** 1.5
+
+
+@pytest.fixture(scope="module")
+def builder(tmp_path_factory: pytest.TempPathFactory) -> ModelBuilder:
+    return ModelBuilder("drive", tmp_path_factory.mktemp("drive"))
+
+
+def asked(builder: ModelBuilder, resistance: Force, kind: str, seed: int) -> Traced:
+    """A record with a resistance, to which one law is fitted."""
+    found = looked_at("one", problem(builder, record(to_and_fro(2.0), resistance, seed)), (kind,))
+    best = found.found.singles[0]
+    named = Judgement("traced", (best,), "it accounts for the residual")
+    return replace(found, found=replace(found.found, judgement=named))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("resistance", "kind"),
+    [
+        (coulomb(40.0), "coulomb_friction"),
+        (viscous(200.0), "viscous_damping"),
+        (cubic(3e3), "cubic_stiffness"),
+        (viscous(0.0), "constant_force"),
+        (lambda t, q, v: 20.0, "constant_force"),
+    ],
+)
+def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
+    traced = asked(builder, resistance, kind, seed)
+    o, here = traced.found, traced.problem
+    assert max(curvature(here, o.singles[0], o.forces, o.size)) < CURVE
+    assert confirmed(here, o.base, o.judgement, o.forces, o.size) is o.judgement
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("resistance", "kind", "over"),
+    [
+        (root(80.0, 80.0), "coulomb_friction", "velocity"),
+        (root(60.0, 120.0), "coulomb_friction", "velocity"),
+        (root(60.0, 120.0), "viscous_damping", "velocity"),
+        (bowl(2e3), "cubic_stiffness", "displacement"),
+    ],
+)
+def test_a_law_that_is_near_is_not_named(builder, resistance, kind, over, seed):
+    traced = asked(builder, resistance, kind, seed)
+    o = traced.found
+    told = confirmed(traced.problem, o.base, o.judgement, o.forces, o.size)
+    assert (told.verdict, told.members) == ("unexplained", ())
+    assert f"over the {over} at carriage" in told.reason
+    assert f"nearest was {kind}@carriage" in told.reason
+
+
+def test_it_is_not_asked_where_what_is_left_is_no_measure(builder):
+    traced = asked(builder, root(60.0, 120.0), "coulomb_friction", 1)
+    o, here = traced.found, traced.problem
+    unknown = replace(here, record=replace(here.record, noise_std=np.array([1e-3, np.nan])))
+    assert confirmed(unknown, o.base, o.judgement, o.forces, o.size) is o.judgement
+
+
+@pytest.mark.parametrize(("truth", "told"), [(coulomb(40.0), "traced"), (root(60.0, 120.0), "unexplained")])
+def test_where_the_form_is_open_it_is_asked_against_other_curves(builder, truth, told):
+    traced = asked(builder, truth, "coulomb_friction", 1)
+    o, here = traced.found, replace(traced.problem, form_error=0.05)
+    own, elsewhere = curvature(here, o.singles[0], o.forces, o.size)
+    assert elsewhere > 0
+    assert curvature(traced.problem, o.singles[0], o.forces, o.size) == (own, 0.0)
+    assert confirmed(here, o.base, o.judgement, o.forces, o.size).verdict == told
+
+
+@pytest.mark.parametrize(
+    ("left", "own", "elsewhere", "closed", "opened"),
+    [
+        (0, CURVE - 1, 0, False, False),
+        (0, CURVE + 1, 0, True, False),
+        (0, 60, 0, True, False),  # of 29 000 that the law explains
+        (0, 80, 0, True, True),
+        (0, 80, 80, True, True),  # one port under two names
+        (0, 80, 90, True, False),
+        (9000, 400, 0, True, False),
+        (9000, 500, 0, True, True),
+        (9000, 500, 600, True, False),
+    ],
+)
+def test_an_open_form_may_leave_a_curve_that_is_little_of_it(left, own, elsewhere, closed, opened):
+    one = np.ones(1000)
+    base, h = (
+        Hypothesis((), Fit((), one[:0], np.eye(0), one * np.sqrt(squares / 1000), np.eye(1000, 0)), ())
+        for squares in (3e4, 1000 + left)
+    )
+    assert [another(h, base, own, elsewhere, form) for form in (False, True)] == [closed, opened]
+
+
+def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
+    """What is left of a class of these laws, best first, on a record with a resistance."""
+    here = problem(builder, record(to_and_fro(2.0), resistance, 3))
+    o = looked_at("one", here, kinds).found
+    fitted = {h.candidates[0].kind: h for h in o.singles}
+    told = Judgement("ambiguous", tuple(fitted[k] for k in kinds), "this record cannot tell them apart")
+    return confirmed(here, o.base, told, o.forces, o.size)
+
+
+def test_of_a_class_the_law_stays_that_no_curve_denies(builder):
+    told = among(builder, viscous(200.0), "quadratic_damping", "viscous_damping")
+    assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])
+
+
+def test_friction_rounded_all_over_the_motion_is_no_friction(builder):
+    told = among(builder, viscous(200.0), "coulomb_friction", "viscous_damping")
+    assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])
+    assert among(builder, root(90.0, 90.0), "stribeck_friction").verdict == "unexplained"
+    assert among(builder, coulomb(40.0), "coulomb_friction").verdict == "ambiguous"  # as it was
+
+
+def test_of_several_laws_each_is_what_its_name_says(builder):
+    here = problem(builder, record(to_and_fro(2.0), viscous(200.0), 3))
+    o = looked_at("one", here, ("coulomb_friction",)).found
+    [h] = o.singles
+    both = replace(
+        h, candidates=(replace(h.candidates[0], kind="parameter_offset", location="m"), *h.candidates)
+    )
+    told = confirmed(here, o.base, Judgement("several", (both,), "both"), o.forces, o.size)
+    assert told.verdict == "unexplained"
+    assert "over the velocity at carriage" in told.reason
+    rounded = {n: v / 1e3 if n.endswith("v_s") else v for n, v in h.fit.theta.items()}
+    sharp = replace(both, fit=replace(h.fit, values=np.array([rounded[u.name] for u in h.fit.unknowns])))
+    told = Judgement("several", (sharp,), "both")
+    assert confirmed(here, o.base, told, o.forces, o.size) is told
+
+
+def test_of_a_class_no_law_stays_where_curves_deny_all_over_that_motion(builder):
+    told = among(builder, root(200.0, 60.0), "quadratic_damping", "viscous_damping", "cubic_stiffness")
+    assert (told.verdict, told.members) == ("unexplained", ())
+
+
+ROUNDED = 0.5  # m/s
+
+
+def rounded(size: float) -> Force:
+    """Dry friction that is full at the highest velocities alone."""
+    return lambda t, q, v: size * float(np.tanh(v / ROUNDED))
+
+
+def test_rounded_friction_is_named_where_any_other_curve_would_show(builder):
+    here = problem(builder, record(to_and_fro(2.0), rounded(60.0), 3))
+    traced = looked_at("one", here, ("coulomb_friction",))
+    o, [h] = traced.found, traced.found.singles[:1]
+    assert misnamed(h, o.forces)
+    assert not misnamed(h, o.forces, FASTEST)
+    assert h.theta["coulomb_friction_carriage_v_s"] == pytest.approx(ROUNDED, rel=0.05)
+    told = Judgement("traced", (h,), "it accounts for the residual")
+    assert confirmed(here, o.base, told, o.forces, o.size) is told
+    # where the form is open other curves may pass for it, and where it explains little
+    assert confirmed(replace(here, form_error=0.05), o.base, told, o.forces, o.size).members == ()
+    little = replace(o.base, fit=replace(o.base.fit, residual=h.fit.residual * 1.01))
+    assert confirmed(here, little, told, o.forces, o.size).members == ()
+
+
+def test_a_law_that_is_denied_gives_way_to_the_right_one(builder):
+    here = problem(builder, record(to_and_fro(2.0), lambda t, q, v: 300.0 * abs(v) * v, 3))
+    o = looked_at("one", here, ("viscous_damping",)).found
+    shown = screened(here, o.base, o.noise, o.size, o.forces, Progress(lambda _: None), Stages())
+    search = Search(shown, Progress(lambda _: None), 1)
+    singles = search.instead(o.singles[0], o.singles)
+    assert singles[0].label == "quadratic_damping@carriage"
+    assert singles[0].theta["quadratic_damping_carriage_c"] == pytest.approx(300.0, rel=0.02)
+    assert [h.label for h in singles].count("viscous_damping@carriage") == 1
+    assert search.instead(singles[0], singles) == singles  # of what is no better nothing is taken

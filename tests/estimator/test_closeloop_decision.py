@@ -1,0 +1,319 @@
+"""Which residual matters, and when an effect accounts for it: with and without an open form of the FMU."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from estimator.closeloop.decision.detect import ONE_EFFECT, matters
+from estimator.closeloop.decision.equivalence import becomes, equivalent
+from estimator.closeloop.decision.verdict import (
+    completes,
+    judge,
+    reached,
+    whole,
+)
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.scores import CURVE
+from estimator.closeloop.hypotheses.twins import limits
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Record, Run
+from fmus.effects import EFFECTS
+from scenarios.closing.result import effects_of
+
+SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
+T = np.arange(2.0 * SAMPLES)
+FORM = 0.2  # of an output, so 6 times the noise
+
+
+def asked(form_error: float = 0.0) -> Problem:
+    y = SIGNAL * np.sqrt(2) * np.sin(T)[:, None] * np.ones(2)
+    run = Run(T, y[:, :0], y, T < SAMPLES, T >= SAMPLES, T >= SAMPLES)
+    return Problem(lambda _: Path(), Record((run,), (), ("a", "b"), NOISE), {}, {}, form_error=form_error)
+
+
+def left(*rms: float) -> Hypothesis:
+    """What leaves residuals of exactly these rms values."""
+    one = np.where(np.arange(len(T)) % 2, 1.0, -1.0)
+    nothing = Fit((), np.zeros(0), np.zeros((0, 0)), one, np.zeros((len(T), 0)))
+    return Hypothesis((), nothing, (one[:, None] * np.array(rms),))
+
+
+@pytest.mark.parametrize(
+    ("rms", "matter"),
+    [((1.0, 1.0), False), ((1.02, 0.98), False), ((1.0, 1.2), True), ((3.0, 1.0), True)],
+)
+def test_what_chance_makes_of_noise_does_not_matter(rms, matter):
+    assert matters(asked(), left(*rms), NOISE) is matter
+
+
+@pytest.mark.parametrize(
+    ("early", "late", "clear", "matter"),
+    [
+        (5.0, 1.0, False, True),  # an actuator that saturates in the part to identify alone
+        (1.02, 1.0, False, False),
+        (1.06, 1.06, False, False),
+        (1.06, 1.06, True, True),  # little, but like an effect as noise never is
+        (1.06, 1.0, True, True),
+        (1.02, 1.02, True, False),
+    ],
+)
+def test_both_parts_matter_and_less_of_what_is_like_an_effect(early, late, clear, matter):
+    assert matters(asked(), in_parts(early, late), NOISE, clear=clear) is matter
+
+
+def in_parts(early: float, late: float) -> Hypothesis:
+    """What leaves residuals of these rms values in the part to identify and in the held-out part."""
+    h = left(1.0, 1.0)
+    return replace(h, residuals=(np.where(T < SAMPLES, early, late)[:, None] * h.residuals[0],))
+
+
+@pytest.mark.parametrize(
+    ("rms", "likeness", "matter"),
+    [
+        ((1.3, 1.0), 0.05, False),  # what another form of contact leaves
+        ((5.0, 1.0), 0.05, False),
+        ((1.3, 1.0), 0.3, True),  # what one effect could explain
+        ((1.02, 1.0), 0.9, False),
+        ((8.0, 1.0), 0.05, True),
+    ],
+)
+def test_an_open_form_leaves_what_is_like_no_effect_alone(rms, likeness, matter):
+    assert matters(asked(FORM), left(*rms), NOISE, likeness) is matter
+
+
+@given(st.floats(1.0, 20.0), st.floats(1.0, 20.0), st.floats(0.0, 1.0))
+def test_less_matters_where_the_form_is_open(a, b, likeness):
+    if matters(asked(FORM), left(a, b), NOISE, likeness):
+        assert matters(asked(), left(a, b), NOISE)
+    assert likeness >= ONE_EFFECT or not matters(asked(FORM), left(min(a, 5.9), min(b, 5.9)), NOISE, likeness)
+
+
+@pytest.mark.parametrize(
+    ("form", "before", "after", "found"),
+    [
+        (0.0, (5.0, 1.0), (1.01, 1.0), (True, True)),
+        (0.0, (5.0, 1.0), (1.19, 1.0), (True, True)),  # 95 % of the way to the noise
+        (0.0, (5.0, 1.0), (2.0, 1.0), (False, True)),
+        (FORM, (20.0, 1.5), (5.0, 1.5), (True, True)),  # within what the form leaves, and no worse
+        (FORM, (20.0, 1.5), (5.0, 1.7), (True, False)),
+        (FORM, (20.0, 1.5), (7.0, 1.5), (False, True)),
+        (FORM, (7.0, 1.5), (5.5, 1.5), (False, False)),  # within it, but hardly anything of it gone
+        (FORM, (3.0, 1.3), (2.6, 1.2), (False, False)),  # all was small: half of it has to go
+        (FORM, (3.0, 1.3), (2.0, 1.2), (True, True)),
+    ],
+)
+def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
+    problem, one = (
+        asked(form),
+        replace(left(*after), candidates=(law("constant_force", 0, 0.0).candidates[0],)),
+    )
+    assert tuple(reached(problem, one, left(*before), NOISE, NOISE).tolist()) == found
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "at", "found"),
+    [
+        ((1.9, 1.3), (1.9, 1.0), "b", True),  # form is left in the other one
+        ((1.9, 1.3), (1.9, 1.0), "a", False),
+        ((1.9, 1.3), (1.9, 1.15), "b", False),  # a gain that makes up for half of the form there
+        ((1.9, 1.3), (2.1, 1.0), "b", False),
+        ((1.9, 1.1), (1.9, 1.0), "b", False),  # as little as that is form
+    ],
+)
+def test_a_fault_of_a_sensor_takes_nearly_all_from_its_own_output(before, after, at, found):
+    fault = replace(left(*after), candidates=(Candidate("sensor_gain", at, ()),))
+    assert reached(asked(FORM), fault, left(*before), NOISE, NOISE).all() == found
+
+
+@pytest.mark.parametrize(
+    ("early", "late", "found"),
+    [
+        (3.0, 2.8, False),  # hardly anything of it in either part
+        (4.5, 1.5, False),  # what makes up for form in the held-out part alone
+        (1.2, 2.8, True),  # an effect that acts in the part to identify
+        (2.2, 2.8, False),
+        (1.7, 1.7, True),
+    ],
+)
+def test_where_the_form_is_open_an_effect_may_act_in_one_part(early, late, found):
+    def hypothesis(identify: float, held_out: float) -> Hypothesis:
+        h = left(held_out, 1.0)
+        return replace(h, fit=replace(h.fit, residual=identify * h.fit.residual))
+
+    base, one = hypothesis(5.0, 3.0), hypothesis(early, late)
+    one = replace(one, candidates=law("constant_force", 0, 0.0).candidates)
+    assert reached(asked(FORM), one, base, NOISE, NOISE).all() == found
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "found"),
+    [
+        ((3.0, 1.3), (2.0, 1.2), False),
+        ((3.0, 1.3), (1.25, 1.1), True),
+        ((7.0, 1.3), (4.5, 1.3), False),  # more than form was there
+        ((7.0, 1.3), (3.2, 1.3), True),
+    ],
+)
+def test_several_effects_account_for_more_of_what_could_be_form(before, after, found):
+    two = tuple(law(kind, 0, 0.0).candidates[0] for kind in ("constant_force", "viscous_damping"))
+    several = replace(left(*after), candidates=two)
+    assert reached(asked(FORM), several, left(*before), NOISE, NOISE).all() == found
+
+
+@pytest.mark.parametrize(
+    ("early", "late", "said"),
+    [
+        (1.0, 5.0, "begins after it"),
+        (5.0, 1.0, "ends before"),
+        (1.2, 5.0, "nearest was"),
+        (5.0, 1.2, "nearest was"),
+    ],
+)
+def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
+    base = in_parts(early, late)
+    told = judge(asked(), base, [base], [], NOISE, NOISE)
+    assert told.verdict == "unexplained"
+    assert said in told.reason
+    assert bool(told.next_experiment) == (said != "nearest was")
+
+
+@pytest.mark.parametrize(
+    ("form", "rms", "began", "verdict"),
+    [
+        (FORM, 1.8, False, "no_discrepancy"),  # within what other forms of contact leave
+        (FORM, 1.8, True, "unexplained"),
+        (FORM, 8.0, False, "unexplained"),
+        (0.0, 1.8, False, "unexplained"),
+    ],
+)
+def test_what_no_effect_explains_may_be_another_form(form, rms, began, verdict):
+    base = left(rms, 1.1)
+    assert judge(asked(form), base, [base], [], NOISE, NOISE, began).verdict == verdict
+
+
+# ---- simpler laws
+
+
+def law(kind: str, extra: int, gain: float) -> Hypothesis:
+    """A law with one unknown and some more that leaves so much less log score than nothing would."""
+    unknowns = tuple(Unknown(f"{kind}_wheel_{i}", 1.0, 0.0, 9.0, 1.0) for i in range(1 + extra))
+    n, one = len(unknowns), np.where(np.arange(len(T)) % 2, 1.0, -1.0)
+    fit = Fit(unknowns, np.ones(n), np.eye(n), one, np.zeros((len(T), n)))
+    left = one * np.sqrt(0.01 - 2 * gain / SAMPLES)
+    return Hypothesis((Candidate(kind, "wheel", unknowns),), fit, (np.column_stack([left, 0 * left]),))
+
+
+@pytest.mark.parametrize(
+    ("gain", "stays"), [(0.5, "coulomb_friction"), (3.5, "coulomb_friction"), (4.5, "stribeck_friction")]
+)
+def test_further_unknowns_have_to_be_worth_their_price(gain, stays):
+    complex_one, simple = law("stribeck_friction", 2, gain), law("coulomb_friction", 0, 0.0)
+    [only] = equivalent(asked(), complex_one, [complex_one, simple], NOISE)
+    assert only.candidates[0].kind == stays
+
+
+@pytest.mark.parametrize(
+    ("form", "left", "stays"),
+    [
+        (0.0, 1.0, "stribeck_friction"),
+        (0.0, 3.0, "stribeck_friction"),
+        (0.05, 1.0, "stribeck_friction"),
+        (0.05, 3.0, "coulomb_friction"),  # the difference is little of what the form leaves anyhow
+    ],
+)
+def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(form, left, stays):
+    complex_one, simple = law("stribeck_friction", 2, 0.5), law("coulomb_friction", 0, 0.0)
+    one = simple.fit.residual
+    complex_one = replace(complex_one, fit=replace(complex_one.fit, residual=left * one))
+    denied = replace(simple, fit=replace(simple.fit, residual=np.sqrt(left**2 + 1.25) * one))
+    assert cost(denied) - cost(complex_one) > CURVE
+    [only] = equivalent(asked(form), complex_one, [complex_one, denied], NOISE)
+    assert only.candidates[0].kind == stays
+
+
+def test_where_the_motion_does_not_show_the_curve_what_lies_between_stays():
+    """At one speed constant, Coulomb and viscous are alike; Coulomb friction becomes viscous damping."""
+    found = [law(kind, extra, 0.0) for kind, extra in (("coulomb_friction", 1), ("viscous_damping", 0))]
+    assert [h.label for h in equivalent(asked(), found[0], found, NOISE)] == ["viscous_damping@wheel"]
+    more = [law("stribeck_friction", 3, 0.0), *found, law("constant_force", 0, 0.0)]
+    kinds = {h.candidates[0].kind for h in equivalent(asked(), more[0], more, NOISE)}
+    assert kinds == {"coulomb_friction", "viscous_damping", "constant_force"}
+    curved = [h for h in more if h.candidates[0].kind != "viscous_damping"]
+    kinds = {h.candidates[0].kind for h in equivalent(asked(), curved[0], curved, NOISE)}
+    assert kinds == {"coulomb_friction", "constant_force"}  # Stribeck's is Coulomb's there
+
+
+def test_a_group_of_parameters_stands_for_one_of_them():
+    one, other = law("parameter_step", 0, 0.0), law("parameter_step", 0, 0.0)
+    names = [f"parameter_step_friction_condition_delta_{n}" for n in ("mu0", "k_A")]
+    members = tuple(Unknown(n, 0.0, -1.0, 1.0, 0.1) for n in names)
+    group = replace(one, candidates=(Candidate("parameter_step", "friction_condition", members),))
+    inside = replace(one, candidates=(replace(one.candidates[0], location="k_A"),))
+    outside = replace(other, candidates=(replace(one.candidates[0], location="F_n"),))
+    for best in (group, inside):
+        assert equivalent(asked(), best, [group, inside, outside], NOISE)[-2:] == [group, outside]
+
+
+@pytest.mark.parametrize("kind", sorted(EFFECTS))
+def test_laws_do_not_become_one_another(kind):
+    for other in limits(kind):
+        assert other in EFFECTS
+        assert kind not in limits(other)
+
+
+# ---- figures of a result
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.2, 1.0), st.floats(-0.9, 0.9))
+def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
+    """As many draws of sine and cosine scatter in size."""
+    unknowns = tuple(Unknown(f"periodic_force_wheel_F_{s}", 0.0, -9e9, 9e9, 1.0) for s in ("sin", "cos"))
+    values, std = 50.0 * np.array([np.sin(phase), np.cos(phase)]), 0.1 * np.array([1.0, ratio])
+    covariance = np.outer(std, std) * np.array([[1.0, correlation], [correlation, 1.0]])
+    wave = Candidate("periodic_force", "wheel", unknowns)
+    fit = Fit(unknowns, values, covariance, np.zeros(1), np.zeros((1, 2)))
+    size, error = effects_of(Hypothesis((wave,), fit, ()))[0].parameters["amplitude"]
+    drawn = np.random.default_rng(0).multivariate_normal(values, covariance, 20_000)
+    assert size == pytest.approx(50.0)
+    assert error == pytest.approx(np.hypot(*drawn.T).std(), rel=0.05)
+
+
+# ---- second effects
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "complete"),
+    [(1.2, 1.0, True), (1.2, 1.05, True), (1.2, 1.15, False), (60.0, 45.0, False), (60.0, 1.0, True)],
+)
+def test_a_second_effect_accounts_for_most_of_what_the_first_leaves(one, two, complete):
+    assert completes(asked(), left(two, 1.0), left(one, 1.0), NOISE) is complete
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "all_of_it"),
+    [(3.0, 1.0, True), (3.0, 1.02, True), (3.0, 1.1, True), (3.0, 1.3, False), (1.5, 1.1, False)],
+)
+def test_a_pair_leaves_little_of_what_a_single_effect_leaves(one, two, all_of_it):
+    def fitted(mean_square):
+        h = left(1.0, 1.0)
+        return replace(h, fit=replace(h.fit, residual=np.sqrt(mean_square) * h.fit.residual))
+
+    assert whole(fitted(two), [fitted(5.0), fitted(one)]) is all_of_it
+    assert whole(fitted(two), [])
+
+
+def test_a_pair_becomes_a_simpler_one_in_either_order():
+    friction = [law(kind, 0, 0.0).candidates[0] for kind in ("stribeck_friction", "coulomb_friction")]
+    offset = law("constant_force", 0, 0.0).candidates[0]
+    rich, simple = (replace(law("constant_force", 0, 0.0), candidates=(c, offset)) for c in friction)
+    swapped = replace(simple, candidates=simple.candidates[::-1])
+    assert becomes(rich, simple)
+    assert becomes(rich, swapped)
+    assert not becomes(simple, rich)
+    assert not becomes(swapped, rich)

@@ -1,0 +1,339 @@
+"""Fits: derivatives along secants, unknowns at bounds, unknowns of two fits."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from estimator.closeloop.fitting import likelihood_profile as likelihood
+from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.slopes import (
+    FADED,
+    FINE,
+    PARTS,
+    Slopes,
+)
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit, loose, sandwich
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.question.problem import Unknown
+from estimator.record import Run
+
+# ---- derivatives along secants
+
+
+class Curved:
+    """An oscillation with unknown size, damping and frequency, and how often it was simulated."""
+
+    def __init__(self, truth: np.ndarray, noise: np.ndarray) -> None:
+        self.t, self.count = np.linspace(0.0, 10.0, len(noise)), 0
+        self.y = self.simulate(truth) + noise
+
+    def simulate(self, x: np.ndarray) -> np.ndarray:
+        return x[0] * np.exp(-x[1] * self.t) * np.sin(x[2] * self.t)
+
+    record, free_states = SimpleNamespace(floor_known=True), ()
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        self.count += 1
+        return (self.y - self.simulate(np.array(list(theta.values()))))[:, None]
+
+
+NAMES = (
+    Unknown("A", 1.0, 0.0, 9.0, 0.1),
+    Unknown("d", 0.1, 0.0, 1.0, 0.02),
+    Unknown("w", 3.0, 2.0, 4.0, 0.1),
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.8, 1.3), st.floats(0.05, 0.2), st.floats(2.9, 3.1), st.integers(0, 99))
+def test_a_fit_along_secants_ends_where_no_direction_gains(size, damping, speed, seed):
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(2000)
+    asked = Curved(np.array([size, damping, speed]), noise)
+    found = fit(asked, NAMES, np.array([0.1]))
+    assert found.converged
+    score = found.jacobian.T @ found.residual
+    assert np.all(np.abs(score) * np.sqrt(np.diag(found.covariance)) < 0.2)  # of a standard error
+    h = 1e-6 * np.eye(3)
+    exact = -np.column_stack([asked.simulate(found.values + d) - asked.simulate(found.values - d) for d in h])
+    exact /= 2e-6 * 0.1
+    assert_allclose(found.jacobian, exact, atol=0.03 * np.abs(exact).max())
+
+
+def test_secants_spare_simulations():
+    asked = Curved(np.array([1.2, 0.12, 3.05]), 0.1 * np.random.default_rng(0).standard_normal(2000))
+    fit(asked, NAMES, np.array([0.1]), gain=1e-9)
+    assert asked.count < 20  # with differences at every step of the same way 6 times 4
+
+
+# ---- rugged valleys
+
+
+@dataclass
+class Rugged:
+    """A valley in x with ripples shorter than the usual step, and a step of the output at a sample."""
+
+    phase: float
+    record, free_states = SimpleNamespace(floor_known=False), ()  # no secants
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        x, t0 = theta["x"], theta["step_force_wheel_t0"]
+        t = np.arange(0.0, 1.0, 0.01)
+        ripple = 1e-3 * np.cos(x / 0.004 + self.phase)
+        return np.concatenate([x + 0 * t, 1 + ripple + 0 * t, 1.0 * (t >= t0) - (t >= 0.5)])[:, None]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.0, 6.0), st.floats(0.3, 0.8))
+def test_finer_differences_see_the_slopes_of_a_rugged_valley(phase, t0):
+    asked = Rugged(phase)
+    x, moment = Unknown("x", 0.5, -9.0, 9.0, 1.0), Unknown("step_force_wheel_t0", t0, 0.0, 1.0, 1.0)
+    valley = fit(asked, (x,), np.ones(1), fixed={moment.name: 0.5})
+    found = fit(asked, (x,), np.ones(1), valley.theta, fixed={moment.name: 0.5}, step=FINE)
+    assert found.residual @ found.residual <= valley.residual @ valley.residual < 0.45**2 * 100 + 101
+    slope = -1e-3 / 0.004 * np.sin(found.values[0] / 0.004 + phase)
+    assert_allclose(found.jacobian[100:200, 0], slope, atol=1e-3)
+    timed = fit(asked, (x, moment), np.ones(1), step=FINE)
+    assert np.any(timed.jacobian[:, 1])  # a moment is not moved less than a sample
+
+
+MOVE = st.one_of(st.just(0.0), st.floats(0.05, 2.0), st.floats(-2.0, -0.05))
+
+
+@given(st.lists(MOVE, min_size=6, max_size=6))
+def test_a_carried_jacobian_keeps_to_the_last_step(moves):
+    a = np.arange(12.0).reshape(4, 3) - 5.0
+
+    def residual(x):
+        return a @ x + 0.1 * (a @ x) ** 2
+
+    slopes = Slopes(residual, np.array([1.0, 2.0, 0.5]), np.full(3, np.inf), [None] * 3)
+    x = np.zeros(3)
+    slopes.by_differences(x)
+    for step in np.array(moves).reshape(2, 3):
+        before, x = x, x + step
+        jacobian = slopes.at(x)
+        assert_allclose(jacobian @ step, residual(x) - residual(before), atol=1e-6, rtol=1e-6)
+        assert not (slopes.exact and step.any())
+    slopes.by_differences(x)
+    assert slopes.exact
+
+
+def test_known_columns_stay():
+    given_column = np.full(4, 7.0)
+    slopes = Slopes(lambda x: np.full(4, x.sum()), np.ones(2), np.full(2, np.inf), [given_column, None])
+    assert_allclose(slopes.by_differences(np.zeros(2)), [[7.0, 1.0]] * 4)
+
+
+class Fading:
+    """A residual of two unknowns, the second of which fades at a rate that the first one sets."""
+
+    def __init__(self) -> None:
+        self.t, self.samples = np.linspace(0.0, 1.0, 2400), 0
+
+    def __call__(self, x, share=1.0):
+        t = self.t[: int(share * len(self.t))]
+        self.samples += len(t)
+        return x[0] * t + x[1] * np.exp(-x[0] * t)
+
+
+@given(st.floats(5.0, 400.0), st.floats(5.0, 400.0))
+def test_what_fades_is_not_simulated_to_the_end(before, now):
+    asked, whole = Fading(), Fading()
+    ones, high = np.ones(2), np.full(2, np.inf)
+    slopes, plain = (
+        Slopes(asked, ones, high, [None] * 2, (1,), asked),
+        Slopes(whole, ones, high, [None] * 2),
+    )
+    for rate in (before, now):
+        x = np.array([rate, 0.3])
+        found, expected = slopes.by_differences(x), plain.by_differences(x)
+        assert_allclose(found, expected, atol=2 * np.sqrt(FADED * np.sum(expected[:, 1] ** 2)))
+    length = int(np.ceil(PARTS * min(1.0, 7.0 / before)) + 1) / PARTS
+    short = now >= before and length < 1.0
+    assert (asked.samples < whole.samples) or not short
+    assert asked.samples <= whole.samples + length * len(whole.t)
+
+
+# ---- bounds
+
+
+def at_a_bound(value: float) -> Fit:
+    unknowns = (Unknown("held", 0.0, 0.0, 1.0, 0.1), Unknown("free", 0.0, -np.inf, np.inf, 1.0))
+    j = np.random.default_rng(0).standard_normal((300, 2))
+    return Fit(unknowns, np.array([value, 3.0]), np.eye(2), j @ np.array([2.0, 0.0]), j)
+
+
+def test_what_a_bound_holds_back_is_no_more_free():
+    assert [u.name for u in loose(at_a_bound(1.0)).unknowns] == ["free"]
+    left = loose(at_a_bound(0.0))
+    assert left.jacobian.shape == (300, 1)
+    assert left.theta == {"free": 3.0}
+    assert loose(at_a_bound(0.5)).theta == at_a_bound(0.5).theta
+
+
+@dataclass
+class Summed:
+    """An output that shows the sum of two unknowns, a + 2 b, and how often it was simulated."""
+
+    a: float
+    b: float
+    record, free_states = SimpleNamespace(floor_known=True), ()
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        t = np.linspace(0.0, 1.0, 400)
+        noise = np.random.default_rng(3).standard_normal(400)
+        return (0.01 * noise + (self.a + 2 * self.b - theta["a"] - 2 * theta["b"]) * t)[:, None]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(1.0, 3.0), st.floats(0.0, 8.0), st.floats(1.0, 3.0))
+def test_of_two_that_tell_their_sum_the_bounded_one_ends_in_the_middle(true_b, begin_a, begin_b):
+    unknowns = Unknown("a", begin_a, -np.inf, np.inf, 1.0), Unknown("b", begin_b, 1.0, 3.0, 0.2)
+    found = fit(Summed(5.0, true_b), unknowns, np.array([0.01]))
+    assert found.theta["b"] == pytest.approx(2.0, abs=0.06)
+    assert found.theta["a"] + 2 * found.theta["b"] == pytest.approx(5.0 + 2 * true_b, abs=0.01)
+    assert found.std["b"] == pytest.approx(2 / np.sqrt(12), rel=0.02)
+    assert abs(found.theta["a"] - 5.0) < 1.9 * found.std["a"]  # of a uniform distribution all of it
+    assert found.residual @ found.residual < 1.2 * 400
+
+
+@given(st.floats(0.0, 50.0))
+def test_what_a_bound_holds_back_counts_as_an_error(pull):
+    """Two unknowns that act alike, one held by a bound: the other one is off by what that one lacks."""
+    rng = np.random.default_rng(1)
+    a, noise = rng.standard_normal(3000), rng.standard_normal(3000)
+    j = np.column_stack([a, 0.8 * a + 0.6 * rng.standard_normal(3000)])
+    best = noise - j @ np.linalg.lstsq(j, noise, rcond=None)[0]
+    covariance = sandwich(best + j @ np.array([pull, 0.0]), j, np.ones(2), np.full(2, np.inf))
+    assert np.sqrt(covariance[0, 0]) >= 0.99 * pull
+    assert np.sqrt(covariance[1, 1]) < 0.1 + 0.05 * pull
+
+
+# ---- two fits
+
+
+def test_a_fit_extended_by_another_has_the_unknowns_of_both():
+    whole, part = at_a_bound(0.5), replace(at_a_bound(0.5), unknowns=(Unknown("own", 0, -1, 1, 1), NAMES[0]))
+    found = part.extended(whole, {"free"})
+    assert [u.name for u in found.unknowns] == ["own", "A", "free"]
+    assert found.theta["free"] == whole.theta["free"]
+    assert_allclose(found.jacobian[:, 2], whole.jacobian[:, 1])
+    assert found.covariance.shape == (3, 3)
+    assert found.std["free"] == whole.std["free"]
+
+
+# ---- errors where the sum of squares is a bent valley
+
+
+class Playing:
+    """A spring with play, over a motion some times wider: stiffness and play make up for each other."""
+
+    free_states = ()
+
+    def __init__(self, seed: int) -> None:
+        t = np.arange(400) * 0.01
+        self.q = np.sin(2 * np.pi * t) + 0.4 * np.sin(2 * np.pi * 2.7 * t)
+        y = np.clip(self.q, -0.2, 0.2) + 0.2 * np.random.default_rng(seed).standard_normal(len(t))
+        every = np.ones(len(t), bool)
+        run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
+        self.record = SimpleNamespace(runs=(run,), floor_known=True, outputs=("y",))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        return run.y - (theta["k"] * np.clip(self.q, -theta["gap"], theta["gap"]))[:, None]
+
+
+def played(seed: int) -> tuple[Playing, Hypothesis]:
+    asked = Playing(seed)
+    k, gap = Unknown("k", 0.0, 0.0, np.inf, 1.0), Unknown("gap", 0.2, 0.0, np.inf, 0.02)
+    found = fit(asked, (k, gap), np.array([0.2]), {"k": 0.8, "gap": 0.25})
+    return asked, Hypothesis((Candidate("free_play", "spring", (k,), (gap,)),), found, ())
+
+
+def test_errors_reach_as_far_as_the_valley_does(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    true, held, wider = {"k": 1.0, "gap": 0.2}, [], []
+    for seed in range(40):
+        asked, h = played(seed)
+        found = likelihood.profiled(asked, h, np.array([0.2])).fit
+        assert found.theta == h.fit.theta
+        held += [abs(found.theta[n] - v) < 1.96 * found.std[n] for n, v in true.items()]
+        wider += [found.std[n] / h.fit.std[n] for n in true]
+    assert np.mean(held) > 0.9
+    assert min(wider) > 1 - 1e-9
+    assert max(wider) > 1.3
+
+
+def test_errors_of_a_linear_law_and_without_declared_noise_stay(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    asked, h = played(1)
+    linear = replace(h, candidates=(Candidate("constant_force", "spring", h.candidates[0].amplitudes),))
+    assert_allclose(likelihood.profiled(asked, linear, np.array([0.2])).fit.covariance, h.fit.covariance)
+    asked.record.floor_known = False
+    assert likelihood.profiled(asked, h, np.array([0.2])) is h
+
+
+class Beginning(Playing):
+    """A force in proportion to a motion that rests for a while, from a moment on."""
+
+    def __init__(self, moment: float, seed: int) -> None:
+        t = np.arange(800) * 0.01
+        self.q = np.where((t > 3.0) & (t < 3.3), 0.0, np.sin(2 * np.pi * 3.0 * t))
+        every = np.ones(len(t), bool)
+        self.record = SimpleNamespace(
+            runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),), floor_known=True
+        )
+        y = 0.1 * np.random.default_rng(seed).standard_normal((len(t), 1))
+        y -= self.identify_residual({"d": 1.0, "d_t0": moment}) - t[:, None]
+        self.record.runs = (Run(t, t[:, None], y, every, ~every, ~every),)
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        acts = (1 + np.tanh((run.t - theta["d_t0"]) / 0.02)) / 2
+        return run.y - (theta["d"] * acts * self.q)[:, None]
+
+
+def begun(moment: float, start: float, seed: int) -> tuple[Beginning, Hypothesis]:
+    asked = Beginning(moment, seed)
+    d, t0 = Unknown("d", 0.0, -np.inf, np.inf, 1.0), Unknown("d_t0", start, 0.0, 8.0, 0.05)
+    found = fit(asked, (d, t0), np.array([0.1]), {"d": 0.9, "d_t0": start})
+    return asked, Hypothesis((Candidate("damping_change", "spring", (d,), (t0,)),), found, ())
+
+
+def test_errors_of_a_moment_reach_over_a_rest(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    before, after = [], []
+    for seed in range(40):
+        true, start = np.random.default_rng(seed).uniform(3.05, 3.25, 2)
+        asked, h = begun(true, start, seed)
+        found = likelihood.profiled(asked, h, np.array([0.1])).fit
+        before.append(abs(h.fit.theta["d_t0"] - true) < 1.96 * h.fit.std["d_t0"])
+        after.append(abs(found.theta["d_t0"] - true) < 1.96 * found.std["d_t0"])
+        assert found.std["d_t0"] < 3.0
+    assert np.mean(before) < 0.8
+    assert np.mean(after) > 0.9
+
+
+def test_a_moment_a_swing_off_is_fitted_again(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    monkeypatch.setattr(
+        likelihood,
+        "finished",
+        lambda problem, rest, promises, size, jobs: [
+            Hypothesis(p.candidates, fit(problem, p.candidates[0].unknowns, size, p.start), ())
+            for p in promises
+        ],
+    )
+    monkeypatch.setattr(likelihood, "settled", lambda problem, h, size: h)
+    asked, h = begun(5.0, 5.0, 0)
+    off = asked.identify_residual({"d": 1.0, "d_t0": 5.35}).ravel() / 0.1
+    stayed = replace(h, fit=replace(h.fit, values=np.array([1.0, 5.35]), residual=off))
+    found = likelihood.profiled(asked, stayed, np.array([0.1])).fit
+    assert found.theta["d_t0"] == pytest.approx(5.0, abs=0.03)

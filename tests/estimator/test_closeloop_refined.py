@@ -1,0 +1,134 @@
+"""The end of a fit whose sum of squares is rugged, and errors that reach what it allows."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimator.closeloop.fitting import likelihood_profile as likelihood
+from estimator.closeloop.fitting import refined as settled
+from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.slopes import FINE, STEP
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Array, Run
+
+SIZE = np.array([0.1])
+AMPLITUDE, STIFFNESS = Unknown("q", 1.0, 0.0, np.inf, 1.0), Unknown("k", 10.0, 0.0, np.inf, 10.0)
+
+BESIDE = 0.25  # N/m too stiff a start, from which the usual differences do not arrive
+
+
+class Swinging:
+    """A spring that has swung so often that a difference of the usual step is turns of it away."""
+
+    free_states = ()
+
+    def __init__(self, k: float, seed: int, noise: float = 0.1) -> None:
+        t = np.arange(4000) * 0.02
+        every = np.ones(len(t), bool)
+        self.true = {"q": 1.0, "k": k}
+        y = noise * np.random.default_rng(seed).standard_normal((len(t), 1)) + swing(t, self.true)
+        self.record = SimpleNamespace(
+            runs=(Run(t, y, y, every, ~every, ~every),), floor_known=True, outputs=("y",)
+        )
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        return run.y - swing(run.t, theta)
+
+
+def swing(t: Array, theta: Mapping[str, float]) -> Array:
+    """Free motion of a mass of 1 kg, (N, 1)."""
+    return theta["q"] * np.cos(np.sqrt(theta["k"]) * t)[:, None]
+
+
+def refit(
+    problem: Problem, rest: Sequence[Unknown], promises: Sequence[Promise], size: Array, jobs: int,
+    step: float = STEP,
+) -> list[Hypothesis]:  # fmt: skip
+    """As `finished`, without an FMU."""
+    return [at_rest(problem, p.candidates[0], size, p.start, step) for p in promises]
+
+
+def at_rest(
+    problem: Problem, c: Candidate, size: Array, start: Mapping[str, float], step: float = STEP
+) -> Hypothesis:
+    """Where a fit from `start` ends."""
+    return Hypothesis((c,), fit(problem, c.unknowns, size, start, step=step), ())
+
+
+def swung(seed: int, off: float) -> tuple[Swinging, Hypothesis]:
+    """A record, and where a fit from a stiffness that is a little off ends."""
+    asked = Swinging(10.0, seed)
+    law = Candidate("stiffness_change", "spring", (AMPLITUDE,), (STIFFNESS,))
+    return asked, at_rest(asked, law, SIZE, {"q": 1.0, "k": 10.0 + off})
+
+
+@pytest.fixture
+def again(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Hypothesis]]:
+    """Fits without an FMU in place of those with one."""
+    monkeypatch.setattr(settled, "finished", refit)
+    monkeypatch.setattr(likelihood, "finished", refit)
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    return refit
+
+
+@pytest.mark.usefixtures("again")
+@settings(max_examples=20)
+@given(seed=st.integers(0, 1000), off=st.floats(-0.25, 0.26))
+def test_finer_differences_lead_on_where_the_usual_ones_come_to_rest(seed, off):
+    asked, h = swung(seed, off)
+    found = settled.settled(asked, h, SIZE)
+    assert cost(found) <= cost(h)
+    assert found.fit.theta["k"] == pytest.approx(10.0, abs=5 * found.fit.std["k"])
+    assert cost(found) < 1.1 * len(found.fit.residual)
+
+
+def test_the_usual_differences_do_come_to_rest_beside():
+    short = [swung(seed, BESIDE)[1] for seed in range(5)]
+    assert all(cost(h) > 2 * len(h.fit.residual) for h in short)
+
+
+def test_where_noise_alone_is_left_nothing_is_fitted_again(monkeypatch):
+    monkeypatch.setattr(settled, "finished", lambda *_, **__: pytest.fail("fitted again"))
+    asked, h = swung(1, 0.0)
+    assert cost(h) < settled.RUGGED * len(h.fit.residual)
+    assert settled.settled(asked, h, SIZE) is h
+
+
+def test_what_fits_worse_is_not_taken_and_worth_is_kept(again):
+    asked, h = swung(2, BESIDE)
+    h = replace(h, worth={"stiffness_change@spring": 7.0})
+    worse = replace(h, fit=replace(h.fit, residual=2 * h.fit.residual))
+    assert settled.lower(h, [worse]) is h
+    [better] = again(asked, (), [Promise(h.candidates, 0.0, h.theta)], SIZE, 1, FINE)
+    assert settled.lower(h, [worse, better]).worth == h.worth
+
+
+@pytest.mark.usefixtures("again")
+def test_errors_hold_the_true_values_where_the_fit_had_come_to_rest_beside():
+    """As often as they say, and they are narrower than beside."""
+    held, narrower = [], []
+    for seed in range(40):
+        asked, h = swung(seed, BESIDE)
+        found = likelihood.profiled(asked, h, SIZE).fit
+        held += [abs(found.theta[n] - v) < 1.96 * found.std[n] for n, v in asked.true.items()]
+        narrower.append(found.std["k"] / h.fit.std["k"])
+    assert np.mean(held) > 0.9
+    assert np.median(narrower) < 0.1
+
+
+def test_errors_reach_a_place_that_the_sum_of_squares_allows():
+    _, h = swung(3, 0.0)
+    moved = h.fit.values + np.array([0.0, 0.05])
+    near = replace(h, fit=replace(h.fit, values=moved, residual=h.fit.residual * np.sqrt(1 + 1 / cost(h))))
+    far = replace(near, fit=replace(near.fit, residual=1.1 * h.fit.residual))
+    assert likelihood.reached(h, near) == pytest.approx([0.0, 0.05 / likelihood.WIDTH])
+    assert likelihood.reached(h, far) == pytest.approx([0.0, 0.0])

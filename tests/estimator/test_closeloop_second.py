@@ -1,0 +1,306 @@
+"""What sets in and when, what is left once an effect explains, and how long it all takes."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from estimator.closeloop import progress
+from estimator.closeloop.decision import allowed as allowing
+from estimator.closeloop.decision.verdict import one_curve, outgrown
+from estimator.closeloop.fitting import rounds
+from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.scores import (
+    CURVE,
+    best_by_label,
+    lead,
+    ranked,
+)
+from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.screen import Screening
+from estimator.closeloop.search import dating, pairs
+from estimator.closeloop.search.onset import grown
+from estimator.closeloop.search.pairs import beside, try_pairs
+from estimator.record import Run
+from fmus.effects import EFFECTS
+from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.carriage import (
+    looked_at,
+    problem,
+    record,
+    to_and_fro,
+)
+
+# ---- what sets in
+
+
+@given(st.integers(6, 44), st.floats(12.0, 50.0), st.integers(0, 99))
+def test_growth_is_dated(k, times, seed):
+    squares = np.random.default_rng(seed).chisquare(40, 50) / 40
+    assert grown(squares, 5) is None
+    squares[k:] *= times
+    assert grown(squares, 5) == pytest.approx(k, abs=1)
+    assert grown(squares, 5, 2 * times) is None
+
+
+def test_a_single_burst_does_not_set_in():
+    squares = np.ones(50) + 0.01 * np.arange(50) % 0.05
+    squares[30] = 400.0
+    assert grown(squares, 5) is None
+
+
+@given(st.floats(0.0, 0.5), st.floats(0.6, 1.0), st.floats(0.0, 1.0), st.floats(-50.0, 50.0))
+def test_shares_of_the_fitted_part_are_dated_wherever_it_lies(first, last, share, begin):
+    t = begin + np.linspace(0.0, 40.0, 2001)
+    fit = (t - begin >= 40.0 * first) & (t - begin <= 40.0 * last)
+    run = Run(t, t[:, None], t[:, None], fit, ~fit, ~fit)
+    at = run.fit_time(share)
+    assert at == pytest.approx(40.0 * (first + share * (last - first)), abs=0.03)
+    assert run.fit_share(at) == pytest.approx(share, abs=1e-6)
+    assert np.mean(t[fit] - begin < at) == pytest.approx(share, abs=0.01)
+    assert (run.fit_share(0.0), run.fit_share(41.0)) == (0.0, 1.0)
+
+
+# ---- second effects
+
+
+def one(kind: str, location: str = "wheel") -> Candidate:
+    return Candidate(kind, location, (Unknown(f"{kind}_{location}_c", 0.0, -np.inf, np.inf, 1.0),))
+
+
+def several(*kinds: tuple[str, str], squares: float = 100.0) -> Hypothesis:
+    candidates = tuple(one(*kind) for kind in kinds)
+    unknowns = tuple(u for c in candidates for u in c.unknowns)
+    n = len(unknowns)
+    residual = np.full(100, np.sqrt(squares / 100))
+    return Hypothesis(candidates, Fit(unknowns, np.ones(n), np.eye(n), residual, np.zeros((100, n))), ())
+
+
+@pytest.mark.parametrize(
+    ("kinds", "curve"),
+    [
+        ((("coulomb_friction", "wheel"), ("quadratic_damping", "wheel")), True),
+        ((("coulomb_friction", "wheel"), ("quadratic_damping", "roller")), False),
+        ((("coulomb_friction", "wheel"), ("constant_force", "wheel")), False),
+        ((("viscous_damping", "wheel"), ("cubic_stiffness", "wheel")), False),
+        ((("bump_stop", "wheel"), ("cubic_stiffness", "wheel")), True),
+        ((("sensor_gain", "wheel"), ("sensor_bias", "wheel")), False),
+    ],
+)
+def test_two_laws_of_one_motion_at_one_place_are_a_curve(kinds, curve):
+    assert one_curve(several(*kinds)) is curve
+
+
+@pytest.mark.parametrize("kind", sorted(k for k, e in EFFECTS.items() if e.over))
+def test_a_law_and_its_limits_are_over_the_same_motion_or_none(kind):
+    limits = [other for other in EFFECTS[kind].becomes if other != "constant_force"]
+    assert {EFFECTS[other].over for other in limits} <= {EFFECTS[kind].over}
+
+
+@pytest.mark.parametrize(("before", "enough"), [(9e3, CURVE), (5e6, 5e3)])
+@pytest.mark.parametrize(
+    ("richer", "counts"),
+    [
+        ([("stribeck_friction", "wheel")], True),
+        ([("stribeck_friction", "roller")], False),
+        ([("step_force", "roller"), ("coulomb_friction", "wheel")], True),
+        ([("step_force", "roller"), ("coulomb_friction", "roller")], False),
+    ],
+)
+def test_a_law_is_outgrown_where_more_gains_much_more_than_chance(before, enough, richer, counts):
+    simple, base = several(("coulomb_friction", "wheel"), squares=2e4), several(squares=2e4 + before)
+    for gain, expected in ((0.0, False), (0.9 * enough, False), (1.1 * enough, counts)):
+        assert outgrown(simple, several(*richer, squares=2e4 - gain), base) is expected
+
+
+class Seen:
+    """A screening of white noise; see Screening."""
+
+    size, group = np.ones(1), 1
+
+
+@pytest.mark.parametrize(
+    ("second", "least", "asked"),
+    [
+        (0.0, 0.0, []),
+        (4.0, 0.0, []),
+        (12.0, 0.0, []),
+        (20.0, 0.0, ["viscous_damping@roller"]),
+        (20.0, 0.99, []),
+    ],
+)
+def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch, second, least, asked):
+    rng = np.random.default_rng(3)
+    laws = [one(kind, at) for kind in ("viscous_damping", "cubic_stiffness") for at in ("wheel", "roller")]
+    change = [(c, rng.standard_normal((4000, 1))) for c in laws]
+    best = one("viscous_damping", "wheel")
+    g = {c.label: column[:, 0] / np.linalg.norm(column) for c, column in change}
+    residual = rng.standard_normal(4000) - second * g["viscous_damping@roller"]
+    found = Fit(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
+    fitted = []
+    monkeypatch.setattr(pairs, "hypotheses", lambda _p, _b, promises, *_: fitted.extend(promises) or [])
+    beside(None, None, Hypothesis((best,), found, ()), Seen(), change, least, 1)
+    assert [p.candidates[1].label for p in fitted] == asked
+    assert all(p.candidates[0] is best for p in fitted)
+
+
+def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_suggests(tmp_path):
+    """A harmonic force at 2.3 Hz that does not show beside a spring of ten times its size."""
+
+    def truth(t: float, q: float, v: float) -> float:
+        return 2e3 * q**3 + 30.0 * float(np.sin(2 * np.pi * 2.3 * t))
+
+    asked = problem(ModelBuilder("drive", tmp_path), record(to_and_fro(2.0), truth, 1))
+    o = looked_at("spring", asked, ("cubic_stiffness",)).found
+    offers = [(kind, "carriage") for kind in ("cubic_stiffness", "harmonic_excitation")]
+    candidates = physical_candidates(offers, asked.builder.outside(), asked.record, o.forces)
+    screening = Screening(asked, o.base.fit, o.size, o.forces)
+    change = list(zip(candidates, screening.changes(candidates), strict=True))
+    found, _ = try_pairs(asked, o.base, screening, o.singles, change, o.noise, 1)
+    both = min(found, key=cost)
+    assert both.theta["harmonic_excitation_carriage_f"] == pytest.approx(2.3, abs=0.01)
+    assert both.theta["cubic_stiffness_carriage_k_3"] == pytest.approx(2e3, rel=0.02)
+    assert both.fit.beyond_noise < 5 * np.sqrt(2 * len(both.fit.residual))
+    before = [c.shape[0].start for c in candidates if c.kind == "harmonic_excitation"]
+    assert min(abs(f - 2.3) for f in before) > 0.1
+
+
+# ---- dating
+
+
+class Swinging:
+    """A force that sets in on an oscillator; the sum of squares over its moment has a minimum a swing."""
+
+    def __init__(self, moment: float) -> None:
+        t = np.linspace(0.0, 20.0, 4000)
+        fit = t < 15.0
+        self.run = Run(t, t[:, None], self.simulate(t, 1.0, moment), fit, ~fit, ~fit)
+        self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
+        self.free_states = ()
+
+    def simulate(self, t: np.ndarray, size: float, moment: float) -> np.ndarray:
+        since = np.maximum(t - moment, 0.0)
+        return (size * (1.0 - np.cos(6.0 * since)) * np.exp(-0.2 * since))[:, None]
+
+    def residuals(self, theta: Mapping[str, float]) -> list[np.ndarray]:
+        return [self.run.y - self.simulate(self.run.t, *theta.values())]
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        return self.residuals(theta)[0][self.run.fit]
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(4.0, 9.0), st.floats(-0.7, 0.7))
+def test_a_moment_some_swings_off_is_found(moment, off):
+    asked, size = Swinging(moment), np.array([0.1])
+    own = Unknown("F_0", 0.0, -9.0, 9.0, 1.0), Unknown("step_t0", moment + off, -np.inf, np.inf, 0.1)
+    late = Candidate("step_force", "wheel", own[:1], own[1:])
+    start = fit(asked, own, size, {"F_0": 1.0})
+    assume(abs(start.theta["step_t0"] - moment) < 0.7)  # as far as is looked
+    h = Hypothesis((late,), start, tuple(asked.residuals(start.theta)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dating, "built", lambda problem, _: problem)
+        patch.setattr(rounds, "built", lambda problem, _: problem)
+        patch.setattr(rounds, "together", lambda problem, promises: [problem] * len(promises))
+        [best] = dating.dated(asked, (), [h], size, 1)
+    assert best.theta["step_t0"] == pytest.approx(moment, abs=0.01)
+    assert cost(best) <= cost(h)
+
+
+# ---- laws that the part to identify cannot tell apart
+
+
+class Saturating:
+    """An effect F on an output, and friction c that shows in the held-out part alone."""
+
+    def __init__(self, seed: int) -> None:
+        t = np.arange(0.0, 60.0, 0.02)
+        fit, rng = t < 36.0, np.random.default_rng(seed)
+        self.late = 1.0 * (t > 40.0)
+        noise = 0.1 * rng.standard_normal(len(t))
+        self.run = Run(t, t[:, None], (3.0 + 2.0 * self.late + noise)[:, None], fit, ~fit, ~fit)
+        self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
+        self.form_error = 0.0
+
+    def residuals(self, theta: Mapping[str, float]) -> list[np.ndarray]:
+        return [self.run.y - (theta["F"] + theta["c"] * self.late)[:, None]]
+
+
+def friction_known(asked: Saturating, kind: str, c: float, error: float) -> Hypothesis:
+    """A law of size 3 that was fitted with a value of the friction and its error."""
+    unknowns = Unknown("F", 0.0, -9.0, 9.0, 1.0), Unknown("c", 1.0, 0.0, 4.0, 1.0)
+    residuals = asked.residuals({"F": 3.0, "c": c})
+    weighted = residuals[0][asked.run.fit].ravel() / 0.1
+    jacobian = np.column_stack([-10 * np.ones(len(weighted)), np.zeros(len(weighted))])
+    found = Fit(unknowns, np.array([3.0, c]), np.diag([1e-2 / len(weighted), error**2]), weighted, jacobian)
+    return Hypothesis((Candidate(kind, "wheel", unknowns[:1]),), found, tuple(residuals))
+
+
+@given(st.floats(0.3, 3.7), st.floats(0.3, 3.7), st.integers(0, 50))
+@settings(max_examples=25, deadline=None)
+def test_where_a_fit_came_to_rest_is_no_evidence(one, other, seed):
+    asked, size = Saturating(seed), np.array([0.1])
+    found = [
+        friction_known(asked, kind, c, 1.2)
+        for kind, c in (("constant_force", one), ("coulomb_friction", other))
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(allowing, "built", lambda problem, _: problem)
+        told = allowing.allowed(asked, ranked(asked, found, size), size)
+        sure = [friction_known(asked, h.candidates[0].kind, h.theta["c"], 1e-4) for h in found]
+        still = allowing.allowed(asked, ranked(asked, sure, size), size)
+    assert abs(lead(asked, *told, size)[0]) < 3.0
+    for h in told:
+        assert h.rms(asked, "choose") == pytest.approx(0.1, rel=0.1)
+    for h in sure:  # what is known stays
+        [moved] = [x for x in still if x.key == h.key]
+        assert moved.rms(asked, "choose") == pytest.approx(h.rms(asked, "choose"), rel=0.1)
+
+
+def test_what_leaves_more_than_noise_is_not_helped():
+    asked, size = Saturating(1), np.array([0.1])
+    h = friction_known(asked, "constant_force", 1.0, 1.2)
+    wrong = replace(h, fit=replace(h.fit, residual=2 * h.fit.residual))
+    assert allowing.allowed(asked, [wrong], size) == [wrong]
+
+
+# ---- progress
+
+
+def test_the_time_of_each_stage_is_counted(monkeypatch):
+    clock = iter([0.0, 1.0, 3.0, 7.0, 12.0])
+    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    said = []
+    stages = progress.Progress(said.append)
+    stages("a", "beginning")
+    stages("b", "going on")
+    stages("a", "once more")
+    stages.end()
+    assert stages.seconds == {"a": 7.0, "b": 4.0}
+    assert said == ["beginning", "going on", "once more"]
+
+
+# ---- labels
+
+
+def test_the_order_of_a_pair_makes_no_other_hypothesis():
+    a, b = ("coulomb_friction", "wheel"), ("actuator_gain", "T_P")
+    better, worse = several(a, b, squares=90.0), several(b, a, squares=100.0)
+    assert best_by_label([worse, better]) == [better]
+
+
+def test_what_sets_in_is_no_part_of_a_curve():
+    late = Candidate(
+        "damping_change", "wheel", one("damping_change").amplitudes, (Unknown("x_t0", 9.0, 0.0, 20.0, 1.0),)
+    )
+    h = several(("coulomb_friction", "wheel"), ("damping_change", "wheel"))
+    assert one_curve(h)
+    assert not one_curve(replace(h, candidates=(h.candidates[0], late)))

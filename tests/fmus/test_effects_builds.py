@@ -1,0 +1,225 @@
+"""Effects in FMUs: each kind built, restarted from its middle, and around a foreign FMU as in our own."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fmus.drive.model import Drive
+from fmus.effects import EFFECTS, offers, parse_effect
+from fmus.errors import BadInput
+from fmus.export.around.outside import Outside
+from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
+from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container import coupled
+from fmus.export.container.coupled import build_coupled
+from fmus.host.archive import describe
+from fmus.host.description import PortNames
+from fmus.host.fmu import Fmu
+from fmus.host.grading.check import grade
+from tests.fmus.test_effects import FALLBACK
+from tests.helpers.everything import EVERY_EFFECT
+
+PORT = PortNames("carriage", "F_ext", "q_dot", "q")
+T = np.linspace(0, 3, 301)
+INPUTS = {"F": 150 * np.sin(np.pi * T[:-1]) + 60 * np.sin(11 * T[:-1])}
+OUTPUTS = ["q", "q_dot"]
+CASES = {  # a size of each that matters here
+    "constant_force@carriage": {"F_0": 20.0},
+    "step_force@carriage": {"F_0": 30.0, "t0": 1.0},
+    "coulomb_friction@carriage": {"F_c": 20.0, "v_s": 0.01},
+    "stribeck_friction@carriage": {"F_c": 10.0, "F_b": 20.0, "v_b": 0.05, "v_s": 0.01},
+    "viscous_damping@carriage": {"c": 50.0},
+    "quadratic_damping@carriage": {"c": 80.0},
+    "cubic_stiffness@carriage": {"k_3": 1e4},
+    "bump_stop@carriage": {"k": 5e3, "gap": 0.02},
+    "free_play@carriage": {"k": 500.0, "gap": 0.02},
+    "hysteresis@carriage": {"F_h": 30.0, "q_y": 0.01},
+    "periodic_force@carriage": {"F_sin": 20.0, "order": 60.0},
+    "harmonic_excitation@carriage": {"F_sin": 20.0, "f": 3.0},
+    "flexible_mode@carriage": {"m": 20.0, "f": 6.0, "D": 0.05},
+    "parameter_offset@M": {"delta": 10.0},
+    "parameter_step@M": {"delta": 10.0, "t0": 1.5},
+    "parameter_drift@F_v": {"rate": 10.0},
+    "actuator_gain@F": {"gain": -0.1},
+    "actuator_saturation@F": {"share": 1.0, "limit": 100.0},
+    "actuator_lag@F": {"share": 1.0, "T": 0.1},
+    "input_delay@F": {"share": 1.0, "T": 0.1},
+}
+COMPONENTS = {"stiffness_change", "damping_change"}  # need a model that says what makes a component
+BY_VELOCITY = ("_damping", "_friction", "flexible_mode")  # a held force lags behind it by half a step
+
+
+def started(text):
+    """Parameters of a case by their names in an FMU."""
+    effect, location = parse_effect(text)
+    return {effect.name_at(location, name): value for name, value in CASES[text].items()}
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """The drive without effects."""
+    return build_python(Drive(), tmp_path_factory.mktemp("drive"))
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory):
+    """own(text) is the drive with an effect built in; anything may act at its port."""
+    folder, made = tmp_path_factory.mktemp("own"), {}
+
+    class Line(Drive):
+        """A drive to which anything may happen."""
+
+        places_known = False
+
+    def build(text):
+        if text not in made:
+            made[text] = build_python(Line([parse_effect(text)]), folder / f"{len(made)}.fmu")
+        return made[text]
+
+    return build
+
+
+@pytest.fixture(scope="module")
+def around(drive, tmp_path_factory):
+    """around(text) is the drive as a foreign FMU with an effect around it."""
+    folder, made = tmp_path_factory.mktemp("around"), {}
+
+    def build(text):
+        if text not in made:
+            kind, location = text.split("@")
+            made[text] = build_coupled(drive, [PORT], [(kind, location)], folder / f"{len(made)}.fmu")
+        return made[text]
+
+    return build
+
+
+def run(path, start):
+    """Free run of the drive, (N, 2)."""
+    with Fmu(path) as fmu:
+        return fmu.simulate(T, INPUTS, OUTPUTS, start)
+
+
+def test_every_kind_is_among_the_cases():
+    assert {text.partition("@")[0] for text in CASES} | COMPONENTS | FALLBACK == set(EVERY_EFFECT)
+
+
+@pytest.mark.parametrize("text", CASES)
+def test_around_a_foreign_fmu_an_effect_does_what_it_does_in_our_own(text, drive, own, around):
+    bare, inside, outside = run(drive, {}), run(own(text), started(text)), run(around(text), started(text))
+    size = np.abs(inside - bare).max(axis=0)
+    assert np.all(size > 1e-4)  # m, m/s: the case shows
+    # of coupling steps of 1 ms: second order, but where a force held over a step goes by the velocity
+    tolerance = 3e-3 if text.partition("@")[0].endswith(BY_VELOCITY) else 5e-5
+    assert np.all(np.abs(outside - inside).max(axis=0) < tolerance * size)
+    assert_allclose(run(around(text), {}), bare, atol=1e-12)  # off: the same steps, in shorter ones
+
+
+@pytest.mark.parametrize("text", CASES)
+def test_an_effect_that_is_off_changes_no_run(text, drive, own):
+    assert_array_equal(run(own(text), {}), run(drive, {}))
+
+
+@pytest.mark.parametrize(
+    ("text", "order", "step"),
+    [
+        ("hysteresis@carriage", 2, 2e-3),
+        ("input_delay@F", 2, 1e-3),  # its fastest motion takes 11 ms
+        ("step_force@carriage", 2, 2e-3),
+        ("viscous_damping@carriage", 1, 2e-3),
+    ],
+)
+def test_the_coupling_error_falls_by_its_order(text, order, step, drive, own, tmp_path, monkeypatch):
+    expected, error = run(own(text), started(text)), []
+    for dt in (step, step / 2):
+        monkeypatch.setattr(coupled, "COUPLING_STEP", dt)
+        kind, location = text.split("@")
+        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{dt}.fmu")
+        error.append(np.abs(run(made, started(text)) - expected).max())
+    assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.2)
+
+
+@pytest.mark.parametrize("build", ["own", "around"])
+@pytest.mark.parametrize("text", CASES)
+def test_a_restart_from_the_middle_repeats_the_rest_exactly(text, build, request):
+    path, start, middle = request.getfixturevalue(build)(text), started(text), 170
+    with Fmu(path) as fmu:
+        states = fmu.description.states
+        whole = fmu.simulate(T, INPUTS, states, start)
+        there = dict(zip(states, whole[middle].tolist(), strict=True))
+        rest = {n: u[middle:] for n, u in INPUTS.items()}
+        again = fmu.simulate(T[middle:], rest, states, start | there)
+    assert_array_equal(again, whole[middle:])
+
+
+@pytest.mark.parametrize("text", ["hysteresis@carriage", "parameter_step@M", "input_delay@F"])
+def test_what_an_effect_brings_passes_the_grade(text, own, around):
+    for path in (own(text), around(text)):
+        assert [c.title for c in grade(path).checks if c.passed is False] == []
+
+
+def test_states_of_effects_can_be_seen_and_set(around):
+    with Fmu(around("actuator_lag@F")) as fmu:
+        lag = "actuator_lag_F_x"
+        assert lag in fmu.description.states
+        fmu.restart(actuator_lag_F_share=1.0, **{lag: 40.0})
+        fmu.step(0.1)
+        assert fmu[lag] == pytest.approx(40.0 * np.exp(-1.0), rel=1e-6)
+
+
+def test_what_changes_while_running_is_heard_by_the_carried_fmu(around, own):
+    for path in (around("parameter_offset@M"), own("parameter_offset@M")):
+        with Fmu(path) as fmu:
+            fmu.restart()
+            fmu.step(0.01, F=10.0)
+            fmu.set(parameter_offset_M_delta=95.0)
+            assert fmu["q_ddot"] == pytest.approx((10.0 - 200.0 * fmu["q_dot"]) / 190.0, rel=1e-9)
+            fmu.set(parameter_offset_M_delta=0.0, M=50.0)
+            assert fmu["q_ddot"] == pytest.approx((10.0 - 200.0 * fmu["q_dot"]) / 50.0, rel=1e-9)
+
+
+def test_several_effects_of_every_sort_at_once(drive, tmp_path):
+    effects = [tuple(text.split("@")) for text in CASES]
+    start = {n: v for text in CASES for n, v in started(text).items()}
+
+    class Line(Drive):
+        """A drive to which anything may happen."""
+
+        places_known = False
+
+    ours = build_python(Line([(EFFECTS[k], at) for k, at in effects]), tmp_path / "ours.fmu")
+    theirs = build_coupled(drive, [PORT], effects, tmp_path / "theirs.fmu")
+    expected = run(ours, start)
+    assert_allclose(run(theirs, start), expected, atol=3e-3 * np.abs(expected).max())
+
+
+def test_everything_on_offer_can_be_built_around_a_foreign_fmu(drive, tmp_path):
+    builder = ForeignBuilder(drive, (PORT,), tmp_path)
+    kinds = {kind for kind, _ in builder.offers}
+    assert kinds == set(EVERY_EFFECT) - COMPONENTS - FALLBACK
+    assert {at for _, at in builder.offers} == {"carriage", "F", "M", "F_v"}
+    known = describe(builder(builder.offers)).variables
+    for kind, location in builder.offers:
+        assert any(name.startswith(f"{kind}_{location}_") for name in known)
+
+
+def test_a_models_builder_offers_what_makes_sense_in_it(tmp_path):
+    found = ModelBuilder("testrig", tmp_path).offers
+    assert ("actuator_saturation", "T_P") in found
+    assert ("parameter_step", "mu0") in found
+    assert ("periodic_force", "wheel") in found
+    assert ("bump_stop", "wheel") not in found
+    assert not {at for _, at in found} & {"pole_pairs", "T_w_ext"}
+
+
+def test_what_a_foreign_fmu_lacks_is_named(drive):
+    known = describe(drive)
+    for effects, words in (
+        ([("viscous_damping", "cariage")], "has no location 'cariage'; did you mean 'carriage'"),
+        ([("parameter_step", "m")], "has no tunable parameter 'm'"),
+        ([("actuator_lag", "F_ext")], "has no input beside its ports 'F_ext'"),
+    ):
+        with pytest.raises(BadInput, match=words):
+            Outside(known, [PORT]).build([(EFFECTS[k], at) for k, at in effects])
+    with pytest.raises(BadInput, match="port 'x': Drive has no input or output 'p'"):
+        Outside(known, [PortNames("x", "F_ext", "q_dot", "p")])
+    assert ("flexible_mode", "carriage") in offers(Outside(known, [PORT]))

@@ -1,0 +1,186 @@
+"""The command line: wrong input gets one clear line and exit code 2, whatever is wrong with it."""
+
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from scenarios.cli.app import app, run_safely
+from tests.helpers.paths import SHIPPED
+
+DEMO = SHIPPED / "demo" / "rig-drag"
+
+
+def railfmi(*arguments: str | Path) -> int:
+    """Exit code of a command line, run in this process."""
+    return run_safely(lambda: app([str(a) for a in arguments], standalone_mode=False))
+
+
+@pytest.fixture
+def experiment(tmp_path: Path) -> Path:
+    """A copy of the bundled experiment with its first 600 samples, to be spoiled."""
+    folder = tmp_path / "spoiled"
+    folder.mkdir()
+    text = (DEMO / "experiment.toml").read_text()
+    text = text.replace("identify = [0.0, 30", "identify = [0.0, 3").replace("test = [30", "test = [3")
+    text = text.replace(", 50]", ", 5.9]").replace(", 50.0]", ", 5.9]")
+    (folder / "experiment.toml").write_text(text)
+    rows = (DEMO / "data.csv").read_text().splitlines()[:601]
+    (folder / "data.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+def in_toml(old: str, new: str) -> Callable[[Path], None]:
+    """An edit of experiment.toml."""
+
+    def spoil(folder: Path) -> None:
+        file = folder / "experiment.toml"
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new))
+
+    return spoil
+
+
+def in_rows(change: Callable[[list[str]], list[str]]) -> Callable[[Path], None]:
+    """An edit of the lines of data.csv."""
+
+    def spoil(folder: Path) -> None:
+        file = folder / "data.csv"
+        file.write_text("\n".join(change(file.read_text().splitlines())) + "\n")
+
+    return spoil
+
+
+def without_values(first: int, last: int) -> Callable[[list[str]], list[str]]:
+    """Blank the last column of some rows."""
+
+    def change(rows: list[str]) -> list[str]:
+        gone = [r.rsplit(",", 1)[0] + "," for r in rows[first:last]]
+        return [*rows[:first], *gone, *rows[last:]]
+
+    return change
+
+
+def corrupt_fmu(folder: Path) -> None:
+    """A foreign FMU that is no zip file."""
+    (folder / "x.fmu").write_bytes(b"PK\x03\x04 broken")
+    in_toml('model = "testrig"', 'fmu = "x.fmu"')(folder)
+
+
+def escaping_fmu(folder: Path) -> None:
+    """A foreign FMU with a path that leads out of it."""
+    with zipfile.ZipFile(folder / "x.fmu", "w") as packed:
+        packed.writestr("modelDescription.xml", "<fmiModelDescription/>")
+        packed.writestr("../../outside.txt", "no")
+    in_toml('model = "testrig"', 'fmu = "x.fmu"')(folder)
+
+
+def other_platform(folder: Path) -> None:
+    """A foreign FMU whose only binary is for a machine that is not this one."""
+    xml = (
+        '<fmiModelDescription fmiVersion="2.0" modelName="x" guid="1"><CoSimulation modelIdentifier="x"/>'
+        "<ModelVariables/><ModelStructure/></fmiModelDescription>"
+    )
+    with zipfile.ZipFile(folder / "x.fmu", "w") as packed:
+        packed.writestr("modelDescription.xml", xml)
+        packed.writestr("binaries/vax/x.so", "no")
+    in_toml('model = "testrig"', 'fmu = "x.fmu"')(folder)
+
+
+WRONG: dict[str, tuple[Callable[[Path], None], list[str]]] = {
+    "no experiment file": (lambda f: (f / "experiment.toml").unlink(), ["experiment.toml", "cannot be read"]),
+    "no data file": (lambda f: (f / "data.csv").unlink(), ["data.csv"]),
+    "broken TOML": (in_toml("[split]", "[split"), ["experiment.toml", "not valid TOML"]),
+    "unknown key": (in_toml("[calibrate]", "[calibrat]"), ["calibrat", "did you mean 'calibrate'?"]),
+    "unknown model": (in_toml('"testrig"', '"testrgi"'), ["testrgi", "did you mean 'testrig'?"]),
+    "FMU is missing": (in_toml('model = "testrig"', 'fmu = "gone.fmu"'), ["gone.fmu", "no such FMU"]),
+    "FMU is corrupt": (corrupt_fmu, ["x.fmu", "not a readable zip"]),
+    "FMU leads outside": (escaping_fmu, ["x.fmu", "leads outside"]),
+    "FMU for another platform": (other_platform, ["x.fmu", "no binary for this platform", "vax"]),
+    "unknown output": (in_toml("[outputs.omega_w]", "[outputs.omega]"), ["'omega'", "did you mean 'omega_"]),
+    "output that is an input": (in_toml("[outputs.omega_w]", "[outputs.T_P]"), ["T_P", "not an output"]),
+    "unknown parameter": (in_toml("J_w = ", "J_v = "), ["J_v", "did you mean"]),
+    "parameter out of range": (in_toml("mu0 = 0.4", "mu0 = -0.4"), ["mu0", "-0.4"]),
+    "bounds turned round": (in_toml("mu0 = [0.3, 0.5]", "mu0 = [0.5, 0.3]"), ["mu0", "increase"]),
+    "unknown column": (in_toml('column = "omega_w"', 'column = "omega_v"'), ["omega_v", "did you mean"]),
+    "unknown unit": (in_toml('unit = "rad/s"', 'unit = "rad/sec"'), ["rad/sec"]),
+    "unit of another kind": (in_toml('unit = "rad/s"', 'unit = "m/s"'), ["m/s", "rad/s"]),
+    "hertz for rad/s": (in_toml('unit = "rad/s"', 'unit = "Hz"'), ["Hz", "2 pi"]),
+    "split outside the record": (in_toml("test = [3", "test = [300"), ["test"]),
+    "no split": (in_toml("[split]", "[split_off]"), ["split"]),
+    "a block of blanks": (in_rows(without_values(100, 140)), ["data.csv", "omega_r"]),
+    "time goes back": (in_rows(lambda r: [*r[:50], r[40], *r[50:]]), ["data.csv", "time", "increas"]),
+    "a gap": (in_rows(lambda r: [*r[:200], *r[260:]]), ["data.csv"]),
+    "a word in a cell": (in_rows(lambda r: [*r[:9], r[9].replace(",", ",oops", 1), *r[10:]]), ["data.csv"]),
+    "an empty file": (in_rows(lambda _: []), ["data.csv"]),
+    "too few samples": (in_rows(lambda r: r[:40]), ["data.csv"]),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_wrong_input_gets_one_line_and_exit_2(
+    wrong: str, experiment: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    spoil, words = WRONG[wrong]
+    spoil(experiment)
+    assert railfmi("close-loop", experiment / "experiment.toml", "--out", tmp_path / "out") == 2
+    said = capfd.readouterr()
+    lines = [line for line in (said.out + said.err).splitlines() if line.strip()]
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("railfmi: ")
+    assert "Traceback" not in lines[0]
+    for word in words:
+        assert word in lines[0], lines[0]
+    assert not (tmp_path / "out").exists(), "nothing may be half-written"
+
+
+USAGE = {
+    "unknown command": (["buidl"], "buidl"),
+    "unknown model": (["build", "testrgi"], "did you mean 'testrig'?"),
+    "unknown effect": (["build", "testrig", "--effect", "viscos_damping@roller"], "viscous_damping"),
+    "effect without a place": (["build", "testrig", "--effect", "viscous_damping"], "KIND@LOCATION"),
+    "unknown place": (["build", "testrig", "--effect", "viscous_damping@roler"], "did you mean 'roller'?"),
+    "effect that makes no sense": (["build", "testrig", "--effect", "cubic_stiffness@wheel"], "no sense"),
+    "kind that is not built": (["build", "testrig", "--kind", "steam"], "steam"),
+    "FMI version that is not built": (["build", "testrig", "--fmi", "1"], "--fmi 1"),
+    "no such FMU": (["check", "gone.fmu"], "gone.fmu"),
+    "a number that is none": (["close-loop", "x", "--jobs", "many"], "--jobs"),
+}
+
+
+@pytest.mark.parametrize("wrong", USAGE)
+def test_wrong_usage_gets_one_line_and_exit_2(
+    wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments, word = USAGE[wrong]
+    assert railfmi(*arguments) == 2
+    said = capfd.readouterr()
+    lines = [line for line in (said.out + said.err).splitlines() if line.strip()]
+    assert len(lines) == 1, lines
+    assert word in lines[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_build_and_check_work_together(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert railfmi("build", "drive", "--effect", "coulomb_friction@carriage", "--out", tmp_path) == 0
+    assert railfmi("check", tmp_path / "Drive.fmu") == 0
+    assert "FAILED" not in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["", "build", "check", "close-loop"])
+def test_help_is_there(command: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert railfmi(*filter(None, [command]), "--help") == 0
+    assert "Usage" in capfd.readouterr().out
+
+
+def test_the_installed_command_answers_with_its_exit_code(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "scenarios.cli.app", "close-loop", str(tmp_path / "nowhere")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "nowhere" in done.stderr

@@ -1,0 +1,291 @@
+"""Measured data: what arrives at the estimators, what is refused, what is noted."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from estimator.record import Record
+from fmus.errors import BadInput
+from fmus.host.description import FmuDescription
+from scenarios.experiment.checks import clipped
+from scenarios.experiment.experiment import load_experiment
+from scenarios.experiment.record import load_record
+from tests.helpers.experiment_files import (
+    GOOD,
+    RIG,
+    assert_one_clear_line,
+    csv_lines,
+    table,
+    variable,
+    write,
+)
+from tests.helpers.paths import SHARED
+
+DATA = SHARED / "data" / "experiments"
+
+
+def read(file: Path, fmu: FmuDescription = RIG) -> Record:
+    return load_record(load_experiment(file), fmu)
+
+
+def kinds(record: Record) -> list[str]:
+    return [note.kind for note in record.notes]
+
+
+def test_data_may_lie_elsewhere(tmp_path):
+    file = write(tmp_path / "here")
+    (tmp_path / "there").mkdir()
+    (tmp_path / "here" / "data.csv").rename(tmp_path / "there" / "data.csv")
+    e = load_experiment(file, data_dir=tmp_path / "there")
+    assert load_record(e, RIG).runs[0].t.size == 1001
+
+
+def test_one_file_is_one_run_in_the_units_of_the_fmu(tmp_path):
+    record = read(write(tmp_path))
+    (run,) = record.runs
+    columns = table()
+    assert record.inputs == ("T_P", "f_sync")
+    assert record.outputs == ("omega_w", "omega_w_dot")
+    assert_allclose(run.y[:, 0], columns["omega"], rtol=1e-8)  # nine digits in the file
+    assert_allclose(run.u[:, 0], columns["torque"], atol=1e-6)
+    assert_array_equal(run.u[:, 1], 7.5)
+    assert_allclose(record.noise_std, [0.3 * np.pi / 30, np.nan])
+    assert kinds(record) == ["unit"]
+
+
+def test_a_shared_border_identifies_only(tmp_path):
+    (run,) = read(write(tmp_path)).runs
+    assert run.t[run.fit | run.choose][-1] == run.t[600] == 6.0
+    assert run.t[run.test][0] == run.t[601]
+    assert np.all(run.fit.astype(int) + run.choose + run.test == 1)
+
+
+def test_the_run_starts_with_the_record_and_ends_with_the_split(tmp_path):
+    toml = GOOD.replace("[0.0, 6.0]", "[2.0, 6.0]").replace("[6.0, 10.0]", "[6.5, 9.0]")
+    (run,) = read(write(tmp_path, toml)).runs
+    assert (run.t[0], run.t[-1]) == (0.0, 9.0)
+    assert (run.fit.sum() + run.choose.sum(), run.test.sum()) == (401, 251)
+
+
+def test_two_files_are_two_runs(tmp_path):
+    split = 'identify_data = "data.csv"\ntest_data = "data.csv"'
+    toml = GOOD.replace("identify = [0.0, 6.0]\ntest = [6.0, 10.0]", split).replace(
+        'data = "data.csv"\ntime', "time"
+    )
+    first, second = read(write(tmp_path, toml)).runs
+    assert np.all(first.fit ^ first.choose)
+    assert not first.test.any()
+    assert second.test.all()
+    assert not np.any(second.fit | second.choose)
+
+
+def test_what_chooses_is_a_fifth_spread_over_what_identifies(tmp_path):
+    (run,) = read(write(tmp_path)).runs
+    assert run.choose.sum() == pytest.approx(0.2 * 601, abs=15)
+    starts = np.flatnonzero(np.diff(run.choose.astype(int)) == 1) + 1
+    assert len(starts) == 5
+    assert np.diff(run.t[starts]) == pytest.approx(1.2, abs=0.15)
+
+
+def test_a_window_to_choose_is_taken_as_it_is_given(tmp_path):
+    toml = GOOD.replace("identify = [0.0, 6.0]", "identify = [0.0, 5.0]\nchoose = [5.0, 6.0]")
+    (run,) = read(write(tmp_path, toml)).runs
+    assert run.t[run.fit][-1] == 5.0
+    assert (run.t[run.choose][0], run.t[run.choose][-1]) == (run.t[501], 6.0)
+
+
+def test_a_file_to_choose_is_a_run_of_its_own(tmp_path):
+    split = 'identify_data = "data.csv"\nchoose_data = "data.csv"\ntest_data = "data.csv"'
+    toml = GOOD.replace("identify = [0.0, 6.0]\ntest = [6.0, 10.0]", split).replace(
+        'data = "data.csv"\ntime', "time"
+    )
+    parts = [[run.fit.all(), run.choose.all(), run.test.all()] for run in read(write(tmp_path, toml)).runs]
+    assert parts == np.eye(3, dtype=bool).tolist()
+
+
+def test_without_a_split_nothing_is_held_out(tmp_path):
+    toml = GOOD.replace("[split]\nidentify = [0.0, 6.0]\ntest = [6.0, 10.0]\n", "")
+    (run,) = read(write(tmp_path, toml)).runs
+    assert run.fit.all()
+    assert not np.any(run.choose | run.test)
+
+
+def test_a_derived_column_is_the_derivative(tmp_path):
+    columns = table() | {"omega": np.sin(table()["time"])}
+    (run,) = read(write(tmp_path, columns=columns)).runs
+    # central differences err by step^2 / 6, those at the ends by step / 2
+    assert_allclose(run.y[1:-1, 1], np.cos(run.t[1:-1]), atol=2e-5)
+
+
+def test_no_inputs_at_all(tmp_path):
+    (run,) = read(write(tmp_path, GOOD.replace('T_P = "torque"\nf_sync = 7.5\n', ""))).runs
+    assert run.u.shape == (1001, 0)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the shared experiments are not beside the repository")
+@pytest.mark.parametrize("file", sorted(DATA.glob("*/experiment.toml")), ids=lambda file: file.parent.name)
+def test_shared_experiments_load(file):
+    from fmus.models import MODELS
+
+    declared = file.read_text()
+    if not any(f'model = "{name}"' in declared for name in MODELS):
+        pytest.skip("its model is not built here yet")
+    e = load_experiment(file)
+    known = [variable(name, "output", o.unit) for name, o in e.outputs.items()]
+    known += [variable(name, "input", None) for name in e.inputs]
+    known += [variable(name, "parameter", None) for name in {**e.parameters, **e.calibrate}]
+    described = {v.name: v for v in known} | {
+        name: variable(name, "output", "rad/s", initial="exact") for name in e.initial
+    }
+    record = load_record(e, FmuDescription(e.id, "2.0", e.id, "{0}", described))
+    (run,) = record.runs
+    assert record.notes == ()
+    assert np.all(run.fit.astype(int) + run.choose + run.test == 1)
+    assert np.isfinite(record.noise_std).all()
+
+
+# the wrong edit of the experiment file or of the data, and words the message must hold
+BAD_USE = [
+    ('unit = "rpm"', 'unit = "Hz"', "[outputs.omega_w]: unit 'Hz' does not fit 'rad/s'"),
+    ('unit = "rpm"', 'unit = "rad/ss"', "did you mean 'rad/s'?"),
+    (
+        "[6.0, 10.0]",
+        "[6.0, 11.0]",
+        "test = [6.0, 11.0] leaves the record data.csv, which runs from 0 to 10 s",
+    ),
+    ("[6.0, 10.0]", "[6.0, 6.2]", "test = [6.0, 6.2] holds 20 samples; at least 50"),
+    ('"torque"', '"torqe"', "[inputs] T_P: column 'torqe' is not in"),
+    ('time = "time"', 'time = "t"', "key 'time': column 't' is not in"),
+    ("[derived.accel]", "[derived.torque]", "[derived.torque] has the name of a column"),
+    ('"data.csv"', '"nodata.csv"', "cannot be read (No such file or directory)"),
+    ('"data.csv"', '"data.mf4"', "cannot be read (No such file or directory)"),
+    ('"data.csv"', '"data.xyz"', "is of no known kind; known are .csv, .mat, .mdf, .mf4, .parquet, .tdms"),
+]
+
+
+@pytest.mark.parametrize(("good", "bad", "words"), BAD_USE)
+def test_units_split_and_columns_against_the_data(tmp_path, good, bad, words):
+    assert good in GOOD
+    file = write(tmp_path, GOOD.replace(good, bad, 1))
+    with pytest.raises(BadInput) as refused:
+        read(file)
+    assert_one_clear_line(refused, file, words)
+
+
+def replace_row(line: int, text: str):
+    """A wrong edit of the data: other text in one line, counted from 1."""
+    return lambda lines: [*lines[: line - 1], text, *lines[line:]]
+
+
+BAD_DATA = [
+    (lambda lines: [], "is empty or has no column names in line 1"),
+    (lambda lines: lines[:1], "has no data below line 1"),
+    (lambda lines: [line.replace(",", ";") for line in lines], "columns are parted by ';'"),
+    (lambda lines: [lines[0].replace("torque", "omega"), *lines[1:]], "column 'omega' occurs twice"),
+    (replace_row(7, "0.05,1.5,12,9,9"), "Expected 4 fields in line 7, saw 5"),
+    (lambda lines: [lines[0], *(line + ",1" for line in lines[1:])], "line 2 has more cells than line 1"),
+    (replace_row(7, "0.05,off,12,110"), "line 7: column 'torque' holds 'off', not a number"),
+    (replace_row(7, "0.05,,12,110"), "column 'torque' has no number in 1 of 1001 rows, first at 0.05 s"),
+    (replace_row(7, "0.05,inf,12,110"), "column 'torque' has no number in 1 of 1001 rows"),
+    (replace_row(7, ",0,12,110"), "line 7: time column 'time' holds no number"),
+    (replace_row(7, ""), "line 7: time column 'time' holds no number"),
+    (replace_row(7, "0.04,0,12,110"), "line 7: time column 'time' goes from 0.04 to 0.04 s"),
+    (replace_row(7, "0.03,0,12,110"), "line 7: time column 'time' goes from 0.04 to 0.03 s"),
+    (lambda lines: lines[:200] + lines[260:], "no data from 1.98 to 2.59 s; end the split before it"),
+    (lambda lines: lines[:1] + lines[1::20], "holds 31 samples; at least 50 are needed"),
+]
+
+
+@pytest.mark.parametrize(("edit", "words"), BAD_DATA)
+def test_bad_data_files(tmp_path, edit, words):
+    file = write(tmp_path)
+    (tmp_path / "data.csv").write_text("\n".join(edit(csv_lines(table()))))
+    with pytest.raises(BadInput) as refused:
+        read(file)
+    assert_one_clear_line(refused, file, words)
+
+
+def test_blank_rows_at_the_end_and_beyond_the_split_do_no_harm(tmp_path):
+    file = write(tmp_path, GOOD.replace("[6.0, 10.0]", "[6.0, 9.0]"))
+    lines = csv_lines(table())
+    lines[960] = lines[960].split(",")[0] + ",,,"
+    (tmp_path / "data.csv").write_text("\n".join(lines) + "\n\n\n")
+    assert read(file).runs[0].t[-1] == 9.0
+
+
+def test_jitter_and_lost_samples_are_noted(tmp_path):
+    columns = table()
+    columns["time"] = columns["time"] + np.random.default_rng(0).uniform(-0.002, 0.002, 1001)
+    columns["time"][[0, -1]] = 0.0, 10.0
+    assert kinds(read(write(tmp_path / "a", columns=columns))) == ["unit", "jitter"]
+    columns = {name: np.delete(values, [300, 301]) for name, values in table().items()}
+    assert kinds(read(write(tmp_path / "b", columns=columns))) == ["unit", "jitter", "gap"]
+
+
+def test_a_few_printed_digits_are_no_jitter(tmp_path):
+    columns = table()
+    columns["time"] = np.round(columns["time"] * 1.00037, 4)  # steps of 0.0100 and 0.0101
+    assert kinds(read(write(tmp_path, columns=columns))) == ["unit"]
+
+
+def test_a_constant_output_is_noted_a_constant_input_is_not(tmp_path):
+    columns = table() | {"n_wheel": np.full(1001, 5.0), "torque": np.zeros(1001)}
+    record = read(write(tmp_path, columns=columns))
+    assert [(n.kind, n.column) for n in record.notes] == [("unit", "n_wheel"), ("constant", "n_wheel")]
+
+
+def test_a_clipped_source_of_a_derived_output_is_noted(tmp_path):
+    columns = table() | {"omega": np.minimum(table()["omega"], 15.0)}
+    record = read(write(tmp_path, columns=columns))
+    assert [(n.kind, n.column) for n in record.notes] == [("unit", "n_wheel"), ("clipped", "omega")]
+
+
+def test_an_fmu_without_units_takes_columns_as_they_are(tmp_path):
+    bare = replace(RIG, variables={n: replace(v, unit=None) for n, v in RIG.variables.items()})
+    record = read(write(tmp_path), bare)
+    assert_allclose(record.runs[0].y[:, 0], table()["n_wheel"], rtol=1e-8)
+    assert kinds(record) == ["unit", "unit"]
+
+
+# --- clipping
+
+
+def stroke(quantum: float, acceleration: float = 2.0, step: float = 1e-3) -> np.ndarray:
+    """Position (n,) of an axis that rests, runs a stroke at 0.25 m/s, rests, runs back; quantised [m]."""
+    ramp = 0.25 / acceleration
+    times = [0, 0.5, 0.5 + ramp, 1.5, 1.5 + ramp, 2.5]
+    speed = np.interp(np.arange(0, 2.5, step), times, [0, 0, 0.25, 0.25, 0, 0])
+    there = np.cumsum(speed) * step
+    return np.round((0.1234 + np.concatenate([there, there[-1] - there])) / quantum) * quantum
+
+
+@pytest.mark.parametrize("quantum", [1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+def test_an_encoder_at_rest_is_not_clipped(quantum):
+    assert clipped(stroke(quantum)) == []
+
+
+def test_a_speed_at_rest_is_not_clipped():
+    speed = np.abs(np.diff(stroke(1e-9)))
+    assert clipped(np.round(speed / 1e-6) * 1e-6) == []
+
+
+@given(st.floats(1e-5, 0.1), st.integers(0, 1000))
+def test_noise_and_quanta_alone_are_not_clipping(quantum, seed):
+    noise = 0.01 * np.random.default_rng(seed).standard_normal(1001)
+    assert clipped(np.round((table()["omega"] + noise) / quantum) * quantum) == []
+
+
+@pytest.mark.parametrize("quantum", [1e-6, 1e-4])
+def test_an_encoder_cut_off_is_clipped(quantum):
+    assert clipped(np.minimum(stroke(quantum), 0.3)) == [(0.3, 1)]
+    assert clipped(np.maximum(stroke(quantum), 0.2)) == [(0.2, 1)]
+
+
+@pytest.mark.parametrize("limit", [8.0, 10.0, 12.0, 14.0, 15.0, 16.0, 17.0])
+def test_a_noisy_channel_cut_off_is_clipped(limit):
+    assert clipped(np.minimum(table()["omega"], limit)) == [(limit, 1)]
