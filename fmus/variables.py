@@ -10,7 +10,10 @@ Expr: TypeAlias = Any  # a casadi.SX scalar; casadi comes without types
 
 @dataclass(frozen=True)
 class Variable:
-    """One scalar variable: unit, start value, limits and nominal in that unit, description, source."""
+    """One scalar variable: unit, start value, limits and nominal in that unit, description, source.
+
+    alarm_below, alarm_above: levels of which an estimate of it warns, unless an experiment has its own.
+    """
 
     unit: str
     start: float = 0.0
@@ -20,6 +23,8 @@ class Variable:
     nominal: float | None = None
     source: str = ""
     name: str = ""
+    alarm_below: float | None = None
+    alarm_above: float | None = None
 
     causality: ClassVar[str] = "local"
     variability: ClassVar[str] = "continuous"

@@ -1,5 +1,6 @@
 """Does a filter believe what it should? NIS, NEES and whiteness of innovations, with their bands."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,9 @@ from scipy.stats import chi2
 from estimator.record import Array
 
 LAGS = 20  # samples over which innovations must not remember
+FALSE_REJECTION = 0.05  # chance that any of the checks rejects a filter whose model and noise are right
+NIS = "NIS"
+WHITENESS = "whiteness of "
 
 
 @dataclass(frozen=True)
@@ -79,3 +83,27 @@ def whiteness(innovation: Array, lags: int = LAGS) -> Whiteness:
     rho = np.array([float(e[k:] @ e[:-k]) / power for k in range(1, lags + 1)])
     statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
     return Whiteness(rho, float(chi2.sf(statistic, lags)), 1.96 / np.sqrt(n))
+
+
+@dataclass(frozen=True)
+class Check:
+    """One test of a filter by its own innovations, passed where the value is within the limit [low, high]."""
+
+    check: str
+    value: float
+    limit: tuple[float, float]
+    passed: bool
+
+
+def checks(nis: Array, freedom: Array, innovation: Array, outputs: Sequence[str]) -> tuple[Check, ...]:
+    """The mean NIS of squares (N,), and each output's whiteness by innovations (N, m) over their deviations.
+
+    FALSE_REJECTION is shared evenly between them (Bonferroni). What too few samples leave open is left out.
+    """
+    level, used = FALSE_REJECTION / (1 + len(outputs)), freedom > 0
+    band = mean_band(nis[used], freedom[used], 1 - level)
+    found = [Check(NIS, band.value, (band.low, band.high), band.within)]
+    for name, e in zip(outputs, innovation.T, strict=True):
+        p = whiteness(e).p_value
+        found.append(Check(f"{WHITENESS}{name}", p, (level, 1.0), p >= level))
+    return tuple(c for c in found if np.isfinite(c.value))

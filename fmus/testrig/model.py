@@ -6,7 +6,7 @@ Equations, symbols and range of validity: README.md beside this file.
 import casadi as cs
 
 from fmus.contact.forces.coefficients import coefficients
-from fmus.contact.forces.friction import friction_coefficient
+from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws.polach import creep_force, stress_gradient
 from fmus.integrate import rodas3
 from fmus.model import Model
@@ -50,7 +50,10 @@ class Testrig(Model):
     N = Parameter("N", 8000.0, min=1.0, doc="normal force", source="thesis 4.5")
     a = Parameter("m", 0.0027, min=1e-6, doc="contact semi-axis along rolling", source="thesis 4.5")
     b = Parameter("m", 0.0027, min=1e-6, doc="contact semi-axis across rolling", source="thesis 4.5")
-    mu0 = Parameter("1", 0.4, min=1e-4, max=2.0, doc="friction coefficient at no slip", source="thesis 4.5")
+    mu0 = Parameter(
+        "1", 0.4, min=1e-4, max=2.0, doc="friction coefficient at no slip", source="thesis 4.5",
+        alarm_below=CRITICAL,
+    )  # fmt: skip
     A = Parameter("1", 0.4, min=0.0, max=1.0, doc="limit over maximum friction", source="thesis 4.5")
     B = Parameter("s/m", 0.6, min=0.0, doc="decrease of friction with slip speed", source="thesis 4.5")
     k_A = Parameter("1", 1.0, min=0.0, doc="Polach factor in the area of adhesion", source="thesis Table 4.1")

@@ -15,7 +15,7 @@ import casadi as cs
 
 from fmus.component import Component
 from fmus.contact.forces.coefficients import looked_up
-from fmus.contact.forces.friction import friction_coefficient
+from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws import selected_law
 from fmus.contact.geometry.search import FLANGE_ANGLE
 from fmus.effects.effect import Effect
@@ -113,7 +113,9 @@ class Wheelset(Model):
     k_x = Parameter("N/m", 4e6, min=0.0, doc="longitudinal stiffness of the suspension", source=TABLE)
     b_y = Parameter("N.s/m", 1e3, min=0.0, doc="lateral damping of the suspension", source=TABLE)
     b_x = Parameter("N.s/m", 1e3, min=0.0, doc="longitudinal damping of the suspension", source=TABLE)
-    mu0 = Parameter("1", 0.5, min=1e-4, max=2.0, doc="friction coefficient at no slip", source=DRY)
+    mu0 = Parameter(
+        "1", 0.5, min=1e-4, max=2.0, doc="friction coefficient at no slip", source=DRY, alarm_below=CRITICAL
+    )
     A = Parameter("1", 0.4, min=0.0, max=1.0, doc="limit over maximum friction", source=DRY)
     B = Parameter("s/m", 0.6, min=0.0, doc="decrease of friction with slip velocity", source=DRY)
     k_A = Parameter("1", 1.0, min=0.0, doc="Polach factor in the area of adhesion", source=DRY)

@@ -212,14 +212,17 @@ def estimate(
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
 ) -> None:
-    """Estimate states, parameters and unknown inputs of an FMU from a record, sample by sample."""
+    """Estimate states, parameters and unknown inputs of an FMU: exit 1 if its own tests reject the filter."""
     from scenarios.estimating.estimating import estimate as filtered
 
     with said.status("reading the experiment") as status:
         result = filtered(experiment, out, data, tell=status.update)
     for name, found in result.estimated.items():
         spread, unit = found["std_error"], found["unit"] or ""
-        typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip())
+        bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
+        typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound)
+    if result.doubt:
+        typer.echo(result.doubt)
     for alarm in result.alarms:
         end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
         likely = f"probability {alarm.probability:.3f}"
@@ -227,7 +230,7 @@ def estimate(
     if result.diverged:
         typer.echo(f"diverged: {result.reason}")
     typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
-    if result.diverged:
+    if not result.consistent:
         raise typer.Exit(1)
 
 

@@ -2,11 +2,12 @@
 
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
+from estimator.filters.consistency import checks
 from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.export.builders.pythonfmu import build_python
@@ -17,6 +18,7 @@ from scenarios.estimating.findings import (
     Tell,
     find,
     informed,
+    standings,
 )
 from scenarios.estimating.page import write_page
 from scenarios.estimating.result import (
@@ -26,6 +28,7 @@ from scenarios.estimating.result import (
     identified,
     innovations,
     nis,
+    passes,
     write_csv,
 )
 from scenarios.estimating.setup import set_up
@@ -84,13 +87,31 @@ def fmu_of(e: Experiment, work: Path) -> Path:
     return e.fmu_path
 
 
+def _standing_notes(found: Findings) -> Iterator[str]:
+    """Of each unknown that lies at a bound, or of which the data tell too little, where it came from."""
+    told = informed(found)
+    for name, s in standings(found).items():
+        if s.side:
+            yield (
+                f"'{name}' is at its {s.side} bound {s.bound:.4g}: the record pushes it there from "
+                f"{s.start:.4g}, so its standard error says nothing; widen the bound, or look for what the "
+                "model lacks"
+            )
+        elif not told.get(name, True) and not s.moved:
+            yield f"the data tell nothing of '{name}': its value is what was believed before"
+        elif not told.get(name, True):
+            left = max(
+                i.left[i.names.index(name)] for i in (found.before, found.after) if i and name in i.names
+            )
+            yield (
+                f"the data tell little of '{name}': {left:.0%} of its first deviation is left, yet its value "
+                f"moved from {s.start:.4g} to {s.value:.4g}"
+            )
+
+
 def _notes(found: Findings) -> list[str]:
     """What must be known of the outcome, in sentences."""
-    notes = [
-        f"the data tell nothing of '{name}': its value is what was believed before"
-        for name, said in informed(found).items()
-        if not said
-    ]
+    notes = list(_standing_notes(found))
     if found.after is not None:
         notes += [
             f"'{a}' and '{b}' cannot be told apart (correlation {c:.3f}); only a combination of both is known"
@@ -112,12 +133,16 @@ def result_of(
     s, h, joint = found.setup, found.history, found.joint
     reason = h.broken and f"{h.broken}; the estimate ends there"
     access = joint.access
+    tests = checks(h.nis, h.freedom, h.innovation, s.outputs)
+    bounds = {name: ended.side for name, ended in standings(found).items() if ended.side}
     return EstimateResult(
         experiment=s.experiment.id,
         filter=s.options.filter,
-        estimated=estimated(joint, h, informed(found)),
+        estimated=estimated(joint, h, informed(found), bounds),
         innovations=innovations(h, s.outputs, s.noise),
         nis=nis(h),
+        checks=tests,
+        consistent=not h.broken and passes(tests),
         log_likelihood=h.log_likelihood,
         identifiability=identified(found.before, found.after),
         alarms=alarms(joint, h, s.options),

@@ -23,7 +23,7 @@ from estimator.filters.identifiability import (
 )
 from estimator.filters.process_noise import LEARNT_FROM, likeliest
 from estimator.filters.smoother import smoothed
-from estimator.filters.system import Joint
+from estimator.filters.system import Joint, UnknownParameter
 from estimator.filters.ukf import Spread, Ukf
 from estimator.record import Array
 from fmus.errors import BadInput
@@ -32,6 +32,9 @@ from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.setup import Setup, finely
 
 Tell = Callable[[str], None]
+MOVED = 0.1  # of its first deviation must an unknown move to be elsewhere than it was believed
+AT_BOUND = 0.01  # of the width between the bounds, or with one bound of the first deviation
+REACH = 2.0  # standard errors: a value at its bound is not told apart from it
 
 
 @dataclass(frozen=True)
@@ -146,3 +149,41 @@ def informed(found: Findings) -> dict[str, bool]:
             for name, said in zip(i.names, i.informed, strict=True):
                 both[name] = both.get(name, True) and said
     return both
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where an unknown ended, in the FMU's unit, against what was believed of it before."""
+
+    start: float
+    value: float
+    moved: bool
+    side: str  # of the bound at which it lies, "lower" or "upper"; empty where it lies at none
+    bound: float  # nan where it lies at none
+
+
+def standings(found: Findings) -> dict[str, Standing]:
+    """Of each unknown parameter and input; none without samples."""
+    joint, h = found.joint, found.history
+    if not len(h.t):
+        return {}
+    begun, n = joint.start(), len(joint.states)
+    std = np.sqrt(np.diag(begun.P))
+    first = joint.values(begun.x[None], std[None])[0][0].tolist()
+    last, error = (of[0].tolist() for of in joint.values(h.x[-1:], h.std[-1:]))
+    ended: dict[str, Standing] = {}
+    for i, name in enumerate(h.names[n:], n):
+        moved = bool(abs(h.x[-1, i] - begun.x[i]) > MOVED * std[i])
+        p = joint.parameters[i - n] if i - n < len(joint.parameters) else None
+        side, bound = _at_bound(p, last[i], error[i]) if p and moved else ("", np.nan)
+        ended[name] = Standing(first[i], last[i], moved, side, bound)
+    return ended
+
+
+def _at_bound(p: UnknownParameter, value: float, error: float) -> tuple[str, float]:
+    """Which bound a value with its standard error lies at, and where that is."""
+    low, high = p.transform.low, p.transform.high
+    near = min(AT_BOUND * (high - low if np.isfinite(high - low) else p.std), REACH * error)
+    if value - low <= near:
+        return "lower", low
+    return ("upper", high) if high - value <= near else ("", np.nan)

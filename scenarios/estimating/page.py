@@ -42,7 +42,8 @@ def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Tru
         alarms=list(raised(result)),
         unknowns=list(unknowns(result)),
         noise=list(noise(found, result)),
-        nis={name: _number(value) for name, value in result.nis.items()},
+        nis=_number(result.nis["mean"]),
+        checks=list(checked(result)),
         bands=_embedded(band_plots(found, truth), folder),
         innovations=_embedded(innovation_plots(found), folder),
         correlations=_embedded(correlation_plots(found), folder),
@@ -56,8 +57,15 @@ def headline(result: EstimateResult) -> str:
     if result.diverged:
         return "The filter diverged; what it had until then is shown."
     wanted = {n: e for n, e in result.estimated.items() if e["kind"] == "parameter"} or result.estimated
-    said = [f"{n} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}" for n, e in wanted.items()]
-    return ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
+    said = [_headed(n, e) for n, e in wanted.items()]
+    values = ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
+    return f"{values}: {result.doubt}" if result.doubt else values
+
+
+def _headed(name: str, e: Row) -> str:
+    """One quantity of the headline, with its bound where it lies at one."""
+    bound = f" (at its {e['at_bound']} bound)" if "at_bound" in e else ""
+    return f"{name} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}{bound}"
 
 
 def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
@@ -74,6 +82,7 @@ def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
             "unit": unit(e["unit"]),
             "band": " to ".join(short(v, _digits(v, e["std_error"])) for v in (low, high)),
             "informed": e.get("informed_by_data", True),
+            "bound": e.get("at_bound"),
             "error": NOTHING if error is None else number(error),
         }
 
@@ -91,6 +100,13 @@ def channels(result: EstimateResult) -> Iterator[Row]:
             "p": _number(c["p_white"]),
             "gated": NOTHING if gated is None else percent(gated),
         }
+
+
+def checked(result: EstimateResult) -> Iterator[Row]:
+    """One row a test that the filter makes of itself."""
+    for c in result.checks:
+        limit = " to ".join(short(end) for end in c.limit)
+        yield {"check": c.check, "value": short(c.value), "limit": limit, "passed": c.passed}
 
 
 def raised(result: EstimateResult) -> Iterator[Row]:

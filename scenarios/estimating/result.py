@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from estimator.filters.consistency import mean_band, share_within, whiteness
+from estimator.filters.consistency import (
+    NIS,
+    WHITENESS,
+    Check,
+    mean_band,
+    share_within,
+    whiteness,
+)
 from estimator.filters.history import History
 from estimator.filters.identifiability import Identifiability
 from estimator.filters.system import Joint
@@ -35,7 +42,8 @@ class EstimateResult:
     """The result of estimate. `estimated` holds, by name, kind, value, standard error, band of 95 %, ...
 
     innovations, by output: noise, rms over what is expected of it (1 where all is right), largest
-    correlation, p value of whiteness, share gated. rms_error: where a truth was given.
+    correlation, p value of whiteness, share gated. checks: the filter's tests of itself; consistent: whether
+    it passes them all. rms_error: where a truth was given.
     """
 
     experiment: str
@@ -43,6 +51,8 @@ class EstimateResult:
     estimated: dict[str, dict[str, Any]]
     innovations: dict[str, dict[str, float | None]]
     nis: dict[str, float | None]
+    checks: tuple[Check, ...]
+    consistent: bool
     log_likelihood: float
     identifiability: dict[str, Any]
     alarms: list[Raised]
@@ -58,13 +68,47 @@ class EstimateResult:
     rms_error: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
+    @property
+    def doubt(self) -> str:
+        """What the filter's own tests say against its standard errors; empty where they all pass."""
+        return "" if self.consistent or self.diverged else doubt(self.checks)
+
     def write(self, path: Path) -> None:
         """Write as JSON."""
         path.write_text(json.dumps(asdict(self), indent=1, allow_nan=False), encoding="utf-8")
 
 
-def estimated(joint: Joint, h: History, informed: dict[str, bool]) -> dict[str, dict[str, Any]]:
-    """The last value of each quantity in the FMU's units."""
+def passes(checks: tuple[Check, ...]) -> bool:
+    """Whether the NIS could be tested, and all tests are passed."""
+    return any(c.check == NIS for c in checks) and all(c.passed for c in checks)
+
+
+def doubt(checks: tuple[Check, ...]) -> str:
+    """Which tests fail, with what against what is expected, and what follows for the standard errors."""
+    nis = next((c for c in checks if c.check == NIS), None)
+    if nis is None:
+        return "not tested against the record: it has too few innovations, so the error may be wrong"
+    said, low, high = [], *nis.limit
+    if not nis.passed:
+        said.append(f"NIS {nis.value:.4g}, expected {low:.4g} to {high:.4g}")
+    remembering = [c for c in checks if c is not nis and not c.passed]
+    if remembering:
+        names = ", ".join(c.check.removeprefix(WHITENESS) for c in remembering)
+        least = min(remembering, key=lambda c: c.value)
+        said.append(
+            f"innovations of {names} correlated in time (p = {least.value:.2g}, "
+            f"expected above {least.limit[0]:.2g})"
+        )
+    wrong = "is too small"
+    if nis.value < low:
+        wrong = "cannot be relied on" if remembering else "is too large"
+    return f"not consistent with the record: {'; '.join(said)}; so the error {wrong}"
+
+
+def estimated(
+    joint: Joint, h: History, informed: dict[str, bool], bounds: dict[str, str]
+) -> dict[str, dict[str, Any]]:
+    """The last value of each quantity in the FMU's units; bounds: on which side one lies at its bound."""
     if not len(h.t):
         return {}
     kinds = ["state"] * len(joint.states) + ["parameter"] * len(joint.parameters)
@@ -80,6 +124,7 @@ def estimated(joint: Joint, h: History, informed: dict[str, bool]) -> dict[str, 
             "std_error": float(std[0, i]),
             "band_95": [float(low[i]), float(high[i])],
             **({"informed_by_data": informed[name]} if name in informed else {}),
+            **({"at_bound": bounds[name]} if name in bounds else {}),
         }
         for i, (name, kind) in enumerate(zip(h.names, kinds, strict=True))
     }

@@ -17,6 +17,8 @@ from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
+from fmus.model import declared
+from fmus.models import model_class
 from scenarios.estimating.unknowns import (
     check_options,
     inputs_of,
@@ -24,7 +26,7 @@ from scenarios.estimating.unknowns import (
     states_of,
     usual,
 )
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.declaration import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
 MIN_SAMPLES = 10
@@ -84,6 +86,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     names = tuple(e.estimate.states) if e.estimate else ()
     states = names or _needed(archive, values, s, record)
     _check_alarms(e, options, (*states, *(u.name for u in (*parameters, *unknown))))
+    options = with_alarms(e, options)
     s, run_of = _fine_enough(archive, values, record, states, noise, every, options.input_parts)
     nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
     return Setup(
@@ -111,10 +114,22 @@ def _check_measured(e: Experiment, record: Record, s: Samples) -> None:
 
 def _check_alarms(e: Experiment, options: Options, estimated: tuple[str, ...]) -> None:
     """Alarms that were asked for must be about something that is estimated."""
-    for name in options.alarms if "alarms" in options.model_fields_set else ():
+    for name in options.alarms:
         if name not in estimated:
             where = f"{e.file}: [estimate.options] alarms '{name}'"
             raise BadInput(f"{where} is not estimated; {did_you_mean(name, estimated)}")
+
+
+def with_alarms(e: Experiment, options: Options) -> Options:
+    """The options with the alarms that the model declares, where they have none; a foreign FMU has none."""
+    if e.model is None or "alarms" in options.model_fields_set:
+        return options
+    alarms = {
+        name: Alarm(below=v.alarm_below, above=v.alarm_above)
+        for name, v in declared(model_class(e.model)).items()
+        if v.alarm_below is not None or v.alarm_above is not None
+    }
+    return options.model_copy(update={"alarms": alarms})
 
 
 def noise_of(record: Record) -> Array:

@@ -148,7 +148,8 @@ class Options(Table):
 
     process_std: noise that drives a state, its unit/sqrt(s). walk: how far a parameter wanders in a second,
     its unit/sqrt(s). initial_std: what is known of a state's start. damping: of an unknown input's process.
-    input_parts: in how many parts inputs act between two samples.
+    input_parts: in how many parts inputs act between two samples. alarms: in place of those that the model
+    declares.
     """
 
     filter: Literal["ukf", "ekf", "dual"] = "ukf"
@@ -165,7 +166,7 @@ class Options(Table):
     alpha: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0
     beta: Number = 2.0
     kappa: Number = 0.0
-    alarms: dict[str, Alarm] = {"mu0": Alarm(below=0.15)}
+    alarms: dict[str, Alarm] = {}
 
 
 class Estimate(Table):

@@ -7,11 +7,12 @@ import numpy as np
 from scipy.stats import norm
 
 from estimator.record import Array
+from fmus.contact.forces.friction import CRITICAL
 from scenarios.estimating.result import stretches
 from scenarios.experiment.declaration import Alarm
 from scenarios.literature.following import Followed
 from scenarios.literature.friction_ukf import CASES as CONDITIONS
-from scenarios.literature.friction_ukf import CRITICAL, task
+from scenarios.literature.friction_ukf import task
 from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.row import Measured, Row, Tell

@@ -197,6 +197,7 @@ def _figure(case: Case, true: Curves, found: Curves, low: Array, high: Array) ->
 NOTES = (
     "Profiles are S1002 on 60E1 1:40; the source has a worn P8 on a 113A rail, which are not public.",
     "Alignment is known, as in the source; gauge is not, and what it does makes the region.",
+    "The source's Fig. 7 has the sum of the radii within that region; it draws no other combination.",
 )
 
 ROW = Row(

@@ -14,7 +14,12 @@ from scenarios.literature import profile_rls as profile
 from scenarios.literature import rolling_radius as radius
 from scenarios.literature import secondary_stiffness as secondary
 from scenarios.literature.case import Case, Record, recorded
-from scenarios.literature.following import first_below, follow, rmse
+from scenarios.literature.following import (
+    Followed,
+    first_below,
+    follow,
+    rmse,
+)
 from scenarios.literature.outcome import Finding, Outcome, table
 from scenarios.literature.row import Row
 from scenarios.literature.twin import twin
@@ -247,6 +252,24 @@ def test_the_radius_is_found_with_a_wrong_patch(start):
     found = radius.followed(truth(case), case, start, fmu_of("rolling_radius"))
     late = found.t > 1.0
     assert rmse(found.value["r_w"][late], np.full(late.sum(), radius.TRUE)) < 1e-4
+
+
+def test_the_primary_springs_filter_finds_the_patch_as_its_source_does():
+    """By virtual penetration, as the record has it; with Hertz's patch the record is far less likely."""
+    case = case_of("primary_stiffness", "static", duration=4.0)
+    record, own = truth(case), primary.task(fmu_of("primary_stiffness"))
+    hertz = replace(own, declared={**own.declared, "patch": 0.0})
+    assert case.true["patch"] == 1.0
+    assert own.known(record).log_likelihood > hertz.known(record).log_likelihood + 100.0
+
+
+def test_the_sources_crossing_stands_only_where_it_gives_one():
+    t = np.arange(0.0, 75.0, 0.5)
+    lost = Followed(t, {"mu0": np.full_like(t, 0.1)}, {"mu0": np.full_like(t, 0.01)}, 0.0, 4.0, 1.0)
+    record = Record({"time": t})
+    for case in (c for c in friction.CASES if c.later):
+        (found,) = (f for f in friction._judged(case, record, "c", lost) if "below 0.15 after" in f.what)
+        assert found.source == (25.0 if case.name.startswith("dry") else None)
 
 
 @pytest.mark.slow

@@ -47,13 +47,16 @@ def of_wheelset(case: Case) -> Record:
     rng, t = np.random.default_rng(case.seed), case.times
     lead = round(case.lead / case.dt)
     whole = wheelset.random_alignment(rng, np.arange(-lead, len(t)) * case.dt, case.speed)
+    true = dict(case.true)
+    form = wheelset.Form(penetration=true.pop("patch", 0.0) > 0)
     end = lead + len(t) - 1
     jump = min(lead + round(case.when / case.dt), end) if case.later else end
     parts, start = [], None
     for first, last in pairwise(sorted({0, jump, end})):
         new = case.later if first == jump else {}
-        now = replace(wheelset.Wheelset(), **{**case.true, **new})
-        parts.append(wheelset.simulate(piece(whole, first, last), now, start=start)[bool(parts) :])
+        now = replace(wheelset.Wheelset(), **{**true, **new})
+        states = wheelset.simulate(piece(whole, first, last), now, form=form, start=start)
+        parts.append(states[bool(parts) :])
         start = dict(zip(wheelset.COORDINATES, parts[-1][-1], strict=True))
     states = dict(zip(wheelset.COORDINATES, np.vstack(parts)[lead:].T, strict=True))
     middle = slice(2 * lead, None, 2)

@@ -28,6 +28,7 @@ from tests.truth.wheelset_contact import (
     contacts,
     hertz,
     kalker,
+    penetrated,
     wheel,
 )
 from tests.truth.wheelset_effects import (
@@ -80,6 +81,14 @@ def test_hertz_is_that_of_the_textbook_for_a_sphere():
     a, b = hertz(np.array([1.5]), np.array([1.5]))
     R, E = 1 / 3.0, wheelset_contact.G / (1 - wheelset_contact.NU)
     assert_allclose([a[0], b[0]], np.cbrt(3 * 55e3 * R / (4 * E)), rtol=1e-6)
+
+
+def test_virtual_penetration_of_a_sphere_is_a_larger_circle_than_hertzs():
+    """By a² = R delta of Hertz and a² = 0.55 delta 2 R of the thesis' eq. 3.43."""
+    A = np.array([1.5])
+    assert_allclose(penetrated(A, A)[0] / hertz(A, A)[0], np.sqrt(1.1), rtol=1e-6)
+    a, b = penetrated(np.array([1.0]), np.array([4.0]))
+    assert_allclose(a / b, 2.0, rtol=1e-9)
 
 
 def test_kalkers_coefficients_at_their_own_poisson_ratio_are_the_table():

@@ -29,6 +29,7 @@ ETA = np.arange(-41.0, 45.0, 0.02)  # mm, places on the wheel
 SHIFTS = np.arange(-7.0, 7.001, 0.05)  # mm
 LAMBDA = 0.02  # mm, of the quasi-elastic weights
 G, NU, LOAD = 8e10, 0.28, 55e3
+LINDER = 0.55  # overlap over Hertz's approach, thesis 3.2.2
 FLATTEST = 0.05  # 1/m
 
 # Kalker 1990, Table E.3: c11, c22, c23, c33 for nu = 0, 0.25, 0.5; a/b = 0.1 ... 1, then b/a = 0.9 ... 0.1
@@ -140,7 +141,19 @@ def kalker(ratio: Array, nu: float = NU) -> Array:
 
 
 def hertz(A: Array, B: Array, load: float = LOAD) -> tuple[Array, Array]:
-    """Semi-axes along and across (n,), m, for surfaces A x² + B y² apart; halving on the axes' ratio."""
+    """Semi-axes along and across (n,), m, for surfaces A x² + B y² apart."""
+    minor, k, _ = ellipse(A, B, load)
+    return np.where(A <= B, minor / k, minor), np.where(A <= B, minor, minor / k)
+
+
+def penetrated(A: Array, B: Array, load: float = LOAD) -> tuple[Array, Array]:
+    """Semi-axes along and across (n,), m, of the area that 0.55 of Hertz's approach overlaps (eq. 3.43)."""
+    _, _, approach = ellipse(A, B, load)
+    return np.sqrt(LINDER * approach / A), np.sqrt(LINDER * approach / B)
+
+
+def ellipse(A: Array, B: Array, load: float) -> tuple[Array, Array, Array]:
+    """Minor semi-axis, m, its ratio to the major one, and Hertz's approach, m; halving on that ratio."""
     flat, steep = np.minimum(A, B), np.maximum(A, B)
     low, high = np.full_like(flat, 1e-4), np.full_like(flat, 1 - 1e-12)
     for _ in range(60):
@@ -149,15 +162,18 @@ def hertz(A: Array, B: Array, load: float = LOAD) -> tuple[Array, Array]:
         ratio = (K - E) / (E / k**2 - K)
         low, high = np.where(ratio < flat / steep, k, low), np.where(ratio < flat / steep, high, k)
     k = (low + high) / 2
-    E = ellipe(1 - k**2)
+    K, E = ellipkm1(k**2), ellipe(1 - k**2)
     modulus = G / (1 - NU)  # of both bodies together, E/(2 (1 - nu²))
     minor = np.cbrt(3 * k * E * load / (2 * np.pi * modulus * (A + B)))
-    return np.where(A <= B, minor / k, minor), np.where(A <= B, minor, minor / k)
+    return minor, k, 3 * load * K * k / (2 * np.pi * modulus * minor)
 
 
 @lru_cache(maxsize=8)
-def contacts(smoothed: float = LAMBDA) -> Contacts:
-    """Contacts at SHIFTS. smoothed: mm, weight of the curvatures' mean, LAMBDA as for the place."""
+def contacts(smoothed: float = LAMBDA, penetration: bool = False) -> Contacts:
+    """Contacts at SHIFTS. smoothed: mm, weight of the curvatures' mean, LAMBDA as for the place.
+
+    penetration: semi-axes by virtual penetration instead of Hertz's.
+    """
     phi = rolls(SHIFTS)
     gap, bend = gaps(SHIFTS, phi)
     _, slope, second = wheel(ETA)
@@ -169,5 +185,5 @@ def contacts(smoothed: float = LAMBDA) -> Contacts:
     grown, steep, _ = wheel(eta)
     delta = np.arctan(-steep)
     A = 1e3 * np.cos(delta) / (2 * (R0 + grown))
-    a, b = hertz(A, np.maximum(B, FLATTEST))
+    a, b = (penetrated if penetration else hertz)(A, np.maximum(B, FLATTEST))
     return Contacts(SHIFTS / 1e3, grown / 1e3, delta, phi, a, b)

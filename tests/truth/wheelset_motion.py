@@ -69,12 +69,14 @@ class Form:
     """Small differences of form that real wheelsets have from the model; the default has none.
 
     smoothed: mm, of the weights in the mean of curvatures; spin_reduced: c23 in the spin force times
-    (k_A + k_S)/2; moment: whether the contacts' spin moments act.
+    (k_A + k_S)/2; moment: whether the contacts' spin moments act; penetration: semi-axes by virtual
+    penetration instead of Hertz's.
     """
 
     smoothed: float = LAMBDA
     spin_reduced: bool = False
     moment: bool = True
+    penetration: bool = False
 
 
 DECLARED = Wheelset()
@@ -83,9 +85,9 @@ OTHER = Form(smoothed=0.04, spin_reduced=True)
 
 
 @lru_cache(maxsize=4)
-def table(smoothed: float, load: float) -> tuple[float, list[Row]]:
+def table(smoothed: float, load: float, penetration: bool = False) -> tuple[float, list[Row]]:
     """First shift, m, and rows of contact at every FINE of shift: growth, delta, a, b, c11 to c33."""
-    c = contacts(smoothed)
+    c = contacts(smoothed, penetration)
     fine = np.arange(c.y[0], c.y[-1], FINE)
     size = np.cbrt(load / LOAD)
     columns = [PchipInterpolator(c.y, v)(fine) for v in (c.growth, c.delta, size * c.a, size * c.b)]
@@ -143,7 +145,7 @@ def contact_forces(
     shift, shift_dot, psi, y_dot, psi_dot = motion
     mu0, A, B, k_A, k_S = friction
     spin = (k_A + k_S) / 2 if form.spin_reduced else 1.0
-    start, rows = table(form.smoothed, p.F_n)
+    start, rows = table(form.smoothed, p.F_n, form.penetration)
     phi, slope = looked_up(*roll_table(), shift)
     phi_dot = slope * shift_dot
     F, M = 0.0, 0.0
