@@ -10,7 +10,7 @@ from fmus.errors import BadInput
 from fmus.models import MODELS
 from fmus.wheelset.model import Wheelset
 from fmus.wheelset.track import Track
-from scenarios.cli.app import profiles_read
+from scenarios.cli.build import profiles_read
 from tests.helpers.profile_files import points_of, write_points
 
 

@@ -179,7 +179,7 @@ def test_help_is_there(command: str, capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_installed_command_answers_with_its_exit_code(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "scenarios.cli.app", "close-loop", str(tmp_path / "nowhere")]
+    command = [sys.executable, "-m", "scenarios.cli", "close-loop", str(tmp_path / "nowhere")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1

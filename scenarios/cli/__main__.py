@@ -1,0 +1,5 @@
+"""`python -m scenarios.cli` is the command `railfmi`."""
+
+from scenarios.cli.app import main
+
+main()

@@ -1,0 +1,23 @@
+"""`railfmi check`: grade an FMU."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from scenarios.cli.console import app
+
+
+@app.command()
+def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
+    """Grade an FMU for use here: validation, restart, repeatability, instances, state, tunables."""
+    from fmus.host.grading.check import grade
+
+    result = grade(fmu)
+    signs = {True: "[green]passed[/]", False: "[red]FAILED[/]", None: "[dim]not offered[/]"}
+    report = Console(highlight=False, soft_wrap=True)
+    for entry in result.checks:
+        report.print(f"{signs[entry.passed]:<24} {entry.title}: {entry.sentence}")
+    if not result.ok:
+        raise typer.Exit(1)

@@ -1,0 +1,66 @@
+"""`railfmi close-loop`: trace what a model lacks, in one experiment or several."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app, said
+
+
+@app.command("close-loop")
+def close_loop(
+    experiments: Annotated[
+        list[Path], typer.Argument(help="experiment.toml, or its folder; several get one table")
+    ],
+    out: Out = Path("out"),
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="processes; one a core by default")] = None,
+    seed: Annotated[int, typer.Option(help="of the simulated records without an effect")] = 0,
+    resume: Annotated[bool, typer.Option("--resume", help="go on with an interrupted run")] = False,
+) -> None:
+    """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
+
+    Several experiments are written to a folder each, with one table; where they use the same FMU, what one
+    shows is tested on the others and fitted to all. Ctrl-C keeps what is finished.
+    """
+    from scenarios.closing.lines import lines_of, table_of
+
+    if len(experiments) == 1:
+        from scenarios.closing.closing import close_loop as run
+
+        try:
+            with said.status("reading the experiment") as status:
+                result = run(experiments[0], out, data, status.update, jobs, seed, resume)
+        except KeyboardInterrupt:
+            said.print("railfmi: interrupted; the same command with --resume goes on from here")
+            raise typer.Exit(130) from None
+        for line in lines_of(result):
+            typer.echo(line)
+        typer.echo(f"report: {out / 'report.html'}")
+        return
+    from scenarios.closing.several import close_loops as run_all
+
+    with said.status("reading the experiments") as status:
+        found = run_all(
+            experiments,
+            out,
+            data,
+            status.update,
+            lambda r: typer.echo(f"{r.experiment}: {r.verdict} ({r.wall_seconds:.0f} s)"),
+            jobs,
+            seed,
+            resume,
+        )
+    if found.results:
+        for line in table_of(found):
+            typer.echo(line)
+        typer.echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
+    if found.interrupted:
+        said.print(
+            f"railfmi: interrupted; {len(found.results)} of {len(experiments)} experiments are finished; "
+            "the same command with --resume goes on from here"
+        )
+        raise typer.Exit(130)

@@ -1,0 +1,30 @@
+"""`railfmi compare`: two FMUs side by side."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app, said
+
+
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="FMU file")],
+    b: Annotated[Path, typer.Argument(help="the other FMU file")],
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml whose inputs and parameters both get")],
+    out: Out = Path("out"),
+    tolerance: Annotated[float, typer.Option(help="relative difference that is accepted")] = 1e-9,
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
+    ] = None,
+) -> None:
+    """Run two FMUs side by side and report where they differ: exit 1 if by more than the tolerance."""
+    from scenarios.comparing.comparing import compare as side_by_side
+
+    with said.status("reading the experiment") as status:
+        found = side_by_side(a, b, experiment, out, tolerance, data, tell=status.update)
+    for line in found.lines():
+        typer.echo(line)
+    if not found.ok:
+        raise typer.Exit(1)

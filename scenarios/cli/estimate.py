@@ -1,0 +1,38 @@
+"""`railfmi estimate`: states, parameters and unknown inputs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app, said
+
+
+@app.command()
+def estimate(
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
+    out: Out = Path("out"),
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
+    ] = None,
+) -> None:
+    """Estimate states, parameters and unknown inputs of an FMU: exit 1 if its own tests reject the filter."""
+    from scenarios.estimating.estimating import estimate as filtered
+
+    with said.status("reading the experiment") as status:
+        result = filtered(experiment, out, data, tell=status.update)
+    for name, found in result.estimated.items():
+        spread, unit = found["std_error"], found["unit"] or ""
+        bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
+        typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound)
+    if result.doubt:
+        typer.echo(result.doubt)
+    for alarm in result.alarms:
+        end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
+        likely = f"probability {alarm.probability:.3f}"
+        typer.echo(f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, {likely}")
+    if result.diverged:
+        typer.echo(f"diverged: {result.reason}")
+    typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
+    if not result.consistent:
+        raise typer.Exit(1)

@@ -1,0 +1,36 @@
+"""`railfmi export-ssp`: a scenario for other tools."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fmus.errors import BadInput
+from scenarios.cli.console import app, said
+
+
+@app.command("export-ssp")
+def export_scenario(
+    scenario: Annotated[Path, typer.Argument(help="scenario file")],
+    out: Annotated[Path, typer.Option("--out", help="folder, or a file ending in .ssp")] = Path("out"),
+    kind: Annotated[str, typer.Option(help="of the FMUs: native or python")] = "native",
+    variant: Annotated[str | None, typer.Option(help="of the scenario; its first by default")] = None,
+    fmi: Annotated[int, typer.Option(help="FMI version, 2 or 3; 3 is native")] = 2,
+    platform: Annotated[list[str] | None, typer.Option(help="of native FMUs; see build")] = None,
+) -> None:
+    """Write a scenario as an SSP 1.0 package that other tools open."""
+    from scenarios.exchange import export_ssp
+
+    if kind not in ("native", "python"):
+        raise BadInput(f"--kind {kind}: 'native' and 'python' are built")
+    with said.status("reading the scenario") as status:
+        package = export_ssp(
+            scenario,
+            out,
+            "native" if kind == "native" else "python",
+            variant,
+            fmi,
+            platform or (),
+            status.update,
+        )
+    typer.echo(package)

@@ -1,0 +1,20 @@
+"""`railfmi import-ssp`: a package of another tool as a scenario."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app, said
+
+
+@app.command("import-ssp")
+def import_package(
+    package: Annotated[Path, typer.Argument(help="SSP package (.ssp)")], out: Out = Path("out")
+) -> None:
+    """Read an SSP package as a scenario folder that `railfmi run` runs."""
+    from scenarios.exchange import import_ssp
+
+    with said.status("reading the package") as status:
+        scenario = import_ssp(package, out, status.update)
+    typer.echo(scenario)

@@ -1,0 +1,36 @@
+"""`railfmi run`: scenarios, and whether what must come true does."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app, said
+
+
+@app.command("run")
+def run_scenarios(
+    scenarios: Annotated[list[Path], typer.Argument(help="scenario files; several get a contact sheet")],
+    out: Out = Path("out"),
+    watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
+) -> None:
+    """Run scenarios and see whether what must come true does: exit 1 if not. Ctrl-C keeps the record."""
+    from scenarios.simulating import Result, run_all
+
+    def done(result: Result) -> None:
+        held = sum(finding.holds for finding in result.expectations)
+        if result.interrupted_at is not None:
+            typer.echo(f"{result.id}: broken off at {result.interrupted_at:g} s; what was recorded is kept")
+        else:
+            took = f"{result.wall_seconds:.1f} s"
+            typer.echo(f"{result.id}: {held} of {len(result.expectations)} came true ({took})")
+        for finding in result.failed:
+            typer.echo(f"  not: {finding.sentence}; {finding.because}")
+
+    with said.status("reading the scenarios") as status:
+        results = run_all(scenarios, out, status.update if watch else (lambda _: None), done)
+    typer.echo(f"results: {out}")
+    if any(r.interrupted_at is not None for r in results):
+        raise typer.Exit(130)
+    if not all(r.ok for r in results):
+        raise typer.Exit(1)
