@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.allowed import allowed
-from estimator.closeloop.decision.detect import LEVEL, detect
+from estimator.closeloop.decision.detect import detect
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.verdict import (
     Judgement,
@@ -68,7 +68,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
         ),
     )  # fmt: skip
     tell("honesty", "working out what else would explain, and what could have been seen")
-    level = LEVEL / len(detection.figures)
+    level = detection.level / len(detection.figures)
     owed = stages.done(
         "honesty",
         lambda: honesty(problem, base, shown.fit, change, size, level, np.random.default_rng(seed)),

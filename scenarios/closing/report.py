@@ -114,7 +114,7 @@ def _rejection(case: Case) -> Values:
         "best": hypothesis_words(case.found.chosen or case.found.base),
         "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
         "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
-        "detection": detection_words(case.found),
+        "detection": detection_words(case.problem, case.found),
         "chance": chance_words(case.found, case.honesty) if case.honesty else "",
         "black_box": case.honesty.black_box if case.honesty else None,
         "power": power_rows(case),

@@ -1,13 +1,13 @@
 """A law that is named is the curve that the force follows, not one that comes near it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import (
-    FASTEST,
     another,
     confirmed,
     curvature,
@@ -16,7 +16,7 @@ from estimator.closeloop.decision.law_form import (
 from estimator.closeloop.decision.verdict import Judgement
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.scores import CURVE
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.search.screened import screened
 from estimator.closeloop.search.search import Search
@@ -31,6 +31,8 @@ from tests.helpers.carriage import (
     to_and_fro,
     viscous,
 )
+
+NOTICED = DEFAULT.decision.noticed
 
 
 def root(bump: float, rebound: float) -> Force:
@@ -74,7 +76,7 @@ def asked(builder: ModelBuilder, resistance: Force, kind: str, seed: int) -> Tra
 def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
     traced = asked(builder, resistance, kind, seed)
     o, here = traced.found, traced.problem
-    assert max(curvature(here, o.singles[0], o.forces, o.size)) < CURVE
+    assert max(curvature(here, o.singles[0], o.forces, o.size)) < NOTICED
     assert confirmed(here, o.base, o.judgement, o.forces, o.size) is o.judgement
 
 
@@ -117,8 +119,8 @@ def test_where_the_form_is_open_it_is_asked_against_other_curves(builder, truth,
 @pytest.mark.parametrize(
     ("left", "own", "elsewhere", "closed", "opened"),
     [
-        (0, CURVE - 1, 0, False, False),
-        (0, CURVE + 1, 0, True, False),
+        (0, NOTICED - 1, 0, False, False),
+        (0, NOTICED + 1, 0, True, False),
         (0, 60, 0, True, False),  # of 29 000 that the law explains
         (0, 80, 0, True, True),
         (0, 80, 80, True, True),  # one port under two names
@@ -134,7 +136,8 @@ def test_an_open_form_may_leave_a_curve_that_is_little_of_it(left, own, elsewher
         Hypothesis((), Fit((), one[:0], np.eye(0), one * np.sqrt(squares / 1000), np.eye(1000, 0)), ())
         for squares in (3e4, 1000 + left)
     )
-    assert [another(h, base, own, elsewhere, form) for form in (False, True)] == [closed, opened]
+    asked = [SimpleNamespace(policy=DEFAULT, form_error=form) for form in (0.0, 0.02)]
+    assert [another(a, h, base, own, elsewhere) for a in asked] == [closed, opened]
 
 
 def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
@@ -192,7 +195,7 @@ def test_rounded_friction_is_named_where_any_other_curve_would_show(builder):
     traced = looked_at("one", here, ("coulomb_friction",))
     o, [h] = traced.found, traced.found.singles[:1]
     assert misnamed(h, o.forces)
-    assert not misnamed(h, o.forces, FASTEST)
+    assert not misnamed(h, o.forces, DEFAULT.decision.fastest)
     assert h.theta["coulomb_friction_carriage_v_s"] == pytest.approx(ROUNDED, rel=0.05)
     told = Judgement("traced", (h,), "it accounts for the residual")
     assert confirmed(here, o.base, told, o.forces, o.size) is told

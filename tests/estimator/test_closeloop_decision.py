@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.decision.detect import ONE_EFFECT, matters
+from estimator.closeloop.decision.detect import matters
 from estimator.closeloop.decision.equivalence import becomes, equivalent
 from estimator.closeloop.decision.verdict import (
     completes,
@@ -19,8 +19,8 @@ from estimator.closeloop.decision.verdict import (
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.scores import CURVE
 from estimator.closeloop.hypotheses.twins import limits
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
@@ -91,7 +91,9 @@ def test_an_open_form_leaves_what_is_like_no_effect_alone(rms, likeness, matter)
 def test_less_matters_where_the_form_is_open(a, b, likeness):
     if matters(asked(FORM), left(a, b), NOISE, likeness):
         assert matters(asked(), left(a, b), NOISE)
-    assert likeness >= ONE_EFFECT or not matters(asked(FORM), left(min(a, 5.9), min(b, 5.9)), NOISE, likeness)
+    assert likeness >= DEFAULT.detection.open_form_likeness or not matters(
+        asked(FORM), left(min(a, 5.9), min(b, 5.9)), NOISE, likeness
+    )
 
 
 @pytest.mark.parametrize(
@@ -232,7 +234,7 @@ def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(for
     one = simple.fit.residual
     complex_one = replace(complex_one, fit=replace(complex_one.fit, residual=left * one))
     denied = replace(simple, fit=replace(simple.fit, residual=np.sqrt(left**2 + 1.25) * one))
-    assert cost(denied) - cost(complex_one) > CURVE
+    assert cost(denied) - cost(complex_one) > DEFAULT.decision.noticed
     [only] = equivalent(asked(form), complex_one, [complex_one, denied], NOISE)
     assert only.candidates[0].kind == stays
 
@@ -304,8 +306,8 @@ def test_a_pair_leaves_little_of_what_a_single_effect_leaves(one, two, all_of_it
         h = left(1.0, 1.0)
         return replace(h, fit=replace(h.fit, residual=np.sqrt(mean_square) * h.fit.residual))
 
-    assert whole(fitted(two), [fitted(5.0), fitted(one)]) is all_of_it
-    assert whole(fitted(two), [])
+    assert whole(asked(), fitted(two), [fitted(5.0), fitted(one)]) is all_of_it
+    assert whole(asked(), fitted(two), [])
 
 
 def test_a_pair_becomes_a_simpler_one_in_either_order():

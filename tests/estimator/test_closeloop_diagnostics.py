@@ -434,7 +434,7 @@ def nameless(drive: ModelBuilder) -> tuple[Problem, Outcome, Hypothesis | None]:
     asked, base = base_of(drive_record(law, np.random.default_rng(12)), drive)
     forces = missing_forces(asked, {}, NOISE)
     found = free_form(asked, base, forces, NOISE, 1)
-    detection = Detection(0.006, {"size of the held-out residual": 50.0}, True)
+    detection = Detection(0.01, 0.006, {"size of the held-out residual": 50.0}, True)
     told = Judgement("unexplained", (), "nothing fits")
     return asked, Outcome(base, base, NOISE, NOISE, detection, tuple(forces), (), (base,), (), told), found
 

@@ -16,6 +16,7 @@ from estimator.closeloop.fitting.slopes import FINE, STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Run
 
@@ -27,6 +28,8 @@ BESIDE = 0.25  # N/m too stiff a start, from which the usual differences do not 
 
 class Swinging:
     """A spring that has swung so often that a difference of the usual step is turns of it away."""
+
+    policy = DEFAULT
 
     free_states = ()
 

@@ -17,6 +17,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.hypotheses.twins import twins, with_twins
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.grouped import group_size, grouped
 from estimator.closeloop.screening.linear import (
@@ -30,7 +31,7 @@ from estimator.closeloop.screening.regressors import Calibration
 from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search.lookalikes import lookalikes
-from estimator.closeloop.search.nomination import NEXT, overlooked
+from estimator.closeloop.search.nomination import overlooked
 from estimator.closeloop.search.onset import BLOCKS, onset
 from estimator.plant import between
 from estimator.record import Record, Run
@@ -60,8 +61,8 @@ def test_constant_changes_that_calibration_may_hide_are_tried_too():
     def promise(kind, location, gain):
         return Promise((candidate(kind, location),), gain, {})
 
-    tried = [promise("viscous_damping", "contact", 900.0)]
-    others = [promise("hysteresis", f"place_{i}", 800.0 - i) for i in range(NEXT + 3)]
+    tried, more = [promise("viscous_damping", "contact", 900.0)], DEFAULT.search.overlooked_more
+    others = [promise("hysteresis", f"place_{i}", 800.0 - i) for i in range(more + 3)]
     hidden = [promise("parameter_offset", "m_w", 90.0), promise("actuator_gain", "V", 70.0)]
     rest = [
         promise("parameter_offset", "m_w", 60.0),  # another shape of one that is there
@@ -69,8 +70,8 @@ def test_constant_changes_that_calibration_may_hide_are_tried_too():
         promise("sensor_gain", "y", 80.0),
         promise("parameter_offset", "A", 1.0),  # noise makes as much
     ]
-    found = overlooked([*tried, *others, *hidden, *rest], tried, {"mu0"})
-    assert found == [*hidden, *others[:NEXT]]
+    found = overlooked(DEFAULT, [*tried, *others, *hidden, *rest], tried, {"mu0"})
+    assert found == [*hidden, *others[:more]]
 
 
 # ---- inputs between samples
@@ -269,6 +270,8 @@ def test_effects_that_act_alike_are_named_together():
 class Columns:
     """Answers a candidate with its column."""
 
+    problem = SimpleNamespace(policy=DEFAULT)
+
     known: dict[str, np.ndarray]
 
     def changes(self, candidates):
@@ -312,6 +315,8 @@ def test_at_another_place_a_law_is_looked_at_in_the_shape_that_it_has():
     )
 
     class Asked:
+        problem = SimpleNamespace(policy=DEFAULT)
+
         def changes(self, candidates):
             return [np.full((9, 1), c.shape[0].start) for c in candidates]
 
@@ -357,7 +362,7 @@ class Line:
     t: np.ndarray
     y: np.ndarray
     builder: None = None
-    record, free_states = SimpleNamespace(floor_known=True), ()
+    record, free_states, policy = SimpleNamespace(floor_known=True), (), DEFAULT
 
     def identify_residual(self, theta):
         return (self.y - theta["a"] * self.t)[:, None]
@@ -373,8 +378,8 @@ def test_what_sets_in_is_noticed_and_what_was_before_is_found(share, seed):
     t = np.linspace(0.0, 10.0, 5000)
     y = 2.0 * t + 0.1 * np.random.default_rng(seed).standard_normal(len(t))
     base = Hypothesis((), replace(nothing_calibrated(t), unknowns=(Unknown("a", 1.0, -9.0, 9.0, 1.0),)), ())
-    assert onset(Line(t, y), base, np.array([0.1])) is None
-    found = onset(Line(t, y + 3.0 * (t > 10.0 * share)), base, np.array([0.1]))
+    assert onset(Line(t, y), base, np.array([0.1]), DEFAULT.search.sets_in_times) is None
+    found = onset(Line(t, y + 3.0 * (t > 10.0 * share)), base, np.array([0.1]), DEFAULT.search.sets_in_times)
     assert found is not None
     assert abs(found[0] - share) <= 1.0 / BLOCKS
     assert found[1].theta["a"] == pytest.approx(2.0, abs=0.1)

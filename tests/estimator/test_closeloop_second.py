@@ -18,11 +18,11 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.scores import (
-    CURVE,
     best_by_label,
     lead,
     ranked,
 )
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.screen import Screening
@@ -39,22 +39,24 @@ from tests.helpers.carriage import (
     to_and_fro,
 )
 
+LIMITS = DEFAULT.search
+
 # ---- what sets in
 
 
 @given(st.integers(6, 44), st.floats(12.0, 50.0), st.integers(0, 99))
 def test_growth_is_dated(k, times, seed):
     squares = np.random.default_rng(seed).chisquare(40, 50) / 40
-    assert grown(squares, 5) is None
+    assert grown(squares, 5, LIMITS.sets_in_times, LIMITS.sets_in_chance) is None
     squares[k:] *= times
-    assert grown(squares, 5) == pytest.approx(k, abs=1)
-    assert grown(squares, 5, 2 * times) is None
+    assert grown(squares, 5, LIMITS.sets_in_times, LIMITS.sets_in_chance) == pytest.approx(k, abs=1)
+    assert grown(squares, 5, 2 * times, LIMITS.sets_in_chance) is None
 
 
 def test_a_single_burst_does_not_set_in():
     squares = np.ones(50) + 0.01 * np.arange(50) % 0.05
     squares[30] = 400.0
-    assert grown(squares, 5) is None
+    assert grown(squares, 5, LIMITS.sets_in_times, LIMITS.sets_in_chance) is None
 
 
 @given(st.floats(0.0, 0.5), st.floats(0.6, 1.0), st.floats(0.0, 1.0), st.floats(-50.0, 50.0))
@@ -105,7 +107,7 @@ def test_a_law_and_its_limits_are_over_the_same_motion_or_none(kind):
     assert {EFFECTS[other].over for other in limits} <= {EFFECTS[kind].over}
 
 
-@pytest.mark.parametrize(("before", "enough"), [(9e3, CURVE), (5e6, 5e3)])
+@pytest.mark.parametrize(("before", "enough"), [(9e3, DEFAULT.decision.noticed), (5e6, 5e3)])
 @pytest.mark.parametrize(
     ("richer", "counts"),
     [
@@ -118,7 +120,10 @@ def test_a_law_and_its_limits_are_over_the_same_motion_or_none(kind):
 def test_a_law_is_outgrown_where_more_gains_much_more_than_chance(before, enough, richer, counts):
     simple, base = several(("coulomb_friction", "wheel"), squares=2e4), several(squares=2e4 + before)
     for gain, expected in ((0.0, False), (0.9 * enough, False), (1.1 * enough, counts)):
-        assert outgrown(simple, several(*richer, squares=2e4 - gain), base) is expected
+        assert (
+            outgrown(SimpleNamespace(policy=DEFAULT), simple, several(*richer, squares=2e4 - gain), base)
+            is expected
+        )
 
 
 class Seen:
@@ -147,7 +152,7 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch,
     found = Fit(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
     fitted = []
     monkeypatch.setattr(pairs, "hypotheses", lambda _p, _b, promises, *_: fitted.extend(promises) or [])
-    beside(None, None, Hypothesis((best,), found, ()), Seen(), change, least, 1)
+    beside(SimpleNamespace(policy=DEFAULT), None, Hypothesis((best,), found, ()), Seen(), change, least, 1)
     assert [p.candidates[1].label for p in fitted] == asked
     assert all(p.candidates[0] is best for p in fitted)
 
@@ -178,6 +183,8 @@ def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_sugg
 
 class Swinging:
     """A force that sets in on an oscillator; the sum of squares over its moment has a minimum a swing."""
+
+    policy = DEFAULT
 
     def __init__(self, moment: float) -> None:
         t = np.linspace(0.0, 20.0, 4000)
@@ -220,6 +227,8 @@ def test_a_moment_some_swings_off_is_found(moment, off):
 
 class Saturating:
     """An effect F on an output, and friction c that shows in the held-out part alone."""
+
+    policy = DEFAULT
 
     def __init__(self, seed: int) -> None:
         t = np.arange(0.0, 60.0, 0.02)

@@ -116,7 +116,7 @@ def looked_at(name: str, asked: Problem, kinds: Sequence[str], quiet: bool = Fal
     singles = ranked(asked, finished(asked, base.fit.unknowns, promises, size, 1), size)
     none = Judgement("no_discrepancy", (), "nothing")
     said = none if quiet else judge(asked, base, singles, (), noise, size)
-    detection = Detection(0.0, {}, True)
+    detection = Detection(0.01, 0.0, {}, True)
     found = (declared, base, noise, size, detection, tuple(forces), tuple(promises), tuple(singles), ())
     return Traced(name, asked, Outcome(*found, said))
 

@@ -13,14 +13,11 @@ from scipy.optimize import least_squares
 
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
-from estimator.closeloop.hypotheses.scores import CHANCE, leaves_noise, ranked
+from estimator.closeloop.hypotheses.scores import leaves_noise, ranked
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-APART = 20.0  # log score between them, from which the part to choose tells what the other does not
-MOST = 8  # laws that are looked at
-REACH = 3.0  # standard errors, that a value may be moved by
 STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
 
 
@@ -29,7 +26,10 @@ def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[
 
     Only their residuals differ, and only where the part to choose sets them apart or from noise.
     """
-    alike = [h for h in found if problem.record.floor_known and leaves_noise(h)][:MOST]
+    limits = problem.policy.decision
+    alike = [h for h in found if problem.record.floor_known and leaves_noise(problem, h)][
+        : limits.errors_laws
+    ]
     if not alike or not _set_apart(problem, alike, size):
         return list(found)
     moved = {id(h): _as_errors_allow(problem, h, size) for h in alike}
@@ -37,9 +37,11 @@ def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[
 
 
 def _set_apart(problem: Problem, alike: Sequence[Hypothesis], size: Array) -> bool:
+    limits = problem.policy
     scores = [float(h.scores(problem, size).sum()) for h in alike]
     samples = alike[0].of(problem, "choose").size
-    return max(scores) - min(scores) > APART or -2 * max(scores) > samples + CHANCE * np.sqrt(2 * samples)
+    worst = samples + limits.detection.chance * np.sqrt(2 * samples)
+    return max(scores) - min(scores) > limits.decision.errors_apart or -2 * max(scores) > worst
 
 
 def _as_errors_allow(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
@@ -65,8 +67,8 @@ def _as_errors_allow(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis
 
     low, high = (np.array([getattr(u, side) for u in unknowns]) for side in ("low", "high"))
     inside = (
-        np.clip((low - best) / error, -REACH, -NUDGE),
-        np.clip((high - best) / error, NUDGE, REACH),
+        np.clip((low - best) / error, -problem.policy.decision.errors_reach, -NUDGE),
+        np.clip((high - best) / error, NUDGE, problem.policy.decision.errors_reach),
     )
     try:
         z = least_squares(misfit, np.zeros(len(best)), slopes, inside, max_nfev=STEPS).x

@@ -17,24 +17,18 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 
-REPLICATES = 499
-LEVEL = 0.01  # probability of calling noise a discrepancy
-SLOW_BLOCKS = 40  # pieces of what no fit has seen, whose means show slow residuals
-SHARE = 0.02  # of an output's rms, and
 LIKENESS = "likeness to an effect"
-BEYOND = 0.5  # times its noise: less than both beyond the noise does not matter
-SLIGHT = 0.2  # times its noise: the same of what is like an effect
-CLEAR = 20.0  # times the bootstrap's 95 % point: from this likeness on it is; records without any come to 6
-CHANCE = 3.0  # standard deviations of the mean square of white noise
-NOISES = 2.0  # times its noise, where the FMU's form leaves something open: less does not matter,
-ONE_EFFECT = 0.2  # unless one effect could explain this share of it; other forms are like no effect
 
 
 @dataclass(frozen=True)
 class Detection:
-    """p_value: of the most telling figure, corrected for their number; figures: observed over the
-    bootstrap's 95 % point; material: whether the residual is large enough to matter."""
+    """Whether a residual is more than noise, and whether it matters.
 
+    p_value: of the most telling figure, corrected for their number, which counts below `level`; figures:
+    observed over the 95 % point of noise; material: whether the residual is large enough to matter.
+    """
+
+    level: float
     p_value: float
     figures: Mapping[str, float]
     material: bool
@@ -42,7 +36,7 @@ class Detection:
     @property
     def detected(self) -> bool:
         """More than noise."""
-        return self.p_value < LEVEL
+        return self.p_value < self.level
 
 
 def detect(
@@ -54,33 +48,34 @@ def detect(
     screened: its fit as it was screened, residual over `noise`; regressors: changes (m, k) of that residual;
     likeness, sets_in: see `matters`.
     """
+    limits = problem.policy.detection
     runs = problem.record.runs
     fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
     left = np.concatenate(base.residuals)[unseen] / noise
     slopes = _sensitivities(problem, base, noise)
     g = _directions(screened.jacobian, regressors) if regressors else None
-    observed = _figures(left)
+    observed = _figures(left, limits.slow_blocks)
     n = slopes.shape[2]
     # noise in the part to identify moves the unknowns by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(slopes[fitted].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
     late, copies = slopes[unseen], []
-    for _ in range(REPLICATES):
+    for _ in range(limits.replicates):
         e = rng.standard_normal(left.shape)
         if n:
             e -= late @ (root @ rng.standard_normal(root.shape[1]))
-        copies.append(_figures(e))
+        copies.append(_figures(e, limits.slow_blocks))
     references = {name: np.array([c[name] for c in copies]) for name in observed}
     if g is not None:
         observed[LIKENESS] = float(np.max((g.T @ screened.residual) ** 2))
-        references[LIKENESS] = _likeness_of_noise(g, rng)
+        references[LIKENESS] = _likeness_of_noise(g, limits.replicates, rng)
     p_values, figures = [], {}
     for name, value in observed.items():
         reference = references[name]
-        p_values.append((1 + np.sum(reference >= value)) / (REPLICATES + 1))
+        p_values.append((1 + np.sum(reference >= value)) / (limits.replicates + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
     p_value = min(1.0, len(p_values) * float(min(p_values)))
-    clear = figures.get(LIKENESS, 0.0) >= CLEAR
-    return Detection(p_value, figures, matters(problem, base, noise, likeness, sets_in, clear))
+    clear = figures.get(LIKENESS, 0.0) >= limits.clear_likeness
+    return Detection(limits.level, p_value, figures, matters(problem, base, noise, likeness, sets_in, clear))
 
 
 def matters(
@@ -99,22 +94,23 @@ def matters(
     likeness: share of what is beyond noise that one effect could explain, by linear regression; clear:
     whether it is so much like one that noise never is.
     """
+    limits = problem.policy.detection
     signal, rms, form_open = signal_size(problem), base.rms(problem, "unseen"), problem.form_error > 0
     beyond = _beyond(problem, base, noise, "unseen")
     if not form_open:
         beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
-    least = SLIGHT if clear and not form_open else BEYOND
-    telling = bool(np.any((beyond >= SHARE * signal) | (beyond >= least * noise)))
+    least = limits.noise_share_of_effects if clear and not form_open else limits.noise_share
+    telling = bool(np.any((beyond >= limits.signal_share * signal) | (beyond >= least * noise)))
     if not form_open:
         return telling
-    large = (beyond >= problem.form_error * signal) & (rms >= NOISES * noise)
-    return bool(np.any(large)) or (telling and (sets_in or likeness >= ONE_EFFECT))
+    large = (beyond >= problem.form_error * signal) & (rms >= limits.open_form_noises * noise)
+    return bool(np.any(large)) or (telling and (sets_in or likeness >= limits.open_form_likeness))
 
 
 def _beyond(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> Array:
     """Root mean square (n_y,) of what a part of the record has beyond noise and what chance makes of it."""
     residual = base.of(problem, part)
-    chance = 1 + CHANCE * np.sqrt(2 / max(len(residual), 1))
+    chance = 1 + problem.policy.detection.chance * np.sqrt(2 / max(len(residual), 1))
     return np.asarray(np.sqrt(np.maximum(np.mean(residual**2, axis=0) - chance * noise**2, 0.0)))
 
 
@@ -146,16 +142,16 @@ def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
     return directions
 
 
-def _likeness_of_noise(g: Array, rng: np.random.Generator) -> Array:
-    """The largest squared projection of white noise on any direction of g (m, k), (REPLICATES,)."""
+def _likeness_of_noise(g: Array, replicates: int, rng: np.random.Generator) -> Array:
+    """The largest squared projection of white noise on any direction of g (m, k), (replicates,)."""
     values, vectors = np.linalg.eigh(g.T @ g)
     root = vectors * np.sqrt(np.maximum(values, 0))
-    drawn = rng.standard_normal((REPLICATES, g.shape[1])) @ root.T
+    drawn = rng.standard_normal((replicates, g.shape[1])) @ root.T
     return np.asarray(np.max(drawn**2, axis=1))
 
 
-def _figures(left: Array) -> dict[str, float]:
-    means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(left, SLOW_BLOCKS)])
+def _figures(left: Array, pieces: int) -> dict[str, float]:
+    means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(left, pieces)])
     return {
         "size of the residual that no fit has seen": float(np.max(np.mean(left**2, axis=0))),
         "slow part of the residual that no fit has seen": float(np.max(np.mean(means**2, axis=0))),

@@ -8,7 +8,6 @@ from itertools import permutations
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.scores import (
-    CURVE,
     beats,
     beyond_noise_of_all,
     lead,
@@ -17,10 +16,6 @@ from estimator.closeloop.hypotheses.twins import limits
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 from fmus.effects import EFFECTS
-
-UNKNOWN = 2.0  # log score that one more unknown has to be worth, beside a simpler law
-FORM = 0.25  # of what the best effect leaves beyond noise where the form is open: less could be form too
-SAME = 0.01  # relative difference of the residual below which a small difference of form could decide
 
 
 def equivalent(
@@ -34,19 +29,20 @@ def equivalent(
     worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
     simpler one stays; of a group of parameters and one of them the group.
     """
-    members, alike = [best], SAME * -float(best.scores(problem, size).sum())
+    limits = problem.policy.decision
+    members, alike = [best], limits.alike * -float(best.scores(problem, size).sum())
     if problem.form_error > 0:
-        alike = max(alike, FORM * beyond_noise_of_all(problem, best, size) / 2)
+        alike = max(alike, limits.open_alike * beyond_noise_of_all(problem, best, size) / 2)
     for h in others:
         if h is best:
             continue
         mean, _ = lead(problem, best, h, size)
-        price = UNKNOWN * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
+        price = limits.unknown * (len(best.fit.unknowns) - len(h.fit.unknowns)) if becomes(best, h) else 0.0
         behind = cost(h) - cost(best)
         if problem.form_error > 0:
             told = mean + behind / 2 >= max(price, alike)
         else:
-            worse = h.fit.converged and behind > max(CURVE, SAME * cost(best))
+            worse = h.fit.converged and behind > max(limits.noticed, limits.alike * cost(best))
             told = worse or (mean >= max(price, alike) and beats(problem, best, h, size))
         if not told:
             members.append(h)

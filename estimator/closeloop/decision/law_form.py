@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.closeloop.decision.verdict import (
-    SECOND,
     Judgement,
     named,
     no_law,
@@ -14,7 +13,7 @@ from estimator.closeloop.decision.verdict import (
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
-from estimator.closeloop.hypotheses.scores import CURVE, leaves_noise
+from estimator.closeloop.hypotheses.scores import leaves_noise
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.free_form import FREE_FORMS, offered
@@ -23,14 +22,6 @@ from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import ForceLaw
-
-SEEN = 0.05  # of the sum of squares of noise: where much is known, so much shows a law that only comes near
-OPEN_LEFT = 0.05  # where the FMU's form leaves something open, of what the law leaves beyond noise, and
-OPEN_MISSED = 2.5e-3  # of what it explains; right laws leave a curve of that size at most
-NEAR = 1e-4  # of what a law explains: a smooth curve that passes for it comes no nearer, and for one of not
-PLAIN = 2  # more than so many unknowns, as rounded Coulomb friction, no nearer than OPEN_MISSED
-FASTEST = 0.1  # of the motion: friction rounded there too is none
-NO_LESS = 0.99  # of what a curve over another motion explains: one port may have two names
 
 
 def confirmed(
@@ -51,8 +42,8 @@ def confirmed(
         wrong = misnamed(m, forces)
         if open_form or not wrong:
             return wrong
-        nowhere = misnamed(m, forces, FASTEST)
-        return [c for c in wrong if c in nowhere or not told_apart(m, c, base)]
+        nowhere = misnamed(m, forces, problem.policy.decision.fastest)
+        return [c for c in wrong if c in nowhere or not told_apart(problem, m, c, base)]
 
     if len(h.candidates) > 1:
         rest = [m for m in judgement.members if not doubted(m)]
@@ -64,7 +55,7 @@ def confirmed(
         if doubted(m):
             return True
         own, elsewhere = curvature(problem, m, forces, size)
-        return another(m, base, own, elsewhere, open_form)
+        return another(problem, m, base, own, elsewhere)
 
     if not denied(h):
         return judgement
@@ -89,14 +80,15 @@ def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0
     return found
 
 
-def told_apart(h: Hypothesis, c: Candidate, base: Hypothesis) -> bool:
+def told_apart(problem: Problem, h: Hypothesis, c: Candidate, base: Hypothesis) -> bool:
     """Whether a curve that passes for one of its laws would show in what is left, and noise alone is left."""
-    if not over_what(c) or not leaves_noise(h):
+    limits = problem.policy.decision
+    if not over_what(c) or not leaves_noise(problem, h):
         return False
     alone = len(h.candidates) == 1
     explained = cost(base) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
-    near = OPEN_MISSED if len(c.unknowns) <= PLAIN else NEAR
-    return near * explained > CURVE
+    near = limits.open_curve_explained if len(c.unknowns) <= limits.plain_law else limits.rounded
+    return near * explained > limits.noticed
 
 
 def motion(h: Hypothesis) -> tuple[str, str]:
@@ -110,18 +102,21 @@ def over_what(c: Candidate) -> str:
     return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
-def another(h: Hypothesis, base: Hypothesis, own: float, elsewhere: float, open_form: bool) -> bool:
+def another(problem: Problem, h: Hypothesis, base: Hypothesis, own: float, elsewhere: float) -> bool:
     """Whether the law of a hypothesis is not the curve of its force; own, elsewhere: see `curvature`.
 
     It is not where a curve is most of what the law leaves, and plain; or much of what the law explains. Where
     the FMU's form leaves something open, right laws leave some curve too: there it has to be much of both,
     and no less than a curve over any other motion, as another form looks like one everywhere.
     """
-    plain, left = max(CURVE, SEEN * len(h.fit.residual)), h.fit.beyond_noise
-    if open_form:
-        least = max(plain, OPEN_LEFT * left, OPEN_MISSED * (cost(base) - cost(h)))
-        return own > least and own > NO_LESS * elsewhere
-    return own > max(plain, SECOND * left) or own > noticed(h, base)
+    limits = problem.policy.decision
+    plain, left = max(limits.noticed, limits.curve_of_noise * len(h.fit.residual)), h.fit.beyond_noise
+    if problem.form_error > 0:
+        least = max(
+            plain, limits.open_curve_left * left, limits.open_curve_explained * (cost(base) - cost(h))
+        )
+        return own > least and own > limits.open_curve_elsewhere * elsewhere
+    return own > max(plain, limits.second_share * left) or own > noticed(problem, h, base)
 
 
 def curvature(

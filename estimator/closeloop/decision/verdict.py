@@ -9,8 +9,6 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.decision.detect import (
-    BEYOND,
-    NOISES,
     Detection,
     matters,
     signal_size,
@@ -20,7 +18,6 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.scores import (
-    CURVE,
     beats,
     beyond_noise,
     beyond_noise_of_all,
@@ -41,15 +38,6 @@ Verdict = Literal[
     "unexplained",
     "insufficient_excitation",
 ]
-MOVES = 3.0  # times the noise: an output that moves less shows nothing
-GAP = 0.95  # share of the gap to the noise that an effect must close where noise is declared
-CLEAN, SCATTER = 1.05, 3.0  # times the noise, and its standard errors: a residual that is noise
-FORM_EXPLAINED = 0.9  # share of the variance beyond the noise, where the FMU's form leaves something open
-HALF = 0.5  # the same that one effect has to explain of all outputs together
-EXPLAINED = 0.75  # share of the residual's variance, where the floor that a model could reach is unknown
-LITTLE = 0.1  # of what a second effect explains: two right ones leave less than that
-SECOND = 0.5  # of what one effect leaves beyond noise, that a second one beside it has to explain
-MISSED = 1e-3  # of what a law explains: right ones leave less than a tenth of it to a curve
 
 
 @dataclass(frozen=True)
@@ -80,22 +68,26 @@ def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, si
     Outputs with declared noise must come down to it, or nearly so; the others must lose most of their
     variance.
     """
-    if idle(h, base) or not beats(problem, h, base, size):
+    limits = problem.policy.decision
+    if idle(problem, h, base) or not beats(problem, h, base, size):
         return False
     declared = ~np.isnan(problem.record.noise_std)
     squares = [
         np.mean((x.of(problem, "choose") / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
         for x in (h, base)
     ]
-    enough = squares[0] <= (1 - EXPLAINED) * squares[1] if (~declared).any() else True
+    enough = squares[0] <= (1 - limits.explained) * squares[1] if (~declared).any() else True
     return bool(np.all(reached(problem, h, base, noise, size)[declared]) and enough)
 
 
 def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> BoolArray:
     """Whether a hypothesis brings each output (n_y,) down to its noise, or to what the FMU's form leaves."""
+    limits = problem.policy.decision
     before, after = base.rms(problem, "choose"), h.rms(problem, "choose")
-    scatter = SCATTER / np.sqrt(2 * len(h.of(problem, "choose")))
-    found: BoolArray = (after < (CLEAN + scatter) * noise) | (gap_closed(before, after, noise) >= GAP)
+    scatter = limits.scatter / np.sqrt(2 * len(h.of(problem, "choose")))
+    found: BoolArray = (after < (limits.clean + scatter) * noise) | (
+        gap_closed(before, after, noise) >= limits.gap
+    )
     if problem.form_error > 0:
         found |= _reached_in_form(problem, h, base, noise, size)
     return found
@@ -112,22 +104,23 @@ def _reached_in_form(
     share, what was small does not grow; where all was small, so that it could be form too, several explain
     nearly all. A fault of a sensor may also leave the others as they are, if nearly all goes from its own.
     """
+    limits = problem.policy
     before, after = base.rms(problem, "choose"), h.rms(problem, "choose")
     left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
-    gone = left <= (1 - FORM_EXPLAINED) * np.maximum(was, 1e-300)
-    if np.any(_faulty(problem, h) & gone & (was >= BEYOND**2)):
-        return np.asarray(gone | (after <= CLEAN * before))
+    gone = left <= (1 - limits.decision.open_explained) * np.maximum(was, 1e-300)
+    if np.any(_faulty(problem, h) & gone & (was >= limits.detection.noise_share**2)):
+        return np.asarray(gone | (after <= limits.decision.clean * before))
     share = (problem.form_error * signal_size(problem) / noise) ** 2
-    large = (was >= share) & (before >= NOISES * noise)
-    several = HALF**2 if large.any() else 1 - FORM_EXPLAINED
-    most = HALF if len(h.candidates) == 1 else several
+    large = (was >= share) & (before >= limits.detection.open_form_noises * noise)
+    several = limits.decision.open_single**2 if large.any() else 1 - limits.decision.open_explained
+    most = limits.decision.open_single if len(h.candidates) == 1 else several
     of_all = beyond_noise_of_all(problem, h, size) / max(beyond_noise_of_all(problem, base, size), 1e-300)
     held_out = np.sum(left) <= most * np.sum(was)
-    if of_all > most or not (held_out or of_all <= most * HALF):
+    if of_all > most or not (held_out or of_all <= most * limits.decision.open_single):
         return np.zeros(len(noise), dtype=bool)
     if not large.any():
         return np.ones(len(noise), dtype=bool)
-    return np.asarray(gone | np.where(large, left < share, after <= CLEAN * before))
+    return np.asarray(gone | np.where(large, left < share, after <= limits.decision.clean * before))
 
 
 def _faulty(problem: Problem, h: Hypothesis) -> BoolArray:
@@ -140,7 +133,7 @@ def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise
     """The verdict where no effect needs to be looked for, or None."""
     measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
     if not detection.detected:
-        if np.all(np.std(measured, axis=0) < MOVES * noise):
+        if np.all(np.std(measured, axis=0) < problem.policy.decision.excited * noise):
             reason = "no output moves out of its noise, so that no effect could have been seen"
             return Judgement("insufficient_excitation", (), reason, "a record in which the outputs move")
         return Judgement(
@@ -183,7 +176,7 @@ def judge(
         h
         for h in pairs
         if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
-        if problem.form_error > 0 or not problem.record.floor_known or whole(h, singles)
+        if problem.form_error > 0 or not problem.record.floor_known or whole(problem, h, singles)
     ]
     if better and (not good or completes(problem, better[0], good[0], size)):
         members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
@@ -191,7 +184,7 @@ def judge(
     if good:
         members = equivalent(problem, good[0], good, size)
         best = members[0]
-        more = [h for h in (*good, *pairs) if problem.form_error == 0 and outgrown(best, h, base)]
+        more = [h for h in (*good, *pairs) if problem.form_error == 0 and outgrown(problem, best, h, base)]
         if more:
             return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
         return named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
@@ -217,13 +210,14 @@ def needed(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis], si
     return not singles or beats(problem, pair, singles[0], size)
 
 
-def whole(pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
+def whole(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
     """Whether a pair leaves noise in the part to identify, or little of what the best single effect leaves.
 
     What is neither of two effects may be brought near to noise by both, one after the other.
     """
+    limits = problem.policy.decision
     gained = min((cost(s) for s in singles), default=np.inf) - cost(pair)
-    return leaves_noise(pair) or bool(pair.fit.beyond_noise < LITTLE * gained)
+    return leaves_noise(problem, pair) or bool(pair.fit.beyond_noise < limits.pair_leaves * gained)
 
 
 def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Array) -> bool:
@@ -231,29 +225,30 @@ def completes(problem: Problem, pair: Hypothesis, single: Hypothesis, size: Arra
 
     Where most of that stays, it is neither effect, and the second one no finding.
     """
-    least = SECOND * beyond_noise(problem, single, size)
+    least = problem.policy.decision.second_share * beyond_noise(problem, single, size)
     return beats(problem, pair, single, size) and 2 * lead(problem, pair, single, size)[0] >= least
 
 
-def outgrown(m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:
+def outgrown(problem: Problem, m: Hypothesis, h: Hypothesis, base: Hypothesis) -> bool:
     """Whether m, which the part to choose does not tell from h, leaves what h explains of the identify part.
 
     h: a law that becomes m, or m and one more. A right law gains alike on both parts; where the richer one
     gains on one alone, both are wrong.
     """
     richer = becomes(h, m) or set(m.key) < set(h.key)
-    return richer and cost(m) - cost(h) > noticed(m, base)
+    return richer and cost(m) - cost(h) > noticed(problem, m, base)
 
 
-def noticed(h: Hypothesis, base: Hypothesis) -> float:
+def noticed(problem: Problem, h: Hypothesis, base: Hypothesis) -> float:
     """Fall of the sum of squares by something more from which on a hypothesis is not the whole of it."""
-    return max(CURVE, MISSED * (cost(base) - cost(h)))
+    limits = problem.policy.decision
+    return max(limits.noticed, limits.missed * (cost(base) - cost(h)))
 
 
 def _noise_alone(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> bool:
     """Whether a part of the record is matched as well as noise lets it be."""
     residual = base.of(problem, part)
-    scatter = SCATTER / np.sqrt(2 * len(residual))
+    scatter = problem.policy.decision.scatter / np.sqrt(2 * len(residual))
     return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * noise))
 
 

@@ -19,7 +19,7 @@ RUGGED = 1.05  # mean square of a residual, in units of noise, from which finer 
 
 def settled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     """The hypothesis where finer differences lead it, if more than noise is left and that is lower."""
-    if leaves_noise(h) or mean_square(h) < RUGGED:
+    if leaves_noise(problem, h) or mean_square(h) < RUGGED:
         return h
     return lower(h, finished(problem, h.others, from_there([h]), size, 1, step=FINE))
 

@@ -18,8 +18,6 @@ from estimator.closeloop.question.problem import Problem
 from estimator.noise import weights
 from estimator.record import Array
 
-LEADING = 6  # hypotheses that are fitted again with the new weights
-
 
 def best_weights(problem: Problem, found: Sequence[Hypothesis]) -> Array:
     """Size of a residual that counts as one, (n_y,), from what the best of the fits leaves."""
@@ -40,7 +38,7 @@ def fitted_again(
 ) -> list[Hypothesis]:
     """All hypotheses in units of the new size, best first on the identify part; leading ones fitted anew."""
     moved = best_by_label(rescaled(h, before, size) for h in found)
-    leading = [h for h in moved if h.candidates][:LEADING]
+    leading = [h for h in moved if h.candidates][: problem.policy.search.reweighted]
     if not leading:
         return moved
     again = finished(problem, leading[0].others, from_there(leading), size, jobs)

@@ -19,9 +19,6 @@ from fmus.host.fmu import FmuError
 BRIEF, LONG = 4, 20  # steps of a fit to rank it, and to finish it
 
 
-FINALISTS = 5
-
-
 GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
 
 
@@ -29,18 +26,6 @@ ROUNDS, LAST = 4, 2  # of further LONG fits of the leading finalists, where they
 
 
 ABOARD = 6  # effects in one FMU
-
-
-LEADERS = 2  # of the finalists that are fitted to the end before the others, and
-
-
-RIVAL = 4.0  # times the best sum of squares, up to which others are fitted to the end
-
-
-HOPELESS = 10.0  # times the best sum of squares after the brief fits
-
-
-WORTH = 0.95  # of the base's sum of squares: a candidate that leaves more is not fitted to the end
 
 
 def hypothesis(
@@ -100,17 +85,18 @@ def briefly(
 
 def to_the_end(
     problem: Problem, base: Hypothesis, brief: Sequence[Hypothesis], size: Array, jobs: int,
-    finalists: int = FINALISTS,
+    finalists: int | None = None,
 ) -> list[Hypothesis]:  # fmt: skip
     """The finalists of brief fits fitted to the end, and all others as they are; best first."""
-    limit = min([WORTH * cost(base), *(HOPELESS * cost(h) for h in brief)])
-    hopeful = [h for h in brief if cost(h) < limit][:finalists]
+    limits = problem.policy.search
+    limit = min([limits.worth_a_fit * cost(base), *(limits.hopeless * cost(h) for h in brief)])
+    hopeful = [h for h in brief if cost(h) < limit][: finalists or limits.finalists]
     done: list[Hypothesis] = []
-    for part in (hopeful[:LEADERS], hopeful[LEADERS:]):
+    for part in (hopeful[: limits.first_finalists], hopeful[limits.first_finalists :]):
         again = [
             Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta})
             for h in part
-            if not done or cost(h) < RIVAL * cost(done[0])
+            if not done or cost(h) < limits.rival * cost(done[0])
         ]
         done = best_by_label(
             [*done, *finished(problem, base.fit.unknowns, again, size, jobs, base.fit.columns)]
@@ -127,9 +113,10 @@ def finished(
 
     guess, step: see `fit`.
     """
+    limits = problem.policy.search
     found = fitted(problem, unknowns, promises, size, LONG, jobs, guess=guess, step=step)
     for _ in range(ROUNDS):
-        short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < RIVAL * cost(found[0])]
+        short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < limits.rival * cost(found[0])]
         if not short:
             break
         before = sum(cost(h) for h in short)

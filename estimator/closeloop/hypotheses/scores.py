@@ -12,12 +12,6 @@ from estimator.record import Array
 CURVE = 40.0  # fall of the sum of squares; what noise makes of a hundred laws is less than half of it
 
 
-CHANCE = 3.0  # standard deviations of the sum of squares of white noise
-
-
-TELLING = 2.0  # standard errors over blocks, from which one hypothesis counts as better
-
-
 def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
     """Of several hypotheses with the same labels the one that fits better; best first."""
     best: dict[tuple[str, ...], Hypothesis] = {}
@@ -27,9 +21,10 @@ def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
     return sorted(best.values(), key=cost)
 
 
-def leaves_noise(h: Hypothesis) -> bool:
+def leaves_noise(problem: Problem, h: Hypothesis) -> bool:
     """Whether nothing but noise is left in the part to identify."""
-    return bool(h.fit.beyond_noise < CHANCE * np.sqrt(2 * len(h.fit.residual)))
+    limits = problem.policy.detection
+    return bool(h.fit.beyond_noise < limits.chance * np.sqrt(2 * len(h.fit.residual)))
 
 
 def ranked(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
@@ -51,9 +46,9 @@ def lead(
 
 
 def beats(problem: Problem, a: Hypothesis, b: Hypothesis, size: Array, part: Part = "choose") -> bool:
-    """Whether a is better than b by more than TELLING standard errors over blocks of a part."""
+    """Whether a is better than b by more standard errors than chance gives, over blocks of a part."""
     mean, error = lead(problem, a, b, size, part)
-    return mean > TELLING * error
+    return mean > problem.policy.decision.telling * error
 
 
 def beyond_noise(problem: Problem, h: Hypothesis, size: Array) -> float:
@@ -66,12 +61,10 @@ def beyond_noise_of_all(problem: Problem, h: Hypothesis, size: Array) -> float:
     return h.fit.beyond_noise + beyond_noise(problem, h, size)
 
 
-SIGNIFICANT = 4.0  # standard errors of an amplitude from zero
-
-
-def idle(h: Hypothesis, base: Hypothesis | None = None) -> list[Candidate]:
+def idle(problem: Problem, h: Hypothesis, base: Hypothesis | None = None) -> list[Candidate]:
     """Members whose amplitude is not clear of zero.
 
     base: the FMU without effects, which tells what a single one is worth.
     """
-    return [c for c, z in zip(h.candidates, h.significance(base), strict=True) if z < SIGNIFICANT]
+    limits = problem.policy.decision
+    return [c for c, z in zip(h.candidates, h.significance(base), strict=True) if z < limits.significant]

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
 from estimator.sensor_faults.sensor_faults import faulty
@@ -60,7 +61,8 @@ class Problem:
 
     builder gives the FMU with `effects`, (kind, location), built in; declared holds parameters and given
     start states, calibrate bounds by name, free_states those whose start is not given; form_error is the
-    share of an output that the FMU's form leaves open. Small and picklable: workers open the FMU themselves.
+    share of an output that the FMU's form leaves open; policy the limits by which it is answered. Small and
+    picklable: workers open the FMU themselves.
     """
 
     builder: Builder
@@ -71,6 +73,7 @@ class Problem:
     ports: tuple[PortNames, ...] = ()
     effects: tuple[tuple[str, str], ...] = ()
     form_error: float = 0.0
+    policy: Policy = DEFAULT
 
     @property
     def plant(self) -> Plant:

@@ -18,14 +18,13 @@ from estimator.closeloop.hypotheses.scores import best_by_label
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 
-LEADING, RIVAL = 3, 2.0  # hypotheses that are dated, up to so many times the best sum of squares
-
 
 def dated(
     problem: Problem, unknowns: Sequence[Unknown], found: Sequence[Hypothesis], size: Array, jobs: int
 ) -> list[Hypothesis]:
     """All hypotheses, best first on the identify part; leading ones fitted again from a better moment."""
-    tried = [h for h in found[:LEADING] if begins(h) and cost(h) < RIVAL * cost(found[0])]
+    limits = problem.policy.search
+    tried = [h for h in found[: limits.dated] if begins(h) and cost(h) < limits.dated_rival * cost(found[0])]
     moments = Parallel(n_jobs=jobs)(delayed(_moment)(problem, h, size) for h in tried)
     again = [
         Promise(h.candidates, 0.0, {**h.fit.theta, begins(h)[0]: moment})

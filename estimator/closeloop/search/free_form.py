@@ -28,9 +28,6 @@ from estimator.record import Array
 RESOLVED = 3.0  # standard errors that a control of realistic size must be worth
 
 
-FINALISTS = 2  # of them, fitted to the end
-
-
 TRIED = 3  # places and quantities that are fitted by simulation
 
 
@@ -68,6 +65,7 @@ def free_form(
     near: effects that came nearest, best first, whose ports are tried too. Better than the base means by
     TELLING standard errors over blocks of that part.
     """
+    limits = problem.policy.search
     candidates = [c for d in dependences(problem, forces) for c in _candidates(problem, d, forces)]
     if not candidates:
         return None
@@ -78,7 +76,7 @@ def free_form(
     promises = screen(screening.fit, [((c,), g) for c, g in chosen if c.amplitudes])
     # a strong law differs from its linear picture, and then a start without it is the better one
     promises += [replace(p, start=base.fit.theta) for p in promises]
-    found = ranked(problem, hypotheses(problem, base, promises, size, jobs, FINALISTS), size)
+    found = ranked(problem, hypotheses(problem, base, promises, size, jobs, limits.finalist_pairs), size)
     better = [h for h in found if cost(h) < cost(base) and beats(problem, h, base, size)]
     return better[0] if better else None
 

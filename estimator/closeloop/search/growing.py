@@ -30,9 +30,6 @@ from estimator.record import Array
 Parts = tuple[tuple[float, int], ...]  # shares of the identify part, and evaluations of a fit to it
 FIRST: Parts = ((0.125, 8), (0.25, 6))
 THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
-SURVIVORS, RIVAL = 4, 4.0  # of the first parts: so many go on, up to so many times the best mean square
-LEADING = 4  # labels, of those that fit best and of the most promising ones
-REFINED = 2  # of all in the end, that are still far from noise: fitted again by finer differences
 SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
 
 
@@ -45,9 +42,12 @@ def from_the_beginning(
     jobs: int,
 ) -> list[Hypothesis]:
     """All hypotheses, best first on the identify part, the leading ones perhaps better than found so far."""
+    limits = problem.policy.search
     physical = [p for p in promises if not p.candidates[0].is_fault]
     fitted = [h.label for h in found if not h.candidates[0].is_fault]
-    leading = dict.fromkeys([*fitted[:LEADING], *list(dict.fromkeys(p.label for p in physical))[:LEADING]])
+    leading = dict.fromkeys(
+        [*fitted[: limits.grown], *list(dict.fromkeys(p.label for p in physical))[: limits.grown]]
+    )
     unknowns = base.fit.unknowns
     declared = {u.name: u.start for u in unknowns}
     states = {n: v for n, v in declared.items() if n in problem.free_states}
@@ -64,13 +64,17 @@ def from_the_beginning(
     alive.sort(key=lambda pair: mean_square(pair[0]))
     tasks = (
         delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), size, THEN)
-        for h, here in alive[:SURVIVORS]
-        if mean_square(h) < RIVAL * mean_square(alive[0][0])
+        for h, here in alive[: limits.grown_survivors]
+        if mean_square(h) < limits.grown_rival * mean_square(alive[0][0])
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
-    again = finished(problem, unknowns, from_there(grown[:LEADING]), size, jobs)
+    again = finished(problem, unknowns, from_there(grown[: limits.grown]), size, jobs)
     best = best_by_label([*found, *grown, *again])
-    rugged = [h for h in best[:REFINED] if mean_square(h) > NEAR and cost(h) < RIVAL * cost(best[0])]
+    rugged = [
+        h
+        for h in best[: limits.grown_refined]
+        if mean_square(h) > NEAR and cost(h) < limits.grown_rival * cost(best[0])
+    ]
     return best_by_label([*best, *finished(problem, unknowns, from_there(rugged), size, jobs, step=FINE)])
 
 

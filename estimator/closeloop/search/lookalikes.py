@@ -21,11 +21,6 @@ from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.screening.screen import Screening
 from estimator.record import Array
 
-ALIKE = 0.05  # of what a law does and calibration cannot take over: one that looks like it leaves less of it
-UNTOLD = 20.0  # of the sum of squares: what noise could hide
-WORSE = 1.5  # times the sum of squares of the best one, from which on a fit may have ended elsewhere
-MOST = 3  # that are fitted
-
 
 def lookalikes(
     screening: Screening, calibration: Calibration, found: Sequence[Hypothesis], change: Changes
@@ -35,8 +30,8 @@ def lookalikes(
     calibration: of the screening's fit; change: of the candidates that may take a place. What was fitted
     nearly as well is left out. The gain of a promise is what it misses, negative.
     """
-    best = found[0]
-    known = {h.key for h in found if cost(h) < WORSE * cost(best)}
+    best, limits = found[0], screening.problem.policy.search
+    known = {h.key for h in found if cost(h) < limits.lookalike_worse * cost(best)}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):
         if c.is_fault:
@@ -48,10 +43,10 @@ def lookalikes(
             if key(laws) in known:
                 continue
             missed, start = _nearest(other, calibration.without(g), response)
-            if missed < max(UNTOLD, ALIKE**2 * float(response @ response)):
+            if missed < max(limits.lookalike_squares, limits.lookalike**2 * float(response @ response)):
                 promises.append(Promise(laws, -missed, {**best.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
-    return distinct(promises)[:MOST]
+    return distinct(promises)[: screening.problem.policy.search.lookalikes]
 
 
 def over_the_same(
@@ -71,7 +66,7 @@ def over_the_same(
             missed, start = _nearest(other, calibration.without(g), response)
             promises.append(Promise((other,), -missed, {**h.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
-    return distinct(promises)[:MOST]
+    return distinct(promises)[: screening.problem.policy.search.lookalikes]
 
 
 def _response(

@@ -23,28 +23,25 @@ from estimator.record import Array
 
 EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
 BLOCKS = 50  # of the identify part whose residuals are compared
-TIMES = 9.0  # the mean square of before: what something new has made of it
-SLIGHT = 2.0  # the same where all is small
-CHANCE = 1e-5  # that the blocks after are ranked above those before
 ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
 LONGER = 2.0  # times that in the short fits
-LEADING, TRIES = 12, 7  # kinds and places that get a short fit, and evaluations of it
+TRIES = 7  # evaluations of a short fit
 GENTLE = 0.3  # of the amplitudes that the linear picture asks for: the other start of these fits
 GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
 
 
-def onset(problem: Problem, base: Hypothesis, size: Array, times: float = TIMES) -> tuple[float, Fit] | None:
+def onset(problem: Problem, base: Hypothesis, size: Array, times: float) -> tuple[float, Fit] | None:
     """Share of the identify part after which the residual is another, and the FMU's fit to what was before.
 
     times: as large its mean square has to be. None where there is no such moment, or where nothing is to be
     calibrated.
     """
-    unknowns, found = base.fit.unknowns, []
+    unknowns, found, chance = base.fit.unknowns, [], problem.policy.search.sets_in_chance
     for early in EARLY if unknowns else ():
         before = fit(problem.beginning(early), unknowns, size)
         squares = _blocks(problem, before, size)
-        if (k := grown(squares, int(early * BLOCKS), times)) is not None:
+        if (k := grown(squares, int(early * BLOCKS), times, chance)) is not None:
             found.append((float(np.sqrt(squares[:k]).mean()), k / BLOCKS, before))
     if not found:
         return None
@@ -59,7 +56,7 @@ def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
     return np.array([float(np.mean(b**2)) for b in np.array_split(residual, BLOCKS)])
 
 
-def grown(squares: Array, first: int, times: float = TIMES) -> int | None:
+def grown(squares: Array, first: int, times: float, level: float) -> int | None:
     """The block from which on mean squares (n,) are so many times larger, `first` at the earliest, or None.
 
     Where their logarithms come in two levels, told apart both by size and by rank: by rank alone blocks that
@@ -70,7 +67,7 @@ def grown(squares: Array, first: int, times: float = TIMES) -> int | None:
     k = min(spread, key=spread.__getitem__)
     before, after = squares[:k], squares[k:]
     chance = float(mannwhitneyu(after, before, alternative="greater").pvalue)
-    return k if after.mean() > times * before.mean() and chance < CHANCE else None
+    return k if after.mean() > times * before.mean() and chance < level else None
 
 
 def since(
@@ -85,9 +82,10 @@ def since(
     Ranked by the first moments after it; the leading ones again by short fits to some more of the record,
     all else held at what the FMU was before, since a strong change differs from its linear picture.
     """
+    limits = problem.policy.search
     share, before = at
     promises = _by_response(problem, at, candidates, size)
-    leading, rest = promises[:LEADING], promises[LEADING:]
+    leading, rest = promises[: limits.sudden_fits], promises[limits.sudden_fits :]
     held = replace(problem, declared={**problem.declared, **before.theta})
     part = held.beginning(min(1.0, share + LONGER * AFTER))
     gentle = [replace(p, start=_scaled(p, GENTLE)) for p in leading]

@@ -24,22 +24,7 @@ from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
 
-LEADING = 8  # single effects that partners are looked for
-
-
 QUICK = 3e6  # candidates times samples, up to which all leading effects are built in and screened anew
-
-
-PARTNERS = 12  # leading candidates among which pairs are screened
-
-
-PROMISES = 4  # pairs from each of the two screenings that are fitted
-
-
-FINALISTS = 2  # of them, fitted to the end
-
-
-BESIDE = 0.25  # of an output's noise: the rms that a second effect has to explain
 
 
 Changes = Sequence[tuple[Candidate, Array]]
@@ -55,20 +40,21 @@ def try_pairs(
 
     Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
     """
+    limits = problem.policy.search
     size = screening.size
     physical = [(c, g) for c, g in change if not c.is_fault]
     alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
-    promises = _from_base(screening.fit, physical)
+    promises = _from_base(problem, screening.fit, physical)
     if alone:
-        promises += _partners(problem, screening, list(alone.values())[:LEADING], physical, noise)
-    found = hypotheses(problem, base, promises, size, jobs, FINALISTS)
+        promises += _partners(problem, screening, list(alone.values())[: limits.paired], physical, noise)
+    found = hypotheses(problem, base, promises, size, jobs, limits.finalist_pairs)
     reached = min((cost(h) for h in singles), default=cost(base))
-    doubtful = [h for h in found if idle(h) and cost(h) < reached]
-    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in idle(h)]
+    doubtful = [h for h in found if idle(problem, h) and cost(h) < reached]
+    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in idle(problem, h)]
     freed = finished(problem, base.fit.unknowns, without, size, jobs) if without else []
     least = {h.label: cost(h) for h in best_by_label([*alone.values(), *freed])}
     found = [replace(h, worth=_worth(h, least)) if h in doubtful else h for h in found]
-    return [h for h in found if not idle(h)], freed
+    return [h for h in found if not idle(problem, h)], freed
 
 
 def _rest(h: Hypothesis, c: Candidate) -> tuple[Candidate, ...]:
@@ -90,23 +76,28 @@ def beside(
     screening, change: of the base, whose linear picture is near enough to see whether there is anything;
     least: share of what is left beyond noise that a second effect has to explain.
     """
+    limits = problem.policy.search
     fit = grouped_fit(best.fit, len(screening.size), screening.group)
-    enough = BESIDE**2 * len(best.fit.residual) / len(screening.size)
-    promises = [p for p in _with(best, fit, change) if p.gain > max(enough, least * fit.beyond_noise)]
-    found = hypotheses(problem, base, promises, screening.size, jobs, FINALISTS) if promises else []
-    return [h for h in found if not idle(h)]
+    enough = limits.second_effect**2 * len(best.fit.residual) / len(screening.size)
+    promises = [
+        p for p in _with(problem, best, fit, change) if p.gain > max(enough, least * fit.beyond_noise)
+    ]
+    found = (
+        hypotheses(problem, base, promises, screening.size, jobs, limits.finalist_pairs) if promises else []
+    )
+    return [h for h in found if not idle(problem, h)]
 
 
-def _from_base(base: Fit, physical: Changes) -> list[Promise]:
+def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:
     order = screen(base, [((c,), g) for c, g in physical])
     by_candidate = dict(physical)
-    leading = [p.candidates[0] for p in order[:PARTNERS]]
+    leading = [p.candidates[0] for p in order[: problem.policy.search.partners]]
     sets = [
         ((a, b), np.hstack([by_candidate[a], by_candidate[b]]))
         for a, b in combinations(leading, 2)
         if a.label != b.label
     ]
-    return distinct(screen(base, sets))[:PROMISES]
+    return distinct(screen(base, sets))[: problem.policy.search.pairs]
 
 
 def _partners(
@@ -134,9 +125,9 @@ def _partners(
             fit, seen = here.fit, list(zip(others, here.changes(others), strict=True))
         else:
             fit, seen = grouped_fit(h.fit, len(screening.size), screening.group), list(change)
-        found += [(cost(h) - p.gain, p) for p in _with(h, fit, seen)]
+        found += [(cost(h) - p.gain, p) for p in _with(problem, h, fit, seen)]
     found.sort(key=lambda pair: pair[0])
-    return distinct([p for _, p in found])[:PROMISES]
+    return distinct([p for _, p in found])[: problem.policy.search.pairs]
 
 
 def _beside(
@@ -154,8 +145,9 @@ def _beside(
     return screening.fit, list(zip(partners, screening.changes(partners), strict=True))
 
 
-def _with(h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
+def _with(problem: Problem, h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
     """A hypothesis with its most promising partners; fit: its own, as the changes are compared with it."""
+    limits = problem.policy.search
     own = {c.label for c in h.candidates}
-    promises = distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[:PROMISES]
+    promises = distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[: limits.pairs]
     return [Promise((*h.candidates, *p.candidates), p.gain, {**h.fit.theta, **p.start}) for p in promises]

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from estimator.closeloop.checkpoints import Stages
-from estimator.closeloop.decision.detect import ONE_EFFECT
 from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose
@@ -16,7 +15,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.screen import Screening, screen
-from estimator.closeloop.search.onset import SLIGHT, TIMES, onset
+from estimator.closeloop.search.onset import onset
 from estimator.record import Array
 
 
@@ -55,7 +54,8 @@ class Screened:
     @property
     def open_to_form(self) -> bool:
         """Whether the residual could be another form of the FMU, as it is like no effect."""
-        return self.problem.form_error > 0 and self.likeness < ONE_EFFECT
+        limits = self.problem.policy.detection
+        return self.problem.form_error > 0 and self.likeness < limits.open_form_likeness
 
     @property
     def began(self) -> bool:
@@ -65,7 +65,8 @@ class Screened:
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
         """What set in during the record; see `onset`."""
-        least = SLIGHT if self.open_to_form else TIMES
+        limits = self.problem.policy.search
+        least = limits.sets_in_times_open if self.open_to_form else limits.sets_in_times
         return self.stages.done("onset", lambda: onset(self.problem, self.base, self.size, least))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:

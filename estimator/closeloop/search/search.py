@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from estimator.closeloop.decision.detect import ONE_EFFECT
 from estimator.closeloop.fitting.rounds import (
     briefly,
     finished,
@@ -23,9 +22,6 @@ from estimator.closeloop.search.dating import dated
 from estimator.closeloop.search.growing import from_the_beginning
 from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.search.nomination import (
-    FAULTS,
-    LEADING,
-    NOMINEES,
     nominated,
     overlooked,
 )
@@ -33,12 +29,6 @@ from estimator.closeloop.search.onset import since
 from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.closeloop.search.screened import Screened
 from estimator.closeloop.search.simpler import simpler
-
-SUDDEN = 4  # effects that may have set in at a moment that shows, fitted beside them
-LIKELY = 0.5  # of what is beyond noise: faults that could explain so much are fitted before all else
-RIVAL = 0.7  # of what a fault that explains could gain: effects that could gain less are no rivals, but
-PLACEBOS = 3  # of them, so that there is a best wrong one
-OVERLOOKED = 0.2  # of what is beyond noise, where the form is open: if all leave so much, more are tried
 
 
 @dataclass(frozen=True)
@@ -89,14 +79,20 @@ class Search:
     def _promises(self) -> list[Promise]:
         """What the screening promises of them, best first, from the calibrated parameters."""
         s, labels = self.screened, {c.label for c, _ in self._single}
-        promises = at_their_moments(s.screening, s.fit, s.promises, LEADING)
+        limits = s.problem.policy.search
+        promises = at_their_moments(s.screening, s.fit, s.promises, limits.nominees_in_shapes)
         start = s.base.fit.theta
         return [replace(p, start={**start, **p.start}) for p in promises if p.label in labels]
 
     def _brief(self) -> tuple[list[Hypothesis], list[Promise]]:
         """Brief fits, best first, and what may have set in at a moment that shows."""
         s = self.screened
-        chosen = nominated(self._promises, NOMINEES if s.problem.builder.quick else NOMINEES // 2)
+        limits = s.problem.policy.search
+        chosen = nominated(
+            s.problem.policy,
+            self._promises,
+            limits.nominees if s.problem.builder.quick else limits.nominees // 2,
+        )
         self.tell("faults", "fitting faults of sensors")
         faults, rest = s.stages.done("faults", lambda: self._faults_first(chosen))
         self.tell(
@@ -105,12 +101,16 @@ class Search:
         )
         brief = s.stages.done("brief", lambda: self._briefly(rest))
         brief = best_by_label([*faults, *brief])
-        if s.problem.form_error > 0 and brief and brief[0].fit.beyond_noise > OVERLOOKED * s.beyond_noise:
-            further = overlooked(self._promises, rest, s.problem.calibrate)
+        if (
+            s.problem.form_error > 0
+            and brief
+            and brief[0].fit.beyond_noise > limits.overlooked_share * s.beyond_noise
+        ):
+            further = overlooked(s.problem.policy, self._promises, rest, s.problem.calibrate)
             self.tell("overlooked", f"fitting {len(further)} more, which calibration may have hidden")
             more = s.stages.done("overlooked", lambda: self._briefly(further))
             brief = best_by_label([*more, *brief])
-        if faults or not (s.open_to_form or any(sets_in(h) for h in brief[:LEADING])):
+        if faults or not (s.open_to_form or any(sets_in(h) for h in brief[: limits.nominees_in_shapes])):
             return brief, []
         self.tell("onset", "looking for what set in during the record")
         sudden, more = s.stages.done("sudden", self._sudden)
@@ -143,7 +143,7 @@ class Search:
         """Pairs of one effect that explains and a second."""
         s = self.screened
         self.tell("second", "looking at what is left for a second effect")
-        least = ONE_EFFECT if s.problem.form_error > 0 else 0.0
+        least = s.problem.policy.detection.open_form_likeness if s.problem.form_error > 0 else 0.0
         return s.stages.done(
             "beside", lambda: beside(s.problem, s.base, one, s.screening, self._single, least, self.jobs)
         )
@@ -160,24 +160,32 @@ class Search:
         rivals. Where none does, all are tried together.
         """
         s = self.screened
-        likely = [p for p in chosen if p.candidates[0].is_fault and p.gain > LIKELY * s.beyond_noise]
+        limits = s.problem.policy.search
+        likely = [
+            p for p in chosen if p.candidates[0].is_fault and p.gain > limits.likely_fault * s.beyond_noise
+        ]
         if not likely or not s.floor_known:
             return [], list(chosen)
-        faults = hypotheses(s.problem, s.base, likely, s.size, self.jobs, FAULTS)
+        faults = hypotheses(s.problem, s.base, likely, s.size, self.jobs, limits.nominated_faults)
         if not s.explained(faults):
             return [], list(chosen)
         others = [p for p in chosen if p not in likely]
-        rivals = [p for i, p in enumerate(others) if i < PLACEBOS or p.gain > RIVAL * likely[0].gain]
+        rivals = [
+            p
+            for i, p in enumerate(others)
+            if i < limits.placebos or p.gain > limits.rival_of_fault * likely[0].gain
+        ]
         return faults, rivals
 
     def _sudden(self) -> tuple[list[Promise], list[Hypothesis]]:
         """What may have set in at a moment that shows, and brief fits of the leading ones."""
         s = self.screened
+        limits = s.problem.policy.search
         if not s.came:
             return [], []
         physical = [c for c, _ in self._single if not c.is_fault]
         promises = since(s.problem, s.came, physical, s.size, self.jobs)
-        return promises, briefly(s.problem, s.base, promises[:SUDDEN], s.size, self.jobs, known=False)
+        return promises, briefly(s.problem, s.base, promises[: limits.sudden], s.size, self.jobs, known=False)
 
     def _replaced(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Hypotheses ranked, other laws in place of those of the best one where that may be the answer."""

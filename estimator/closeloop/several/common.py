@@ -16,7 +16,6 @@ from estimator.closeloop.several.joint import (
 )
 from estimator.closeloop.several.part import Part
 from estimator.closeloop.several.transfer import (
-    LEVEL,
     Status,
     Traced,
     Transfer,
@@ -32,7 +31,8 @@ class Common:
     """An effect (label) in several records, fitted to all of them and to each.
 
     alone: each record's own fit, said: what it says of the machine's unknowns, and costs: its sum of squares;
-    samples: residuals that were fitted, of each record; accounted: whether the common value accounts for it.
+    samples: residuals that were fitted, of each record; accounted: whether the common value accounts for it;
+    level: chance of a difference, below which the values differ.
     """
 
     label: str
@@ -44,6 +44,7 @@ class Common:
     likeness: Likeness
     samples: tuple[int, ...]
     accounted: tuple[bool, ...]
+    level: float
 
     @property
     def serves(self) -> bool:
@@ -69,7 +70,7 @@ class Common:
             return (
                 f"no one value of {self.label} accounts for {every}; not for {' and '.join(left)} ({chance})"
             )
-        if self.likeness.p_value < LEVEL:
+        if self.likeness.p_value < self.level:
             return (
                 f"one value of {self.label} accounts for {every}, though their own values differ ({chance})"
             )
@@ -149,6 +150,7 @@ def _compared(
         likeness(together, costs, said),
         tuple(len(h.fit.residual) for h in alone),
         tuple(_accounts(r, h) for r, h in zip(records, together.parts, strict=True)),
+        records[0].problem.policy.decision.different,
     )
 
 

@@ -10,7 +10,6 @@ from typing import Literal
 
 from joblib import Parallel, delayed
 
-from estimator.closeloop.decision.equivalence import SAME
 from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.fitting.rounds import finished
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -32,7 +31,6 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-LEVEL = 0.01  # chance of a difference between estimates, below which they differ
 SHAPES = 2  # of an effect, the most promising ones of the other record, from which it is fitted there
 
 Status = Literal["confirmed", "agrees", "differs", "surpassed", "absent", "silent", "open", "impossible"]
@@ -219,7 +217,7 @@ def _judged(
             return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} does so better"
         if explains(t.problem, held, t.base, t.noise, t.size):
             return "confirmed", f"{label} with the values of {a} accounts for {b} too"
-        if apart.p_value >= LEVEL:
+        if apart.p_value >= t.problem.policy.decision.different:
             return "agrees", f"{label} accounts for {b} with values that agree with those of {a}, {far}"
         return "differs", f"{label} accounts for {b} with other values only, {far}"
     if t.explanation is None:
@@ -227,7 +225,9 @@ def _judged(
     labels = {c.label for c in t.member.candidates}
     beside = [c for c in t.explanation.candidates if c.label not in labels]
     both = _held(t, own, values, beside) if beside else held
-    worse = beats(t.problem, t.explanation, both, t.size) and (not t.quiet or apart.p_value < LEVEL)
+    worse = beats(t.problem, t.explanation, both, t.size) and (
+        not t.quiet or apart.p_value < t.problem.policy.decision.different
+    )
     by = "needs no effect" if t.quiet else f"is accounted for by {t.explanation.label}"
     if worse:
         return "absent", f"{b} {by}, and {label} with the values of {a} makes it worse"
@@ -237,5 +237,5 @@ def _judged(
 def _outdone(t: _Task, own: Hypothesis, explanation: Hypothesis) -> bool:
     """Whether what the other record found is better there, and by more than a small difference of form."""
     mean, _ = lead(t.problem, explanation, own, t.size)
-    matters = mean >= SAME * -float(explanation.scores(t.problem, t.size).sum())
+    matters = mean >= t.problem.policy.decision.alike * -float(explanation.scores(t.problem, t.size).sum())
     return matters and beats(t.problem, explanation, own, t.size)

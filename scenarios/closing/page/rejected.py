@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.closeloop.decision.detect import LEVEL, REPLICATES
-from estimator.closeloop.decision.verdict import EXPLAINED, explains, reached
+from estimator.closeloop.decision.verdict import explains, reached
 from estimator.closeloop.diagnostics.diagnostics import Honesty
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.scores import SIGNIFICANT, idle, lead
+from estimator.closeloop.hypotheses.scores import idle, lead
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
@@ -49,11 +48,13 @@ def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
 
 def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """Why a hypothesis was rejected, most telling first."""
-    weak = idle(h, found.base)
+    weak = idle(problem, h, found.base)
     for c in weak:
         z = h.significance(found.base)[h.candidates.index(c)]
         which = f" of {candidate_words(c)}" if len(h.candidates) > 1 else ""
-        from_zero = f"only {number(z, 2)} standard errors from zero ({SIGNIFICANT:g} needed)"
+        from_zero = (
+            f"only {number(z, 2)} standard errors from zero ({problem.policy.decision.significant:g} needed)"
+        )
         yield f"size{which} {from_zero if z >= NIL else 'zero'}"
     if weak or not explains(problem, h, found.base, found.noise, found.size):
         yield from _left(problem, found, h)
@@ -80,8 +81,9 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
             - _squares(problem, found, h)[~declared].sum()
             / _squares(problem, found, found.base)[~declared].sum()
         )
-        if share < EXPLAINED:
-            yield f"takes away {percent(max(share, 0.0))} of the residual's variance ({EXPLAINED:.0%} needed)"
+        needed = problem.policy.decision.explained
+        if share < needed:
+            yield f"takes away {percent(max(share, 0.0))} of the residual's variance ({needed:.0%} needed)"
 
 
 def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
@@ -89,16 +91,16 @@ def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
     return squares
 
 
-def detection_words(found: Outcome) -> str:
+def detection_words(problem: Problem, found: Outcome) -> str:
     """The test for a discrepancy."""
-    d = found.detection
-    at_floor = d.p_value <= 1.001 * len(d.figures) / (REPLICATES + 1)
+    d, draws = found.detection, problem.policy.detection.replicates
+    at_floor = d.p_value <= 1.001 * len(d.figures) / (draws + 1)
     least = ", the least that so many records can show" if at_floor else ""
     verdict = "more than noise" if d.detected else "no more than what noise leaves"
     size = "large enough to matter" if d.material else "too small to matter"
     return (
-        f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {LEVEL:g} it "
-        f"counts) and {size}. It was held against {REPLICATES} draws of white noise of the record's size; "
+        f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {d.level:g} it "
+        f"counts) and {size}. It was held against {draws} draws of white noise of the record's size; "
         "what calibration to that noise would change follows from the FMU's sensitivities, to first order."
     )
 
