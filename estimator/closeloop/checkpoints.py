@@ -1,20 +1,50 @@
-"""Results of stages kept on disk, so that an interrupted run goes on where it stopped."""
+"""Checkpoints: results of stages kept on disk, so that an interrupted run goes on where it stopped.
 
-import pickle
+They are read by a codec that runs nothing, and only from a file and a folder that are real.
+"""
+
+import os
 import shutil
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from stat import S_ISREG
 from typing import TypeVar, cast
 
+from estimator.closeloop.decision.detect import Detection
+from estimator.closeloop.decision.verdict import Judgement
+from estimator.closeloop.diagnostics.black_box import BlackBox
+from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.diagnostics.power import Visible
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.screening.missing_force import MissingForce
+from fmus import codec
+from fmus.host.description import PortNames
+
 Result = TypeVar("Result")
+
+SUFFIX = ".checkpoint"
+KEPT = (
+    Unknown, Candidate, Fit, Hypothesis, Promise, PortNames, MissingForce, Detection, BlackBox, Visible,
+    Honesty, Judgement,
+)  # fmt: skip
+# a link is not followed, and a pipe is not waited for, even where one takes the file's place at this moment
+SAFELY = (
+    os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+)
 
 
 @dataclass(frozen=True)
 class Stages:
     """Keeps what stages return in a folder, under a key that says what they were worked out from.
 
-    Without a folder nothing is kept. A result under another key, or one that cannot be read, is made again.
+    Without a folder nothing is kept. A checkpoint with another key, or one that cannot be read, is made
+    again; links are not followed but replaced.
     """
 
     folder: Path | None = None
@@ -24,29 +54,48 @@ class Stages:
         """What the stage returned before, or returns now."""
         if self.folder is None:
             return work()
-        file = self.folder / f"{name}.pickle"
+        file = self.folder / f"{name}{SUFFIX}"
         try:
-            key, kept = pickle.loads(file.read_bytes())
-        except (
-            OSError,
-            EOFError,
-            pickle.UnpicklingError,
-            AttributeError,
-            ImportError,
-            ValueError,
-            TypeError,
-        ):
-            key, kept = None, None
-        if key == self.key:
-            return cast(Result, kept)
+            return cast(Result, self._kept(file))
+        except (OSError, codec.Unreadable):
+            pass  # it is made again below, so that an error of the stage does not seem to come from here
         found = work()
+        if self.folder.is_symlink() or not self.folder.is_dir():
+            _remove(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
-        part.write_bytes(pickle.dumps((self.key, found)))
-        part.replace(file)
+        self._keep(found, file)
         return found
 
+    def _kept(self, file: Path) -> object:
+        if file.parent.is_symlink():
+            raise codec.Unreadable("lies behind a link")
+        with os.fdopen(os.open(file, SAFELY), "rb") as stream:
+            if file.is_symlink() or not S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise codec.Unreadable("is no file")
+            return codec.read(stream, self.key, KEPT)
+
+    def _keep(self, found: object, file: Path) -> None:
+        """Write beside and rename, so that an interruption leaves no half checkpoint."""
+        handle, name = tempfile.mkstemp(dir=file.parent, suffix=".part")
+        part = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                codec.write(stream, found, self.key, KEPT)
+            if file.is_dir() and not file.is_symlink():
+                _remove(file)
+            part.replace(file)
+        finally:
+            part.unlink(missing_ok=True)
+
     def forget(self) -> None:
-        """Delete all that was kept."""
+        """Delete all that was kept; of a link the link, not what it leads to."""
         if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            _remove(self.folder)
+
+
+def _remove(path: Path) -> None:
+    """Delete a folder with all that it holds, a file, or a link, if there is one."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

@@ -19,7 +19,9 @@ def close_loop(
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; one a core by default")] = None,
     seed: Annotated[int, typer.Option(help="of the simulated records without an effect")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="go on with an interrupted run")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="go on from the checkpoints of an interrupted run")
+    ] = False,
 ) -> None:
     """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
 

@@ -35,7 +35,7 @@ Tell = Callable[[str], None]
 Builder = ModelBuilder | ForeignBuilder
 
 
-STAGES = ".stages"  # folder of what an interrupted run leaves
+STAGES = ".stages"  # folder of the checkpoints that an interrupted run leaves
 
 
 def close_loop(
@@ -52,7 +52,7 @@ def close_loop(
     experiment: path of an experiment.toml, or its folder; out: folder for result.json, report.html, the
     figures and the augmented FMU (nothing is written without); data_dir: where the data files lie, by
     default beside the experiment; jobs: processes, by default one a core; seed: of the bootstrap; resume: go
-    on with what an interrupted run left in `out`.
+    on from the checkpoints that an interrupted run left in `out`.
     Raises BadInput for a wrong experiment.
     """
     begun = time.monotonic()
@@ -86,7 +86,7 @@ def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Exper
 
 
 def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> Stages:
-    """Where a run keeps its stages until its results are written; without `resume` what is there goes."""
+    """Where a run keeps its checkpoints until its results are written; old ones go without `resume`."""
     if folder is None:
         return Stages()
     files = [e.file, *e.data_files, *([e.fmu_path] if e.fmu_path else [])]

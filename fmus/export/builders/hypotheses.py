@@ -1,6 +1,7 @@
 """FMUs with effects built in, made when first asked for: one model or foreign FMU, many hypotheses."""
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -24,6 +25,7 @@ from fmus.models import model_class
 
 Effects = tuple[tuple[str, str], ...]  # (kind, location)
 LONGEST = 100  # characters of a folder's name, well below what file systems take
+PLAIN = re.compile(r"[\w@+ .-]+")  # a name that is that of a folder on every file system
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def _fastest(model: Model, path: Path) -> Path:
 
 def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:
     name = "+".join(["base", *(f"{k}@{at}" for k, at in effects)])
-    if len(name) > LONGEST:
+    if len(name) > LONGEST or not PLAIN.fullmatch(name):  # a slash would lead out of the folder
         name = f"{len(effects)}_effects_{sha256(name.encode()).hexdigest()[:16]}"
     target = folder / name / "model.fmu"
     if not target.exists():
