@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -140,16 +140,31 @@ def equations(model: Model) -> Equations:
     given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)}
     given |= model.outputs() | model.motions
     y = _complete(model, "outputs", given, [v.name for v in model.of(Output)])
-    f = _compiled("f", model, [x, u, p], cs.vertcat(*dot.values()), "dx")
-    h = _compiled("h", model, [x, u, p], cs.vertcat(*y.values()), "y")
+    calls = _with_own_functions(model.calls)
+    f = _compiled("f", calls, [x, u, p], cs.vertcat(*dot.values()), "dx")
+    h = _compiled("h", calls, [x, u, p], cs.vertcat(*y.values()), "y")
     tolerated = [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
     return Equations(f, h, type(model).method(f, tolerated))
 
 
-def _compiled(name: str, model: Model, symbols: list[Expr], expression: Expr, result: str) -> cs.Function:
+def _with_own_functions(calls: Sequence[Call]) -> list[Call]:
+    """The calls with copies of their functions, which share what the functions share.
+
+    CasADi keeps the derivative of a spline in the spline and serialises it too: without the copies, equations
+    that were linearised would change the bytes of every later build.
+    """
+    packed = cs.StringSerializer()
+    packed.pack([call.function for call in calls])
+    own = cs.StringDeserializer(packed.encode()).unpack()
+    return [replace(call, function=function) for call, function in zip(calls, own, strict=True)]
+
+
+def _compiled(
+    name: str, calls: Sequence[Call], symbols: list[Expr], expression: Expr, result: str
+) -> cs.Function:
     """A function of x, u, p; where the model calls others, a graph of them around its own expressions."""
     names = ["x", "u", "p"]
-    if not model.calls:
+    if not calls:
         return cs.Function(name, symbols, [cs.cse(expression)], names, [result])
     given = [cs.MX.sym(n, s.shape) for n, s in zip(names, symbols, strict=True)]
     known = list(zip(symbols, given, strict=True))
@@ -159,7 +174,7 @@ def _compiled(name: str, model: Model, symbols: list[Expr], expression: Expr, re
         inner = cs.Function("part", [s for s, _ in needed], cs.cse(list(parts)))
         return list(inner.call([m for _, m in needed]))
 
-    for call in model.calls:
+    for call in calls:
         results: Any = call.function.call(worked_out(call.arguments))
         known += zip(call.results, results, strict=True)
     return cs.Function(name, given, worked_out([expression]), names, [result])

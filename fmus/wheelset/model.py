@@ -245,7 +245,7 @@ class Wheelset(Model):
     @cached_property
     def _curves(m) -> dict[str, dict[str, Expr]]:
         """Contact of each wheel, by the fields of the curves."""
-        curves = _own(contact_curves(m.track))
+        curves = contact_curves(m.track)
         found = {}
         for side, shift in m._shifts.items():
             (contact,) = m.call(curves, m.contact_search, shift)
@@ -262,13 +262,9 @@ class Wheelset(Model):
         return phi, (left["lift_slope"] + right["lift_slope"]) * rate_of_shift / base
 
     @cached_property
-    def _kalker(m) -> cs.Function:
-        return _own(looked_up())
-
-    @cached_property
     def _scale(m) -> Expr:
         """Size of the patches over the table's; called, as otherwise each use would work it out anew."""
-        (scale,) = m.call(_own(patch_scale()), m.F_n, m.G, m.nu)
+        (scale,) = m.call(patch_scale(), m.F_n, m.G, m.nu)
         return scale
 
     @cached_property
@@ -303,7 +299,7 @@ class Wheelset(Model):
 
     def _coefficients(m, a: Expr, b: Expr) -> list[Expr]:
         """Kalker's coefficients, or for the linear law those that are given."""
-        c11, c22, c23, c33 = m.call(m._kalker, a / b, m.nu)
+        c11, c22, c23, c33 = m.call(looked_up(), a / b, m.nu)
         kalker = (c11, c22, m.k_spin * c23, m.k_spin * c33)
         area = m.G * a * b
         given = (
@@ -331,8 +327,3 @@ class Wheelset(Model):
             F += F_y
             M += R_x * F_y - R_y * F_x + w.M_z * cs.cos(slope)
         return F, M
-
-
-def _own(function: cs.Function) -> cs.Function:
-    """A copy of a function of the process: CasADi keeps derivatives in it, and writes them into FMUs."""
-    return cs.Function.deserialize(function.serialize())

@@ -307,6 +307,32 @@ def test_functions_called_in_the_equations_are_worked_out_in_their_order():
     assert slope == pytest.approx(np.array([[0, 1], [-0.2, 0.25 - 0.2]]))
 
 
+class Splined(Ball):
+    """The ball on a spring whose force is a spline, in a function that every model of the class shares."""
+
+    name = "Splined"
+    q = cs.MX.sym("q")
+    spline = cs.bspline(q, cs.DM([1, -2, 3, 4]), [[-2.0] * 4 + [2.0] * 4], [3], 1)
+    spring = cs.Function("spring", [q], [spline])
+
+    def derivatives(self):
+        (force,) = self.call(self.spring, self.x)
+        return {"x": self.v, "v": (self.F_ext - force) / self.m}
+
+
+@pytest.mark.parametrize("kind", [*MODELS.values(), Splined], ids=lambda kind: kind.name)
+def test_linearising_a_model_changes_none_of_its_equations(kind):
+    def written(model):
+        made = equations(model)
+        return [f.serialize() for f in (made.f, made.h, made.step)]
+
+    model = kind()
+    before = written(model)
+    equations(model).step.jacobian()
+    assert written(model) == before
+    assert written(kind()) == before
+
+
 def test_models_are_found_by_name_in_any_case():
     assert model_class("TestRig") is MODELS["testrig"]
     with pytest.raises(BadInput, match="did you mean 'testrig'"):

@@ -1,11 +1,18 @@
 """Profiles: exact sections, and what is made of measured points."""
 
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+import fmus
 from fmus.contact.cache import folder
 from fmus.contact.geometry.exact import exact_names, exact_profile
 from fmus.contact.geometry.measured import load_profile, measured_profile
@@ -285,3 +292,24 @@ def test_fits_are_kept_on_disk(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     measured_profile(write_points(tmp_path / "wheel.txt", good(n=407)), "wheel")
     assert len(list(folder().glob("*.npz"))) == 1
+
+
+def test_a_fit_does_not_depend_on_the_number_of_threads(tmp_path):
+    """A machine with one core cannot tell; OpenBLAS then has one thread anyway."""
+    script = """
+        import sys
+        import numpy as np
+        from fmus.contact.geometry.smoothing import smooth_curve
+        print(smooth_curve(*np.loadtxt(sys.argv[1]).T).spline.c.tobytes().hex())
+    """
+    file = tmp_path / "points.txt"
+    np.savetxt(file, good(n=1500))
+    command = [sys.executable, "-c", textwrap.dedent(script), str(file)]
+    where = os.environ | {"PYTHONPATH": str(Path(fmus.__file__).parents[1])}
+    one, two = (
+        subprocess.run(
+            command, env=where | {"OPENBLAS_NUM_THREADS": threads}, check=True, capture_output=True
+        ).stdout
+        for threads in ("1", "2")
+    )
+    assert one == two

@@ -136,9 +136,11 @@ def test_two_builds_have_the_same_bytes(built, name, tmp_path, monkeypatch):
 
 
 def test_a_native_build_before_changes_no_byte(tmp_path):
-    before = sums(build_python(MODELS["wheelset"](), tmp_path / "a.fmu"))
-    build_native(MODELS["wheelset"](), tmp_path)
-    assert sums(build_python(MODELS["wheelset"](), tmp_path / "b.fmu")) == before
+    model = MODELS["wheelset"]()
+    before = sums(build_python(model, tmp_path / "a.fmu"))
+    build_native(model, tmp_path)
+    assert sums(build_python(model, tmp_path / "same_model.fmu")) == before
+    assert sums(build_python(MODELS["wheelset"](), tmp_path / "new_model.fmu")) == before
 
 
 def test_a_build_elsewhere_has_the_same_bytes(built, tmp_path):

@@ -16,6 +16,7 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from fmus.contact.arguments import Array
+from fmus.contact.one_thread import one_thread
 
 # of the weight of the penalty: coefficients, rms distance, effective count of parameters
 Fitted: TypeAlias = Callable[[float], tuple[Array, float, float]]
@@ -45,6 +46,7 @@ class Curve:
     parameters: float
 
 
+@one_thread()
 def smooth_curve(y: Array, z: Array, rms: float | None = None) -> Curve:
     """The curve through points (n,), m, in their order; rms: distance that counts as noise, m, else found."""
     points = np.column_stack([y, z])
