@@ -13,10 +13,10 @@ from stat import S_ISREG
 from typing import TypeVar, cast
 
 from estimator.closeloop.decision.detect import Detection
-from estimator.closeloop.decision.verdict import Judgement
 from estimator.closeloop.diagnostics.black_box import BlackBox
 from estimator.closeloop.diagnostics.diagnostics import Honesty
 from estimator.closeloop.diagnostics.power import Visible
+from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -31,7 +31,7 @@ Result = TypeVar("Result")
 SUFFIX = ".checkpoint"
 KEPT = (
     Unknown, Candidate, Fit, Hypothesis, Promise, PortNames, MissingForce, Detection, BlackBox, Visible,
-    Honesty, Judgement,
+    Honesty, Check, Judgement,
 )  # fmt: skip
 # a link is not followed, and a pipe is not waited for, even where one takes the file's place at this moment
 SAFELY = (

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from estimator.closeloop.decision.detect import Detection
-from estimator.closeloop.decision.verdict import Judgement
 from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.screening.missing_force import MissingForce

@@ -13,12 +13,12 @@ from estimator.closeloop.decision.allowed import allowed
 from estimator.closeloop.decision.detect import detect
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.verdict import (
-    Judgement,
     confirmed_on_test,
     judge,
     without_fits,
 )
 from estimator.closeloop.diagnostics.diagnostics import honesty
+from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.reweighted import best_weights, fitted_again, rescaled
@@ -74,7 +74,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
         lambda: honesty(problem, base, shown.fit, change, size, level, np.random.default_rng(seed)),
     )
     found = (declared, base, noise, size, detection, tuple(forces), tuple(shown.promises))
-    early = without_fits(problem, base, detection, noise)
+    before, early = without_fits(problem, base, detection, noise)
     if early:
         return Outcome(*found, (), (), early, owed)
     search = Search(shown, tell, jobs)
@@ -88,7 +88,7 @@ def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stag
         found = (declared, base, noise, size, *found[4:])
     singles, pairs, judgement = _answered(shown, forces, search, singles, pairs, tell)
     tell("test", "holding the answer against the test part")
-    judgement = confirmed_on_test(problem, base, judgement, size)
+    judgement = confirmed_on_test(problem, base, judgement, size).after(before)
     if judgement.verdict == "unexplained":
         tell("free form", "fitting a force of free form")
         curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))

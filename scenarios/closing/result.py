@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from estimator.closeloop.decision.equivalence import becomes
-from estimator.closeloop.decision.verdict import Verdict, gap_closed
+from estimator.closeloop.decision.verdict import gap_closed
 from estimator.closeloop.diagnostics.diagnostics import Honesty
 from estimator.closeloop.diagnostics.power import Visible
+from estimator.closeloop.evidence import Check, Verdict
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.scores import lead
@@ -46,14 +47,18 @@ class Alternative:
 class Result:
     """The contract's result of close-loop; `error` holds RMSE on the test part by output.
 
-    There `placebo` is that of the best wrong effect, `black_box` that of the calibrated FMU with a linear
-    model of its residual. power: the smallest effects that the record would have shown, null where none;
-    free_form: where nothing explains, the curve that comes nearer, which `after` and the FMU then hold.
+    decision: the checks that the verdict follows from, in their order, with the number and the limit of each;
+    policy: the version of all limits. In `error`, `placebo` is that of the best wrong effect, `black_box`
+    that of the calibrated FMU with a linear model of its residual. power: the smallest effects that the
+    record would have shown, null where none; free_form: where nothing explains, the curve that comes nearer,
+    which `after` and the FMU then hold.
     seconds: of wall time, by stage.
     """
 
     experiment: str
     verdict: Verdict
+    decision: list[dict[str, Any]]
+    policy: str
     effects: list[Effect]
     alternatives: list[Alternative]
     calibrated: dict[str, Figure]
@@ -94,6 +99,8 @@ def result_of(
     return Result(
         experiment=name,
         verdict=found.judgement.verdict,
+        decision=[_check(c) for c in found.judgement.checks],
+        policy=problem.policy.version,
         effects=list(_unique(e for h in members for e in effects_of(h))),
         alternatives=alternatives(problem, found),
         calibrated={n: _figure(best, n) for n in problem.calibrate},
@@ -141,6 +148,16 @@ def best_wrong(found: Outcome) -> Hypothesis | None:
 
 def _nested(h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
     return any(becomes(h, m) or becomes(m, h) for m in members)
+
+
+def _check(c: Check) -> dict[str, Any]:
+    """A line of the decision; JSON has no infinity."""
+    return {
+        "check": c.name,
+        "value": c.value if np.isfinite(c.value) else None,
+        "limit": c.limit,
+        "passed": c.passed,
+    }
 
 
 def _line(v: Visible) -> dict[str, Any]:

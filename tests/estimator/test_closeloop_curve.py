@@ -8,12 +8,12 @@ import pytest
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import (
-    another,
     confirmed,
     curvature,
+    curve_check,
     misnamed,
 )
-from estimator.closeloop.decision.verdict import Judgement
+from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT
@@ -31,6 +31,7 @@ from tests.helpers.carriage import (
     to_and_fro,
     viscous,
 )
+from tests.helpers.verdicts import judged
 
 NOTICED = DEFAULT.decision.noticed
 
@@ -58,7 +59,7 @@ def asked(builder: ModelBuilder, resistance: Force, kind: str, seed: int) -> Tra
     """A record with a resistance, to which one law is fitted."""
     found = looked_at("one", problem(builder, record(to_and_fro(2.0), resistance, seed)), (kind,))
     best = found.found.singles[0]
-    named = Judgement("traced", (best,), "it accounts for the residual")
+    named = judged("traced", (best,), "it accounts for the residual")
     return replace(found, found=replace(found.found, judgement=named))
 
 
@@ -77,7 +78,10 @@ def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
     traced = asked(builder, resistance, kind, seed)
     o, here = traced.found, traced.problem
     assert max(curvature(here, o.singles[0], o.forces, o.size)) < NOTICED
-    assert confirmed(here, o.base, o.judgement, o.forces, o.size) is o.judgement
+    told = confirmed(here, o.base, o.judgement, o.forces, o.size)
+    assert (told.verdict, told.members) == (o.judgement.verdict, o.judgement.members)
+    assert told.checks[-1].name == "the force follows the law"
+    assert told.checks[-1].passed
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -137,7 +141,7 @@ def test_an_open_form_may_leave_a_curve_that_is_little_of_it(left, own, elsewher
         for squares in (3e4, 1000 + left)
     )
     asked = [SimpleNamespace(policy=DEFAULT, form_error=form) for form in (0.0, 0.02)]
-    assert [another(a, h, base, own, elsewhere) for a in asked] == [closed, opened]
+    assert [not curve_check(a, h, base, own, elsewhere).passed for a in asked] == [closed, opened]
 
 
 def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
@@ -145,7 +149,7 @@ def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
     here = problem(builder, record(to_and_fro(2.0), resistance, 3))
     o = looked_at("one", here, kinds).found
     fitted = {h.candidates[0].kind: h for h in o.singles}
-    told = Judgement("ambiguous", tuple(fitted[k] for k in kinds), "this record cannot tell them apart")
+    told = judged("ambiguous", tuple(fitted[k] for k in kinds), "this record cannot tell them apart")
     return confirmed(here, o.base, told, o.forces, o.size)
 
 
@@ -168,13 +172,13 @@ def test_of_several_laws_each_is_what_its_name_says(builder):
     both = replace(
         h, candidates=(replace(h.candidates[0], kind="parameter_offset", location="m"), *h.candidates)
     )
-    told = confirmed(here, o.base, Judgement("several", (both,), "both"), o.forces, o.size)
+    told = confirmed(here, o.base, judged("several", (both,), "both"), o.forces, o.size)
     assert told.verdict == "unexplained"
     assert "over the velocity at carriage" in told.reason
     rounded = {n: v / 1e3 if n.endswith("v_s") else v for n, v in h.fit.theta.items()}
     sharp = replace(both, fit=replace(h.fit, values=np.array([rounded[u.name] for u in h.fit.unknowns])))
-    told = Judgement("several", (sharp,), "both")
-    assert confirmed(here, o.base, told, o.forces, o.size) is told
+    told = judged("several", (sharp,), "both")
+    assert confirmed(here, o.base, told, o.forces, o.size).members == told.members
 
 
 def test_of_a_class_no_law_stays_where_curves_deny_all_over_that_motion(builder):
@@ -197,8 +201,8 @@ def test_rounded_friction_is_named_where_any_other_curve_would_show(builder):
     assert misnamed(h, o.forces)
     assert not misnamed(h, o.forces, DEFAULT.decision.fastest)
     assert h.theta["coulomb_friction_carriage_v_s"] == pytest.approx(ROUNDED, rel=0.05)
-    told = Judgement("traced", (h,), "it accounts for the residual")
-    assert confirmed(here, o.base, told, o.forces, o.size) is told
+    told = judged("traced", (h,), "it accounts for the residual")
+    assert confirmed(here, o.base, told, o.forces, o.size).members == told.members
     # where the form is open other curves may pass for it, and where it explains little
     assert confirmed(replace(here, form_error=0.05), o.base, told, o.forces, o.size).members == ()
     little = replace(o.base, fit=replace(o.base.fit, residual=h.fit.residual * 1.01))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.decision.detect import matters
+from estimator.closeloop.decision.detect import importance
 from estimator.closeloop.decision.equivalence import becomes, equivalent
 from estimator.closeloop.decision.verdict import (
     completes,
@@ -25,10 +25,15 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.closing.result import effects_of
+from tests.helpers.verdicts import DETECTED
 
 SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
 T = np.arange(2.0 * SAMPLES)
 FORM = 0.2  # of an output, so 6 times the noise
+
+
+def matters(*residual, **how) -> bool:
+    return importance(*residual, **how) >= 1.0
 
 
 def asked(form_error: float = 0.0) -> Problem:
@@ -179,7 +184,7 @@ def test_several_effects_account_for_more_of_what_could_be_form(before, after, f
 )
 def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
     base = in_parts(early, late)
-    told = judge(asked(), base, [base], [], NOISE, NOISE)
+    told = judge(asked(), base, [base], [], NOISE, NOISE).after(DETECTED)
     assert told.verdict == "unexplained"
     assert said in told.reason
     assert bool(told.next_experiment) == (said != "nearest was")
@@ -196,7 +201,7 @@ def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
 )
 def test_what_no_effect_explains_may_be_another_form(form, rms, began, verdict):
     base = left(rms, 1.1)
-    assert judge(asked(form), base, [base], [], NOISE, NOISE, began).verdict == verdict
+    assert judge(asked(form), base, [base], [], NOISE, NOISE, began).after(DETECTED).verdict == verdict
 
 
 # ---- simpler laws

@@ -14,7 +14,6 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from estimator.closeloop.decision.detect import Detection
-from estimator.closeloop.decision.verdict import Judgement
 from estimator.closeloop.diagnostics.black_box import LARGEST, black_box
 from estimator.closeloop.diagnostics.decoys import (
     decoy,
@@ -43,6 +42,7 @@ from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
 from scenarios.closing.report import write_report
 from scenarios.closing.result import result_of
+from tests.helpers.verdicts import judged
 
 SEEDS = st.integers(0, 10_000)
 FREE_FORMS = sorted(k for k, e in EFFECTS.items() if issubclass(e, FreeForm))
@@ -434,8 +434,8 @@ def nameless(drive: ModelBuilder) -> tuple[Problem, Outcome, Hypothesis | None]:
     asked, base = base_of(drive_record(law, np.random.default_rng(12)), drive)
     forces = missing_forces(asked, {}, NOISE)
     found = free_form(asked, base, forces, NOISE, 1)
-    detection = Detection(0.01, 0.006, {"size of the held-out residual": 50.0}, True)
-    told = Judgement("unexplained", (), "nothing fits")
+    detection = Detection(0.01, 0.006, {"size of the held-out residual": 50.0}, 1.0)
+    told = judged("unexplained", (), "nothing fits")
     return asked, Outcome(base, base, NOISE, NOISE, detection, tuple(forces), (), (base,), (), told), found
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2, kstest
 
-from estimator.closeloop.decision.verdict import Judgement, gap_closed
+from estimator.closeloop.decision.verdict import gap_closed
 from estimator.closeloop.fitting.rounds import finished
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
@@ -41,6 +41,7 @@ from tests.helpers.carriage import (
     to_and_fro,
     viscous,
 )
+from tests.helpers.verdicts import judged
 
 FREE = (-np.inf, np.inf)
 FRICTIONS = ("constant_force", "coulomb_friction", "viscous_damping")
@@ -226,7 +227,7 @@ def test_a_law_that_nearly_fits_yields_to_the_one_that_does(builder: ModelBuilde
         asked = replace(problem(builder, made, speed=0.3), calibrate={})
         ones.append(looked_at(name, asked, kinds))
     even = ones[0].found
-    not_told = Judgement("ambiguous", even.singles, "both, for all that this record tells")
+    not_told = judged("ambiguous", even.singles, "both, for all that this record tells")
     ones[0] = replace(ones[0], found=replace(even, judgement=not_told))
     found = transfers(*ones)
     assert statuses(found) == {"viscous_damping": "surpassed", "quadratic_damping": "confirmed"}
@@ -340,8 +341,8 @@ def test_an_effect_is_found_again_beside_another_one(builder: ModelBuilder) -> N
     promise = Promise(tuple(pair), 0.0, {**parts["coulomb_friction"].start, **parts["constant_force"].start})
     base, size = both.found.base, both.found.size
     fitted = finished(both.problem, base.fit.unknowns, [promise], size, 1)
-    judged = Judgement("several", tuple(fitted), "two")
-    both = replace(both, found=replace(both.found, judgement=judged))
+    two = judged("several", tuple(fitted), "two")
+    both = replace(both, found=replace(both.found, judgement=two))
     [found] = transfers(one, both)
     assert found.status == "confirmed"
     assert [c.kind for c in found.held.candidates if c not in found.member.candidates][-1] == "constant_force"

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.closeloop.decision.detect import Detection
-from estimator.closeloop.decision.verdict import Judgement, judge
+from estimator.closeloop.decision.verdict import judge
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.rounds import finished
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -20,6 +20,7 @@ from estimator.closeloop.several.transfer import Traced
 from estimator.noise import noise_floor
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.verdicts import DETECTED, judged
 
 DT, SAMPLES, FINE = 0.01, 1500, 10
 NOISE = np.array([1e-3, 1e-2])  # m, m/s
@@ -114,9 +115,9 @@ def looked_at(name: str, asked: Problem, kinds: Sequence[str], quiet: bool = Fal
     candidates = physical_candidates(offered, asked.builder.outside(), asked.record, forces)
     promises = [_promise(c, base.fit.theta) for c in candidates]
     singles = ranked(asked, finished(asked, base.fit.unknowns, promises, size, 1), size)
-    none = Judgement("no_discrepancy", (), "nothing")
-    said = none if quiet else judge(asked, base, singles, (), noise, size)
-    detection = Detection(0.01, 0.0, {}, True)
+    none = judged("no_discrepancy", (), "nothing")
+    said = none if quiet else judge(asked, base, singles, (), noise, size).after(DETECTED)
+    detection = Detection(0.01, 0.0, {}, 1.0)
     found = (declared, base, noise, size, detection, tuple(forces), tuple(promises), tuple(singles), ())
     return Traced(name, asked, Outcome(*found, said))
 

@@ -18,6 +18,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 
 LIKENESS = "likeness to an effect"
+TINY = 1e-300  # of a signal or a noise that is zero
 
 
 @dataclass(frozen=True)
@@ -25,18 +26,23 @@ class Detection:
     """Whether a residual is more than noise, and whether it matters.
 
     p_value: of the most telling figure, corrected for their number, which counts below `level`; figures:
-    observed over the 95 % point of noise; material: whether the residual is large enough to matter.
+    observed over the 95 % point of noise; importance: size of the residual over the least that matters.
     """
 
     level: float
     p_value: float
     figures: Mapping[str, float]
-    material: bool
+    importance: float
 
     @property
     def detected(self) -> bool:
         """More than noise."""
         return self.p_value < self.level
+
+    @property
+    def material(self) -> bool:
+        """Large enough to matter."""
+        return self.importance >= 1.0
 
 
 def detect(
@@ -75,24 +81,26 @@ def detect(
         figures[name] = float(value / np.quantile(reference, 0.95))
     p_value = min(1.0, len(p_values) * float(min(p_values)))
     clear = figures.get(LIKENESS, 0.0) >= limits.clear_likeness
-    return Detection(limits.level, p_value, figures, matters(problem, base, noise, likeness, sets_in, clear))
+    return Detection(
+        limits.level, p_value, figures, importance(problem, base, noise, likeness, sets_in, clear)
+    )
 
 
-def matters(
+def importance(
     problem: Problem,
     base: Hypothesis,
     noise: Array,
     likeness: float = 1.0,
     sets_in: bool = False,
     clear: bool = False,
-) -> bool:
-    """Whether a residual is too large to be left alone, in any output and either part of the record.
+) -> float:
+    """How large a residual is beside the least that matters, in any output and either part of the record.
 
-    Compared with the signal is what it has beyond noise, beyond what chance makes of that too. Where the
-    FMU's form leaves something open, what no fit has seen counts alone; less than form leaves matters only
-    if one effect could explain much of it, or if it sets in during the record, as no form does.
-    likeness: share of what is beyond noise that one effect could explain, by linear regression; clear:
-    whether it is so much like one that noise never is.
+    From 1 on it matters. Compared with the signal and with the noise is what it has beyond noise, beyond what
+    chance makes of that too. Where the FMU's form leaves something open, what no fit has seen counts alone;
+    less than form leaves matters only if one effect could explain much of it, or if it sets in during the
+    record, as no form does. likeness: share of what is beyond noise that one effect could explain, by linear
+    regression; clear: whether it is so much like one that noise never is.
     """
     limits = problem.policy.detection
     signal, rms, form_open = signal_size(problem), base.rms(problem, "unseen"), problem.form_error > 0
@@ -100,11 +108,13 @@ def matters(
     if not form_open:
         beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
     least = limits.noise_share_of_effects if clear and not form_open else limits.noise_share
-    telling = bool(np.any((beyond >= limits.signal_share * signal) | (beyond >= least * noise)))
+    lowest = np.minimum(limits.signal_share * signal, least * noise)
+    telling = float(np.max(beyond / np.maximum(lowest, TINY)))
     if not form_open:
         return telling
-    large = (beyond >= problem.form_error * signal) & (rms >= limits.open_form_noises * noise)
-    return bool(np.any(large)) or (telling and (sets_in or likeness >= limits.open_form_likeness))
+    form = np.maximum(problem.form_error * signal, TINY)
+    large = float(np.max(np.minimum(beyond / form, rms / (limits.open_form_noises * noise))))
+    return max(large, telling) if sets_in or likeness >= limits.open_form_likeness else large
 
 
 def _beyond(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> Array:

@@ -1,15 +1,16 @@
 """Is it the law's curve? What a free curve over the same motion could explain of what a law leaves."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from estimator.closeloop.decision.verdict import (
-    Judgement,
     named,
     no_law,
     noticed,
 )
+from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
@@ -23,44 +24,52 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import ForceLaw
 
+FOLLOWS: Name = "the force follows the law"
+
 
 def confirmed(
     problem: Problem, base: Hypothesis, judgement: Judgement, forces: Sequence[MissingForce], size: Array
 ) -> Judgement:
-    """The judgement, or one without its best single law where that is not the curve that the force follows.
+    """The judgement, without its best member where a law of that is not the curve that the force follows.
 
-    Then those of its class stay that are not denied so, if one of them is a curve over the same motion; else
-    it is `unexplained`. So it is with several laws, one of which is not what its name says.
+    Then those of its class stay that are not denied so; for a single law only if one of them is a curve over
+    the same motion; else it is `unexplained`.
     Asked where noise is declared: else what is left is no measure.
     """
-    best = judgement.members[:1]
-    if not best or not problem.record.floor_known:
+    if not judgement.members or not problem.record.floor_known:
         return judgement
-    [h], open_form = best, problem.form_error > 0
+    best, *others = judgement.members
+    check = _follows(problem, best, base, forces, size)
+    if check.passed:
+        return replace(judgement, checks=(*judgement.checks, check))
+    rest = [m for m in others if _follows(problem, m, base, forces, size).passed]
+    if len(best.candidates) == 1 and not any(motion(m) == motion(best) for m in rest):
+        rest = []
+    if rest:
+        return named(rest).after(judgement.checks)
+    wrong = doubted(problem, best, base, forces)
+    return no_law(best, wrong[0] if wrong else None, check).after(judgement.checks)
 
-    def doubted(m: Hypothesis) -> list[Candidate]:
-        wrong = misnamed(m, forces)
-        if open_form or not wrong:
-            return wrong
-        nowhere = misnamed(m, forces, problem.policy.decision.fastest)
-        return [c for c in wrong if c in nowhere or not told_apart(problem, m, c, base)]
 
-    if len(h.candidates) > 1:
-        rest = [m for m in judgement.members if not doubted(m)]
-        if h in rest:
-            return judgement
-        return named(rest, "several") if rest else no_law(h, doubted(h)[0])
+def _follows(
+    problem: Problem, h: Hypothesis, base: Hypothesis, forces: Sequence[MissingForce], size: Array
+) -> Check:
+    """Whether the laws of a hypothesis are what their names say, and a single one the curve of its force."""
+    wrong = doubted(problem, h, base, forces)
+    if wrong or len(h.candidates) > 1:
+        return Check.most(FOLLOWS, len(wrong), 0)
+    return curve_check(problem, h, base, *curvature(problem, h, forces, size))
 
-    def denied(m: Hypothesis) -> bool:
-        if doubted(m):
-            return True
-        own, elsewhere = curvature(problem, m, forces, size)
-        return another(problem, m, base, own, elsewhere)
 
-    if not denied(h):
-        return judgement
-    rest = [m for m in judgement.members[1:] if not denied(m)]
-    return named(rest, "traced") if any(motion(m) == motion(h) for m in rest) else no_law(h)
+def doubted(
+    problem: Problem, h: Hypothesis, base: Hypothesis, forces: Sequence[MissingForce]
+) -> list[Candidate]:
+    """Laws of a hypothesis that with its values are not what their names say, as far as the record tells."""
+    wrong = misnamed(h, forces)
+    if problem.form_error > 0 or not wrong:
+        return wrong
+    nowhere = misnamed(h, forces, problem.policy.decision.fastest)
+    return [c for c in wrong if c in nowhere or not told_apart(problem, h, c, base)]
 
 
 def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0) -> list[Candidate]:
@@ -102,8 +111,8 @@ def over_what(c: Candidate) -> str:
     return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
-def another(problem: Problem, h: Hypothesis, base: Hypothesis, own: float, elsewhere: float) -> bool:
-    """Whether the law of a hypothesis is not the curve of its force; own, elsewhere: see `curvature`.
+def curve_check(problem: Problem, h: Hypothesis, base: Hypothesis, own: float, elsewhere: float) -> Check:
+    """Whether the law of a hypothesis is the curve of its force; own, elsewhere: see `curvature`.
 
     It is not where a curve is most of what the law leaves, and plain; or much of what the law explains. Where
     the FMU's form leaves something open, right laws leave some curve too: there it has to be much of both,
@@ -112,11 +121,11 @@ def another(problem: Problem, h: Hypothesis, base: Hypothesis, own: float, elsew
     limits = problem.policy.decision
     plain, left = max(limits.noticed, limits.curve_of_noise * len(h.fit.residual)), h.fit.beyond_noise
     if problem.form_error > 0:
-        least = max(
-            plain, limits.open_curve_left * left, limits.open_curve_explained * (cost(base) - cost(h))
-        )
-        return own > least and own > limits.open_curve_elsewhere * elsewhere
-    return own > max(plain, limits.second_share * left) or own > noticed(problem, h, base)
+        explained = cost(base) - cost(h)
+        least = max(plain, limits.open_curve_left * left, limits.open_curve_explained * explained)
+        return Check.most(FOLLOWS, own, max(least, limits.open_curve_elsewhere * elsewhere))
+    least = min(max(plain, limits.second_share * left), noticed(problem, h, base))
+    return Check.most(FOLLOWS, own, least)
 
 
 def curvature(

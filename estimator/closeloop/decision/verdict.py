@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from estimator.closeloop.decision.detect import (
-    Detection,
-    matters,
-    signal_size,
-)
+from estimator.closeloop.decision.detect import Detection, importance, signal_size
 from estimator.closeloop.decision.equivalence import becomes, equivalent, splitting
+from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.onset import moment
@@ -21,7 +18,6 @@ from estimator.closeloop.hypotheses.scores import (
     beats,
     beyond_noise,
     beyond_noise_of_all,
-    idle,
     lead,
     leaves_noise,
 )
@@ -29,30 +25,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.record import Array, BoolArray
 from fmus.effects import EFFECTS
 
-Verdict = Literal[
-    "no_discrepancy",
-    "sensor_fault",
-    "traced",
-    "ambiguous",
-    "several",
-    "unexplained",
-    "insufficient_excitation",
-]
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """The verdict, the hypotheses that it rests on (the class, best first) and the way to split them."""
-
-    verdict: Verdict
-    members: tuple[Hypothesis, ...]
-    reason: str
-    next_experiment: str = ""
-
-    def of(self, found: Sequence[Hypothesis]) -> Judgement:
-        """The same of hypotheses as they were fitted."""
-        fitted = {h.key: h for h in found}
-        return replace(self, members=tuple(fitted[m.key] for m in self.members))
+TINY = 1e-300  # of a variance that is zero
 
 
 def gap_closed(before: Array, after: Array, noise: Array) -> Array:
@@ -62,22 +35,38 @@ def gap_closed(before: Array, after: Array, noise: Array) -> Array:
 
 
 def explains(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> bool:
-    """Whether a hypothesis accounts for the discrepancy on the part to choose.
+    """Whether a hypothesis accounts for the discrepancy on the part to choose."""
+    return all(c.passed for c in account(problem, h, base, noise, size))
+
+
+def account(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> list[Check]:
+    """The checks of a hypothesis on the part to choose.
 
     Every effect must be clear of zero, and the whole better than without it over the blocks of that part.
     Outputs with declared noise must come down to it, or nearly so; the others must lose most of their
     variance.
     """
-    limits = problem.policy.decision
-    if idle(problem, h, base) or not beats(problem, h, base, size):
-        return False
-    declared = ~np.isnan(problem.record.noise_std)
-    squares = [
-        np.mean((x.of(problem, "choose") / size)[:, ~declared] ** 2) if (~declared).any() else 0.0
-        for x in (h, base)
+    limits, declared = problem.policy.decision, ~np.isnan(problem.record.noise_std)
+    clear = min(h.significance(base), default=0.0)
+    mean, error = lead(problem, h, base, size)
+    found = [
+        Check.least("the size is clear of zero", clear, limits.significant),
+        better("better than without it on the part to choose", mean, error, limits.telling),
     ]
-    enough = squares[0] <= (1 - limits.explained) * squares[1] if (~declared).any() else True
-    return bool(np.all(reached(problem, h, base, noise, size)[declared]) and enough)
+    if declared.any():
+        left = int(np.sum(declared & ~reached(problem, h, base, noise, size)))
+        found.append(Check.most("outputs left above their noise", left, 0))
+    if not declared.all():
+        after, before = (np.mean((x.of(problem, "choose") / size)[:, ~declared] ** 2) for x in (h, base))
+        taken = 1 - float(after) / max(float(before), TINY)
+        found.append(Check.least("share of the variance taken away", taken, limits.explained))
+    return found
+
+
+def better(name: Name, mean: float, error: float, limit: float) -> Check:
+    """A check of a difference in log score, in standard errors; none at all is not better."""
+    z = mean / error if error > 0 else 0.0
+    return Check(name, float(z), limit, bool(mean > limit * error))
 
 
 def reached(problem: Problem, h: Hypothesis, base: Hypothesis, noise: Array, size: Array) -> BoolArray:
@@ -129,22 +118,30 @@ def _faulty(problem: Problem, h: Hypothesis) -> BoolArray:
     return np.array([y in faults for y in problem.record.outputs])
 
 
-def without_fits(problem: Problem, base: Hypothesis, detection: Detection, noise: Array) -> Judgement | None:
-    """The verdict where no effect needs to be looked for, or None."""
+def without_fits(
+    problem: Problem, base: Hypothesis, detection: Detection, noise: Array
+) -> tuple[list[Check], Judgement | None]:
+    """The checks of a residual before any effect is looked for, and the verdict where none needs to be."""
     measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
+    moves = float(np.max(np.std(measured, axis=0) / noise))
+    dead = [n.sentence for n in problem.record.notes if n.kind == "constant"]
+    checks = [
+        Check("the residual is more than noise", detection.p_value, detection.level, detection.detected),
+        Check.least("the outputs move out of their noise", moves, problem.policy.decision.excited),
+        Check.least("the residual is large enough to matter", detection.importance, 1.0),
+        Check.most("every sensor moves", len(dead), 0),
+    ]
+    if not detection.detected and not checks[1].passed:
+        reason = "no output moves out of its noise, so that no effect could have been seen"
+        return checks, Judgement(tuple(checks), (), reason, "a record in which the outputs move")
     if not detection.detected:
-        if np.all(np.std(measured, axis=0) < problem.policy.decision.excited * noise):
-            reason = "no output moves out of its noise, so that no effect could have been seen"
-            return Judgement("insufficient_excitation", (), reason, "a record in which the outputs move")
-        return Judgement(
-            "no_discrepancy", (), f"the residual is what noise would leave (p = {detection.p_value:.2g})"
-        )
+        reason = f"the residual is what noise would leave (p = {detection.p_value:.2g})"
+        return checks, Judgement(tuple(checks), (), reason)
     if not detection.material:
         size = ", ".join(f"{r:.2f}" for r in base.rms(problem, "unseen") / noise)
         reason = f"the residual is more than noise, but too small to matter ({size} times the noise)"
-        return Judgement("no_discrepancy", (), reason)
-    dead = [n.sentence for n in problem.record.notes if n.kind == "constant"]
-    return Judgement("sensor_fault", (), "; ".join(dead)) if dead else None
+        return checks, Judgement(tuple(checks), (), reason)
+    return checks, Judgement(tuple(checks), (), "; ".join(dead)) if dead else None
 
 
 def confirmed_on_test(problem: Problem, base: Hypothesis, found: Judgement, size: Array) -> Judgement:
@@ -153,14 +150,19 @@ def confirmed_on_test(problem: Problem, base: Hypothesis, found: Judgement, size
     The best member must be better than the FMU without it there too; else nothing is claimed. The others of
     its class are not asked, for that would choose among them.
     """
-    if not found.members or beats(problem, found.members[0], base, size, "test"):
+    if not found.members:
         return found
-    gained, error = lead(problem, found.members[0], base, size, "test")
+    best, limit = found.members[0], problem.policy.decision.telling
+    gained, error = lead(problem, best, base, size, "test")
+    check = better("better than without it on the test part", gained, error, limit)
+    if check.passed:
+        return replace(found, checks=(*found.checks, check))
     reason = (
-        f"{found.members[0].label} accounts for the part to choose, but the test part does not confirm it: "
+        f"{best.label} accounts for the part to choose, but the test part does not confirm it: "
         f"its log score changes by {gained:.3g} with a standard error of {error:.2g} there"
     )
-    return Judgement("unexplained", (), reason, "a record in which what was seen appears in all three parts")
+    advice = "a record in which what was seen appears in all three parts"
+    return Judgement((*found.checks, check), (), reason, advice)
 
 
 def judge(
@@ -172,37 +174,57 @@ def judge(
     began: whether it sets in during the record.
     """
     good = [h for h in singles if explains(problem, h, base, noise, size)]
-    better = [
+    both = [
         h
         for h in pairs
         if explains(problem, h, base, noise, size) and needed(problem, h, singles, size)
         if problem.form_error > 0 or not problem.record.floor_known or whole(problem, h, singles)
     ]
-    if better and (not good or completes(problem, better[0], good[0], size)):
-        members = [h for h in equivalent(problem, better[0], better, size) if not one_curve(h)]
-        return named(members, "several") if members else no_law(better[0])
+    if both and (not good or completes(problem, both[0], good[0], size)):
+        members = [h for h in equivalent(problem, both[0], both, size) if not one_curve(h)]
+        checks = account(problem, both[0], base, noise, size)
+        return (named(members) if members else no_law(both[0])).after(checks)
     if good:
         members = equivalent(problem, good[0], good, size)
-        best = members[0]
-        more = [h for h in (*good, *pairs) if problem.form_error == 0 and outgrown(problem, best, h, base)]
-        if more:
-            return no_law(best) if becomes(more[0], best) else _not_all(best, more[0])
-        return named(members, "sensor_fault" if good[0].candidates[0].is_fault else "traced")
-    if problem.form_error > 0 and not matters(problem, base, noise, 0.0, began):
+        checks = account(problem, members[0], base, noise, size)
+        more = _richest(problem, members[0], [*good, *pairs], base)
+        if more is None:
+            return named(members).after(checks)
+        checks.append(more[1])
+        denied = no_law if becomes(more[0], members[0]) else partial(_not_all, richer=more[0])
+        return denied(members[0]).after(checks)
+    nearest = singles[0] if singles else base
+    return _nothing(problem, base, noise, began, nearest).after(account(problem, nearest, base, noise, size))
+
+
+def _richest(
+    problem: Problem, best: Hypothesis, others: Sequence[Hypothesis], base: Hypothesis
+) -> tuple[Hypothesis, Check] | None:
+    """The first hypothesis that has outgrown the best one, and what it gains on the part to identify."""
+    more = [h for h in others if problem.form_error == 0 and outgrown(problem, best, h, base)]
+    if not more:
+        return None
+    gained, limit = cost(best) - cost(more[0]), noticed(problem, best, base)
+    return more[0], Check.most("nothing richer gains on the part to identify", gained, limit)
+
+
+def _nothing(problem: Problem, base: Hypothesis, noise: Array, began: bool, nearest: Hypothesis) -> Judgement:
+    """The verdict where no hypothesis accounts for the residual."""
+    size = importance(problem, base, noise, 0.0, began)
+    form = Check.least("more than another form of the model leaves", size, 1.0)
+    if problem.form_error > 0 and not form.passed:
         reason = (
             "the residual is within what another form of the FMU leaves, and no effect explains most of it"
         )
-        return Judgement("no_discrepancy", (), reason)
+        return Judgement((form,), (), reason)
     if _noise_alone(problem, base, noise, "fit"):
         reason = "the part to identify shows no more than noise: what there is begins after it"
-        return Judgement("unexplained", (), reason, "a split with some of it in the part to identify")
+        return Judgement((), (), reason, "a split with some of it in the part to identify")
     if _noise_alone(problem, base, noise, "choose"):
         reason = "the part to choose shows no more than noise: what there is ends before, unconfirmed"
-        return Judgement("unexplained", (), reason, "a split with some of it in the part to choose")
-    nearest = singles[0].label if singles else "none"
-    return Judgement(
-        "unexplained", (), f"no effect of the library accounts for the residual; nearest was {nearest}"
-    )
+        return Judgement((), (), reason, "a split with some of it in the part to choose")
+    label = nearest.label if nearest.candidates else "none"
+    return Judgement((), (), f"no effect of the library accounts for the residual; nearest was {label}")
 
 
 def needed(problem: Problem, pair: Hypothesis, singles: Sequence[Hypothesis], size: Array) -> bool:
@@ -260,31 +282,38 @@ def one_curve(h: Hypothesis) -> bool:
     return len(set(laws)) < len(laws)
 
 
-def no_law(h: Hypothesis, law: Candidate | None = None) -> Judgement:
+def no_law(h: Hypothesis, law: Candidate | None = None, check: Check | None = None) -> Judgement:
     """The verdict where a force keeps to a curve, but not to that of the law which comes nearest.
 
-    law: of those of the hypothesis, where it is not the first.
+    law: of those of the hypothesis, where it is not the first; check: what says so.
     """
     c = law or next(c for c in h.candidates if c.kind in EFFECTS)
     over = EFFECTS[c.kind].over or "motion"
     reason = (
         f"a force over the {over} at {c.location} that follows no law of the library; nearest was {h.label}"
     )
-    return Judgement("unexplained", (), reason)
+    return Judgement((check or Check.most("the force follows the law", 1, 0),), (), reason)
 
 
-def _not_all(m: Hypothesis, h: Hypothesis) -> Judgement:
+def _not_all(m: Hypothesis, richer: Hypothesis) -> Judgement:
     reason = (
-        f"{m.label} accounts for the part to choose, but not for the part to identify, where {h.label} would"
+        f"{m.label} accounts for the part to choose, but not for the part to identify, where {richer.label} "
+        "would"
     )
-    return Judgement("unexplained", (), reason)
+    return Judgement((), (), reason)
 
 
-def named(members: Sequence[Hypothesis], verdict: Verdict) -> Judgement:
-    """The verdict where one hypothesis accounts for the residual; `ambiguous` where several do."""
+def named(members: Sequence[Hypothesis]) -> Judgement:
+    """The verdict where one hypothesis accounts for the residual, or several do."""
+    best = members[0]
+    faults = sum(c.is_fault for c in best.candidates)
+    checks = (
+        Check.most("alternatives that this record does not tell apart", len(members) - 1, 0),
+        Check.most("effects that are needed", len(best.candidates), 1),
+        Check.most("faults of sensors among them", faults, 0),
+    )
     if len(members) == 1:
-        return Judgement(verdict, tuple(members), f"{members[0].label} accounts for the residual")
+        return Judgement(checks, tuple(members), f"{best.label} accounts for the residual")
     names = ", ".join(m.label for m in members)
-    return Judgement(
-        "ambiguous", tuple(members), f"this record cannot tell apart {names}", splitting(members)
-    )
+    reason = f"this record cannot tell apart {names}"
+    return Judgement(checks, tuple(members), reason, splitting(members))
