@@ -24,6 +24,7 @@ from scenarios.closing.page.glossary import effect_words, glossary, hypothesis_w
 from scenarios.closing.page.power_table import power_rows
 from scenarios.closing.page.rejected import (
     chance_words,
+    decided,
     detection_words,
     rejected,
     tried,
@@ -114,6 +115,7 @@ def _rejection(case: Case) -> Values:
         "best": hypothesis_words(case.found.chosen or case.found.base),
         "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
         "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
+        "decision": [decided(c) for c in case.found.judgement.checks],
         "detection": detection_words(case.problem, case.found),
         "chance": chance_words(case.found, case.honesty) if case.honesty else "",
         "black_box": case.honesty.black_box if case.honesty else None,
