@@ -107,6 +107,45 @@ def conversion(unit: str, target_unit: str, where: str) -> tuple[float, float]:
     return source.factor / target.factor, (source.offset - target.offset) / target.factor
 
 
+def model_unit(stated: str | None, declared: str | None, variable: str, where: str) -> str | None:
+    """The unit of an FMU's variable: as the FMU states it, else as the user declares it, else None.
+
+    `where` (file and key) begins the message of the BadInput for a declared unit that is not known or that
+    differs from the stated one.
+    """
+    if declared is None:
+        return stated
+    try:
+        base_exponents(declared)
+        alike = stated is None or conversion(declared, stated, where) == (1.0, 0.0)
+    except BadInput as error:
+        said = str(error).removeprefix(f"{where}: ")
+        raise BadInput(f'{where} model_unit = "{declared}": {said}') from error
+    if not alike:
+        raise BadInput(
+            f"{where} model_unit = \"{declared}\", but {variable} is in '{stated}', as the FMU states; "
+            "leave model_unit out"
+        )
+    return stated or declared
+
+
+def column_conversion(unit: str, target: str | None, variable: str, where: str) -> tuple[float, float]:
+    """Factor and offset from a column's unit to that of an FMU's variable.
+
+    Raises BadInput where the units do not fit, and where that of the variable is said by nobody.
+    """
+    if target is not None:
+        return conversion(unit, target, where)
+    try:
+        base_exponents(unit)
+    except BadInput as error:
+        raise BadInput(f"{where}: {error}") from error
+    raise BadInput(
+        f"{where}: the column is in '{unit}', but the FMU states no unit for {variable} to convert it to; "
+        'write model_unit = "..." beside the column, the unit of the variable in the FMU'
+    )
+
+
 def to_si(values: ArrayLike, unit: str, target_unit: str, where: str) -> NDArray[np.float64]:
     """Values in `unit` -> values in `target_unit`, the unit of the FMU's variable (SI for our own).
 

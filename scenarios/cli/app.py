@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -12,6 +13,7 @@ import typer
 from fmus.errors import BadInput
 from fmus.host.fmu import FmuError
 from scenarios.cli.console import app, said
+from scenarios.finished import finished_or_said
 
 for module in iter_modules([str(Path(__file__).parent)]):
     if module.name not in ("__main__", "app"):
@@ -25,7 +27,9 @@ def main() -> None:
     """Entry of the console command."""
     for name in THREADS:
         os.environ.setdefault(name, "1")
-    sys.exit(run_safely(lambda: app(standalone_mode=False)))
+    with finished_or_said():
+        code = run_safely(lambda: app(standalone_mode=False))
+    sys.exit(code)
 
 
 def run_safely(command: Callable[[], object]) -> int:
@@ -35,6 +39,13 @@ def run_safely(command: Callable[[], object]) -> int:
         return code if isinstance(code, int) else 0
     except (BadInput, FmuError) as error:
         said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
+        return 2
+    except BrokenProcessPool:
+        said.print(
+            "railfmi: a worker process ended before its work was done, because an FMU ended it or memory ran "
+            "out; 'railfmi check' on the FMU tells whether it does so, and --jobs 1 needs the least memory",
+            markup=False, soft_wrap=True,
+        )  # fmt: skip
         return 2
     except typer.Abort:
         return _interrupted()

@@ -88,7 +88,7 @@ def _measured(case: Case) -> Values:
         "cards": error_table.gap_cards(case),
         "channels": list(sections.channels(case)),
         "runs": sections.runs(case),
-        "free_states": case.problem.free_states,
+        "start_values": list(sections.start_values(case)),
     }
 
 

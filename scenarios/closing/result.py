@@ -21,6 +21,8 @@ from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.regressors import is_wave
 from estimator.closeloop.search.free_form import curve_of
 from estimator.record import Array
+from fmus.export.builders.hypotheses import ForeignBuilder
+from fmus.host.archive import describe
 
 Figure = list[float]  # value and standard error
 
@@ -52,7 +54,7 @@ class Result:
     that of the calibrated FMU with a linear model of its residual. power: the smallest effects that the
     record would have shown, null where none; free_form: where nothing explains, the curve that comes nearer,
     which `after` and the FMU then hold.
-    seconds: of wall time, by stage.
+    seconds: of wall time, by stage. start_values: of the states that are not declared, see start_values.
     """
 
     experiment: str
@@ -75,6 +77,7 @@ class Result:
     nomination: dict[str, Any] = field(default_factory=dict)
     free_form: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    start_values: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
         """Write as JSON, whole or not at all."""
@@ -121,7 +124,35 @@ def result_of(
         nomination=_nomination(honesty) if honesty else {},
         free_form=_curve(curve) if curve else {},
         seconds={stage: round(s, 2) for stage, s in found.seconds.items()},
+        start_values=start_values(problem, found),
     )
+
+
+def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
+    """Start values that are not declared, by state: `value`, and `how` it came about.
+
+    "fitted", with `std_error`; all others are left at the FMU's own start value, None where it states none:
+    "not seen" where another start would not have shown in the residual; of outputs of a foreign FMU that are
+    measured or at a port, "not settable" where it takes no start value, "not exact" where it does not say
+    that the start value is exactly that of the state.
+    """
+    fitted, known = found.base.fit, describe(problem.builder(())).variables
+    best = found.built_in or found.base
+    table: dict[str, dict[str, Any]] = {}
+    for name in problem.free_states:
+        if name in fitted.std:
+            fit = best.fit if name in best.fit.std else fitted
+            table[name] = {"how": "fitted", "value": fit.theta[name], "std_error": fit.std[name]}
+        else:
+            table[name] = {"how": "not seen", "value": known[name].start}
+    if isinstance(problem.builder, ForeignBuilder):  # our own outputs are states, or worked out from these
+        own = describe(problem.builder.fmu).variables
+        at_ports = [name for port in problem.ports for name in (port.displacement, port.velocity)]
+        for name in dict.fromkeys([*problem.record.outputs, *at_ports]):
+            if name not in (*problem.free_states, *problem.declared):
+                how = "not settable" if own[name].initial == "calculated" else "not exact"
+                table[name] = {"how": how, "value": own[name].start}
+    return table
 
 
 def errors(problem: Problem, found: Outcome, best: Hypothesis) -> dict[str, Array]:

@@ -19,26 +19,43 @@ def _interval(value: object) -> tuple[float, float]:
     return float(value[0]), float(value[1])
 
 
-def _column_or_number(value: object) -> str | float:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int | float) and _is_number(value):
-        return float(value)
-    raise ValueError(f"must be a column name in quotes or a number, not {value!r}")
-
-
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
 Interval = Annotated[tuple[float, float], PlainValidator(_interval)]
-Channel = Annotated[str | float, PlainValidator(_column_or_number)]
 
 
 class Table(BaseModel):
     """A table of the file: its keys are the fields, no others."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class InputColumn(Table):
+    """A measured input: its column, the column's unit, and the FMU's where the FMU states none.
+
+    Without `unit` the column has the unit that the file states, else that of the FMU.
+    """
+
+    column: str
+    unit: str | None = None
+    model_unit: str | None = None
+
+
+def _column_or_number(value: object) -> str | float | InputColumn:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | float) and _is_number(value):
+        return float(value)
+    if isinstance(value, dict):
+        return InputColumn.model_validate(value)
+    raise ValueError(
+        f"must be a column name in quotes or a number, or a table {{column, unit, model_unit}}, not {value!r}"
+    )
+
+
+Channel = Annotated[str | float | InputColumn, PlainValidator(_column_or_number)]
 
 
 class Split(Table):
@@ -84,10 +101,14 @@ class Split(Table):
 
 
 class Output(Table):
-    """A measured output: its column, the column's unit, and the standard deviation of its noise in it."""
+    """A measured output: its column, the column's unit, and the standard deviation of its noise in it.
+
+    model_unit: the FMU's unit, to be said where the FMU states none; the column is converted to it.
+    """
 
     column: str
     unit: str
+    model_unit: str | None = None
     noise_std: Positive | None = None
 
 
@@ -196,6 +217,17 @@ class Declaration(Table):
     derived: dict[str, Derived] = {}
     ports: tuple[Port, ...] = ()
     estimate: Estimate | None = None
+
+    @property
+    def input_columns(self) -> dict[str, InputColumn]:
+        """The measured inputs; the others are constants."""
+        named = {n: InputColumn(column=c) if isinstance(c, str) else c for n, c in self.inputs.items()}
+        return {name: c for name, c in named.items() if isinstance(c, InputColumn)}
+
+    @property
+    def input_constants(self) -> dict[str, float]:
+        """The inputs that are constant, in the FMU's unit."""
+        return {name: c for name, c in self.inputs.items() if isinstance(c, float)}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

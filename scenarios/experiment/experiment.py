@@ -107,8 +107,9 @@ def _start_can_be_set(v: FmuVariable) -> bool:
 
 def _wrong_values(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
     """Declared numbers and bounds outside the FMU's limits, and declared numbers outside their bounds."""
-    constants = {name: c for name, c in e.inputs.items() if not isinstance(c, str)}
-    for where, table in (("parameters", e.parameters), ("initial", e.initial), ("inputs", constants)):
+    for where, table in (
+        ("parameters", e.parameters), ("initial", e.initial), ("inputs", e.input_constants),
+    ):  # fmt: skip
         for name, value in table.items():
             yield from _outside(f"[{where}] {name} = {value:g}", (value, value), fmu.variables.get(name))
     for name, (low, high) in e.calibrate.items():

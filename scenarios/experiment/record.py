@@ -14,7 +14,7 @@ from estimator.record import (
 )
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
-from fmus.units import conversion
+from fmus.units import column_conversion, model_unit
 from scenarios.experiment.checks import (
     check_cells,
     check_gaps,
@@ -24,7 +24,7 @@ from scenarios.experiment.checks import (
 )
 from scenarios.experiment.experiment import Experiment, check_names
 from scenarios.experiment.readers import read_sheet
-from scenarios.experiment.readers.units import StatedUnits
+from scenarios.experiment.readers.units import SAME, StatedUnits
 
 CHOOSE = 0.2  # of the samples that identify: on these an answer is chosen, if no others are given
 PIECES = 5  # in which they lie
@@ -61,17 +61,12 @@ def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]
     """Factor and offset of each output's column, (n_y, 2), and what was converted."""
     scale, notes = [], []
     for name, output in e.outputs.items():
-        unit = fmu.variables[name].unit
-        factor, offset = 1.0, 0.0
-        if unit is None:
-            said = f"{fmu.name} states no unit for '{name}'; column '{output.column}' is taken as it is"
-            notes.append(Note("unit", output.column, said))
-        else:
-            factor, offset = conversion(output.unit, unit, f"{e.file}: [outputs.{name}]")
-        if (factor, offset) != (1.0, 0.0):
+        where, variable = f"{e.file}: [outputs.{name}]", f"'{name}' of {fmu.name}"
+        unit = model_unit(fmu.variables[name].unit, output.model_unit, variable, where)
+        scale.append(column_conversion(output.unit, unit, variable, where))
+        if scale[-1] != SAME:
             said = f"column '{output.column}' is converted from {output.unit} to {unit}"
             notes.append(Note("unit", output.column, said))
-        scale.append((factor, offset))
     return np.array(scale), notes
 
 
@@ -87,9 +82,12 @@ def _run(
     notes = _checked(e, file, data, missing)
     for name, derived in e.derived.items():
         data[name] = _derivative(t, data[derived.derivative])
+    given = dict[str, Array | float](e.input_constants)
+    for name, channel in e.input_columns.items():
+        given[name] = _input(e, fmu, name, data[channel.column], stated)
     u = np.empty((t.size, len(e.inputs)))
-    for j, (name, channel) in enumerate(e.inputs.items()):
-        u[:, j] = _input(e, fmu, name, data[channel], stated) if isinstance(channel, str) else channel
+    for j, name in enumerate(e.inputs):
+        u[:, j] = given[name]
     outputs = np.column_stack([data[output.column] for output in e.outputs.values()])
     y = outputs * scale[:, 0] + scale[:, 1]
     masks = {"fit": fit[used], "choose": choose[used], "test": test[used]}
@@ -97,19 +95,29 @@ def _run(
 
 
 def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated: StatedUnits) -> Array:
-    """An input in the FMU's unit (N,): taken as it is, unless the file states another unit."""
-    channel = str(e.inputs[name])
-    if channel in e.derived:
-        return values
-    factor, offset = stated.to(channel, fmu.variables[name].unit, f"{e.file}: [inputs] {name}")
+    """An input in the FMU's unit (N,): taken as it is where neither experiment nor file says its unit."""
+    channel, where, variable = e.input_columns[name], f"{e.file}: [inputs] {name}", f"'{name}' of {fmu.name}"
+    column, times = _source(e, channel.column)
+    target = model_unit(fmu.variables[name].unit, channel.model_unit, variable, where)
+    if channel.unit is None:
+        factor, offset = stated.to(column, target, where, times)
+        return values * factor + offset
+    factor, offset = column_conversion(channel.unit, target, variable, where)
+    if (factor, offset) != SAME:
+        said = f"column '{channel.column}' is converted from {channel.unit} to {target}"
+        stated.notes.append(Note("unit", channel.column, said))
     return values * factor + offset
 
 
 def _check_units(e: Experiment, stated: StatedUnits) -> None:
-    """The units declared of the outputs against those that the file states."""
-    for name, output in e.outputs.items():
-        column, times = _source(e, output.column)
-        stated.check(column, times, output.unit, f"{e.file}: [outputs.{name}]")
+    """The units declared of the measured inputs and outputs against those that the file states."""
+    declared = {f"[outputs.{name}]": (output.column, output.unit) for name, output in e.outputs.items()}
+    for name, channel in e.input_columns.items():
+        if channel.unit is not None:
+            declared[f"[inputs] {name}"] = channel.column, channel.unit
+    for where, (name, unit) in declared.items():
+        column, times = _source(e, name)
+        stated.check(column, times, unit, f"{e.file}: {where}")
 
 
 def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -> list[Note]:
@@ -117,7 +125,7 @@ def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -
     t = data[e.time]
     check_gaps(str(file), t)
     measured = dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values())
-    needed = {_source(e, c)[0] for c in e.inputs.values() if isinstance(c, str)}
+    needed = {_source(e, c.column)[0] for c in e.input_columns.values()}
     for column, values in data.items():
         may_miss = missing and column in measured and column not in needed
         check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
@@ -227,7 +235,7 @@ def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
 def _wanted(e: Experiment) -> dict[str, str]:
     """The columns that must be in a file, and where the experiment names them."""
     named = {e.time: "key 'time'"}
-    named |= {c: f"[inputs] {name}" for name, c in e.inputs.items() if isinstance(c, str)}
+    named |= {c.column: f"[inputs] {name}" for name, c in e.input_columns.items()}
     named |= {output.column: f"[outputs.{name}]" for name, output in e.outputs.items()}
     named |= {derived.derivative: f"[derived.{name}]" for name, derived in e.derived.items()}
     return {column: where for column, where in named.items() if column not in e.derived}

@@ -2,7 +2,7 @@
 
 import ast
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +21,7 @@ from scenarios.simulating.value import (
 )
 
 Lookup = Callable[[str], Value]
+Side = tuple[ast.expr, float]  # of a comparison, and its number
 CONSTANTS = MappingProxyType({"pi": np.pi, "e": np.e})
 ARITHMETIC: Mapping[type[ast.AST], tuple[Callable[..., Any], Callable[[Value, Value], str | None]]] = (
     MappingProxyType(
@@ -43,10 +44,14 @@ COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = MappingPro
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a statement holds, and the numbers on the sides of its comparisons, in order."""
+    """Whether a statement holds, and the numbers on the sides of its comparisons, in order.
+
+    problem: which of them is not finite, and why; then neither the statement nor its negation holds.
+    """
 
     holds: bool
     values: tuple[float, ...]
+    problem: str | None = None
 
 
 @dataclass(frozen=True)
@@ -68,9 +73,18 @@ class Statement(Expression):
     """A comparison of numbers, or several joined by and, or, not."""
 
     def verdict(self, lookup: Lookup) -> Verdict:
-        """Whether it holds."""
-        values: list[float] = []
-        return Verdict(_holds(self.tree, lookup, self.where, values), tuple(values))
+        """Whether it holds: never where a number in it is not finite."""
+        sides: list[Side] = []
+        try:
+            holds = _holds(self.tree, lookup, self.where, sides)
+        except BadInput as error:
+            raise BadInput("; ".join([str(error), *_not_finite(self.names, lookup)])) from error
+        values = tuple(number for _, number in sides)
+        wrong = next((side for side, number in sides if not np.isfinite(number)), None)
+        if wrong is None:
+            return Verdict(holds, values)
+        said = [f"'{ast.unparse(wrong)}' is not finite", *_not_finite(_names(wrong, self.where), lookup)]
+        return Verdict(False, values, "; ".join(said))
 
 
 def expression(text: str, where: str) -> Expression:
@@ -197,17 +211,27 @@ def _value(node: ast.expr, lookup: Lookup, where: str) -> Value:
     raise BadInput(f"{where}: '{ast.unparse(node)}' may not stand in a formula")
 
 
-def _holds(node: ast.expr, lookup: Lookup, where: str, values: list[float]) -> bool:
-    """Whether a statement holds; all sides of its comparisons are worked out, none is left out."""
+def _not_finite(names: Iterable[str], lookup: Lookup) -> Iterator[str]:
+    """A sentence on each of these signals that is not finite, with the first place where it is not."""
+    for name in dict.fromkeys(names):
+        signal = lookup(name)
+        bad = np.flatnonzero(~np.isfinite(signal.y))
+        if bad.size and signal.x is not None:
+            axis, unit = ("y", "m") if "contact" in name.split(".") else ("t", "s")
+            yield f"signal '{name}' is not finite from {axis} = {signal.x[bad[0]]:g} {unit} on"
+
+
+def _holds(node: ast.expr, lookup: Lookup, where: str, sides: list[Side]) -> bool:
+    """Whether a statement of finite numbers holds; all sides of its comparisons are worked out."""
     match node:
         case ast.BoolOp(op=op, values=parts):
-            found = [_holds(part, lookup, where, values) for part in parts]
+            found = [_holds(part, lookup, where, sides) for part in parts]
             return all(found) if isinstance(op, ast.And) else any(found)
         case ast.UnaryOp(op=ast.Not(), operand=part):
-            return not _holds(part, lookup, where, values)
+            return not _holds(part, lookup, where, sides)
         case ast.Compare(left=left, ops=ops, comparators=rest):
             numbers = [_value(side, lookup, where).number() for side in (left, *rest)]
-            values += numbers
+            sides += zip((left, *rest), numbers, strict=True)
             pairs = zip(numbers[:-1], ops, numbers[1:], strict=True)
             return all(COMPARISONS[type(op)](a, b) for a, op, b in pairs)
     raise BadInput(f"{where}: '{ast.unparse(node)}' compares nothing")

@@ -24,7 +24,16 @@ AXIS = "s"  # unit of the axis of a run
 
 
 def _measure(function: Callable[[Array], Any]) -> Function:
-    """A number of the samples, in their unit."""
+    """A number of all samples, in their unit."""
+
+    def measure(a: Value) -> Value:
+        return Value(float(function(a.finite_signal()[1])), unit=a.unit)
+
+    return measure
+
+
+def _of_one_sample(function: Callable[[Array], Any]) -> Function:
+    """A number of one of the samples, in their unit; the others do not matter."""
 
     def measure(a: Value) -> Value:
         return Value(float(function(a.signal()[1])), unit=a.unit)
@@ -55,7 +64,10 @@ def _cut(inside: Callable[[Array, float, float], Any]) -> Function:
 
     def cut(a: Value, first: Value, second: Value | None = None) -> Value:
         x, y = a.signal()
-        kept = inside(x, first.number(), second.number() if second else np.inf)
+        places = [place.number() for place in (first, second) if place is not None]
+        if not np.isfinite(places).all():
+            raise BadInput(f"is cut at {', '.join(f'{place:g}' for place in places)}, which is not finite")
+        kept = inside(x, places[0], places[-1])
         return Value(y[kept], x[kept], a.unit)
 
     return cut
@@ -73,6 +85,8 @@ def _at(a: Value, place: Value) -> Value:
 def _shifted(a: Value, delay: Value) -> Value:
     """The signal later by a delay; before its start it rests."""
     x, y = a.signal()
+    if not np.isfinite(delay.number()):
+        raise BadInput(f"has a delay of {delay.number():g}, which is not finite")
     return a.with_y(np.interp(x - delay.number(), x, y), a.unit)
 
 
@@ -94,17 +108,25 @@ def _derivative(a: Value) -> Value:
     x, y = a.signal()
     if x.size < 3:
         raise BadInput("needs three samples for a derivative")
-    return a.with_y(np.gradient(y, x), f"({a.unit or 1})/{AXIS}")
+    with np.errstate(invalid="ignore"):  # inf - inf is nan, which is what it should be
+        return a.with_y(np.gradient(y, x), f"({a.unit or 1})/{AXIS}")
+
+
+def _steps(a: Value) -> Value:
+    """Differences of neighbouring samples."""
+    x, y = a.signal()
+    with np.errstate(invalid="ignore"):
+        return Value(np.diff(y), x[1:], a.unit)
 
 
 def _integral(a: Value) -> Value:
-    x, y = a.signal()
+    x, y = a.finite_signal()
     return Value(float(trapezoid(y, x)), unit=product(a, Value(0.0, unit=AXIS)))
 
 
 def _crossing(a: Value, level: Value) -> Value:
     """Where the signal first passes through a level, linear between the samples; nan where it does not."""
-    places = _crossings(*a.signal(), level.number())
+    places = _crossings(*a.finite_signal(), level.number())
     return Value(float(places[0]) if places.size else float("nan"))
 
 
@@ -117,8 +139,9 @@ def _crossings(x: Array, y: Array, level: float) -> Array:
 
 def _settled(a: Value, target: Value, band: Value) -> Value:
     """From where on the signal stays within a band about a target; nan where it ends outside."""
-    x, y = a.signal()
-    outside = np.flatnonzero(~(np.abs(y - target.number()) <= band.number()))
+    x, y = a.finite_signal()
+    width = band.number() if np.isfinite(band.number()) else np.nan
+    outside = np.flatnonzero(~(np.abs(y - target.number()) <= width))
     if not outside.size:
         return Value(float(x[0]))
     return Value(float(x[outside[-1] + 1]) if outside[-1] + 1 < x.size else float("nan"))
@@ -126,7 +149,9 @@ def _settled(a: Value, target: Value, band: Value) -> Value:
 
 def _peaks(a: Value) -> Value:
     """Amplitudes of an oscillation about zero: the extremes of its half waves."""
-    x, y = a.signal()
+    x, y = a.finite_signal()
+    if np.isnan(y).any():
+        return a.with_y(y, a.unit)
     size = np.abs(y)
     found, _ = find_peaks(size)
     return Value(size[found], x[found], a.unit)
@@ -136,6 +161,8 @@ def _growth(a: Value) -> Value:
     """Rate of an oscillation's amplitude, 1/s: slope of the logarithm of its peaks, by least squares."""
     peaks = _peaks(a)
     x, y = np.asarray(peaks.x), np.asarray(peaks.y)
+    if np.isnan(y).any():
+        return Value(float("nan"), unit="1/s")
     if x.size < 3:
         raise BadInput(f"has {x.size} peaks; a growth needs three")
     return Value(float(np.polyfit(x - x[0], np.log(y), 1)[0]), unit="1/s")
@@ -143,15 +170,26 @@ def _growth(a: Value) -> Value:
 
 def _frequency(a: Value) -> Value:
     """Mean frequency, Hz: half the passages through zero between the first and the last one."""
-    places = _crossings(*a.signal(), 0.0)
+    x, y = a.finite_signal()
+    if np.isnan(y).any():
+        return Value(float("nan"), unit="Hz")
+    places = _crossings(x, y, 0.0)
     if places.size < 3:
         raise BadInput("passes through zero less than three times; a frequency needs more")
     return Value(float((places.size - 1) / 2 / (places[-1] - places[0])), unit="Hz")
 
 
+def _count(a: Value) -> Value:
+    """How many samples a signal has, 1 for a number."""
+    count = float(a.y.size) if a.is_signal else 1.0
+    return Value(count if np.isfinite(a.y).all() else float("nan"))
+
+
 def _conicity(difference: Value, amplitude: Value) -> Value:
     """Equivalent conicity (EN 15302) of a rolling radius difference over the shift."""
-    x, y = difference.signal()
+    x, y = difference.finite_signal()
+    if not np.isfinite([*y, amplitude.number()]).all():
+        return Value(float("nan"), unit="1")
     table = pd.DataFrame({"r_left": y, "r_right": 0.0}, index=x)
     return Value(float(equivalent_conicity(table, amplitude.number())), unit="1")
 
@@ -170,7 +208,7 @@ SIGNALS: Mapping[str, tuple[Function, tuple[int, ...]]] = (
             "shifted": (_shifted, (2,)),
             "on": (_on, (2,)),
             "mirrored": (_mirrored, (1,)),
-            "steps": (lambda a: Value(np.diff(a.signal()[1]), a.signal()[0][1:], a.unit), (1,)),
+            "steps": (_steps, (1,)),
             "axis": (lambda a: Value(a.signal()[0], a.x), (1,)),
             "derivative": (_derivative, (1,)),
             "peaks": (_peaks, (1,)),
@@ -190,9 +228,9 @@ NUMBERS: Mapping[str, tuple[Function, tuple[int, ...]]] = MappingProxyType(  # a
         "std": (_measure(np.std), (1,)),
         "rms": (_measure(lambda y: np.sqrt(np.mean(y**2))), (1,)),
         "span": (_measure(np.ptp), (1,)),
-        "first": (_measure(lambda y: y[0]), (1,)),
-        "last": (_measure(lambda y: y[-1]), (1,)),
-        "count": (lambda a: Value(float(a.y.size) if a.is_signal else 1.0), (1,)),
+        "first": (_of_one_sample(lambda y: y[0]), (1,)),
+        "last": (_of_one_sample(lambda y: y[-1]), (1,)),
+        "count": (_count, (1,)),
         "at": (_at, (2,)),
         "integral": (_integral, (1,)),
         "crossing": (_crossing, (2,)),

@@ -11,7 +11,7 @@ from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
 from fmus.host.master.signals import Source
-from fmus.units import to_si
+from fmus.units import column_conversion, model_unit
 from scenarios.experiment.checks import check_time
 from scenarios.experiment.declaration import Number, Table
 from scenarios.experiment.readers import read_sheet
@@ -42,13 +42,14 @@ class Speeds(Table):
 
 class Column(Table):
     """A column of a data file over its time column; unit: of the column, by default that which the file
-    states, else that of the input.
+    states, else that of the input; model_unit: of the input, where its FMU states none.
     """
 
     data: str
     time: str
     column: str
     unit: str | None = None
+    model_unit: str | None = None
     factor: Number = 1.0
 
 
@@ -91,12 +92,14 @@ def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) ->
     check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row)
     fmu, _, variable = name.partition(".")
     described = fmus[fmu].variables.get(variable) if fmu in fmus else None
-    unit = described.unit if described else None
+    if described is None:  # the master says so, with the names there are
+        return times, values
+    unit = model_unit(described.unit, c.model_unit, f"'{name}'", f"key '{key}':")
     if c.unit is not None:
         stated.check(c.column, 0, c.unit, f"key '{key}':")
-        values = values if unit is None else to_si(values, c.unit, unit, f"key '{key}.unit'")
-        return times, c.factor * values
-    factor, offset = stated.to(c.column, unit, f"key '{key}'")
+        factor, offset = column_conversion(c.unit, unit, f"'{name}'", f"key '{key}.unit'")
+    else:
+        factor, offset = stated.to(c.column, unit, f"key '{key}'")
     return times, c.factor * (factor * values + offset)
 
 

@@ -188,4 +188,4 @@ def _findings(questions: Asked, runs: Mapping[str, Run]) -> Iterator[Finding]:
             except BadInput as error:
                 yield Finding(*asked_for, False, (), str(error))
             else:
-                yield Finding(*asked_for, verdict.holds, finite(verdict.values))
+                yield Finding(*asked_for, verdict.holds, finite(verdict.values), verdict.problem)

@@ -34,6 +34,11 @@ class Value:
             raise BadInput("gets a signal without samples; widen its window")
         return self.x, self.y
 
+    def finite_signal(self) -> tuple[Array, Array]:
+        """x and y of a signal for a question that all samples answer: all nan where one is not finite."""
+        x, y = self.signal()
+        return x, y if np.isfinite(y).all() else np.full(x.shape, np.nan)
+
     def number(self) -> float:
         """A number; BadInput for a signal."""
         if self.x is not None:
@@ -53,8 +58,11 @@ def combined(function: Callable[..., Any], values: list[Value], unit: str | None
     for x in axes[1:]:
         if x is not axes[0] and not np.array_equal(x, axes[0]):
             raise BadInput("joins signals with different times; bring one onto the other's with on(a, b)")
-    with np.errstate(all="ignore"):  # what is not finite shows up in the comparison
-        return Value(function(*(v.y for v in values)), axes[0] if axes else None, unit)
+    with np.errstate(all="ignore"):
+        found = function(*(v.y for v in values))
+        for v in values:  # tanh(inf) or nan ** 0 are numbers, but say nothing about the signal
+            found = np.where(np.isfinite(v.y), found, np.nan)
+    return Value(found if axes else float(found), axes[0] if axes else None, unit)
 
 
 def alike(values: list[Value]) -> str | None:
@@ -84,5 +92,5 @@ def power(a: Value, b: Value) -> str | None:
     if a.unit in (None, "1"):
         return a.unit
     exponent = b.number()
-    whole = exponent == round(exponent) and exponent >= 1
+    whole = bool(np.isfinite(exponent)) and exponent == round(exponent) and exponent >= 1
     return "*".join([f"({a.unit})"] * round(exponent)) if whole else None

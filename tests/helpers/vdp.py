@@ -51,12 +51,12 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def build_vdp(compiler, folder):
+def build_vdp(compiler, folder, source=SOURCE):
     """Compile and pack it; the path of the FMU."""
     library = folder / f"vdp{fmpy.sharedLibraryExtension}"
     headers = Path(fmpy.__file__).parent / "c-code"
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2"]
-    made = [compiler, *strict, "-shared", "-fPIC", "-I", headers, SOURCE, "-o", library, "-lm"]
+    made = [compiler, *strict, "-shared", "-fPIC", "-I", headers, source, "-o", library, "-lm"]
     subprocess.run(made, check=True)
     path = folder / "VanDerPol.fmu"
     with zipfile.ZipFile(path, "w") as packed:

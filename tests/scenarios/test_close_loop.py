@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from estimator.closeloop.decision.verdict import Verdict
+from estimator.closeloop.evidence import Verdict
 from fmus.drive.model import Drive
 from fmus.effects import EFFECTS
 from fmus.export.builders.pythonfmu import build_python
@@ -98,6 +98,7 @@ u = "u"
 [outputs.x]
 column = "x"
 unit = "1"
+model_unit = "1"
 noise_std = 0.001
 [[ports]]
 name = "shaft"

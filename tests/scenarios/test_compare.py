@@ -33,6 +33,7 @@ column = "y"
 unit = "{unit}"
 noise_std = 1e-3
 """
+BARE = '1"\nmodel_unit = "1'  # of an FMU that states no unit
 
 
 class Millimetres(Drive):
@@ -174,7 +175,7 @@ def test_versions_of_one_pythonfmu_source_do_not_meet(tmp_path):
     for name, body in zip("ab", bodies, strict=True):
         (tmp_path / name).mkdir()
         made.append(foreign_builder(tmp_path / name)(body))
-    folder = experiment(tmp_path, initial="{x = 1.0}", output="x", unit="1", inputs="{u = 0.0}")
+    folder = experiment(tmp_path, initial="{x = 1.0}", output="x", unit=BARE, inputs="{u = 0.0}")
     gap = compare(*made, folder).outputs["x"]
     n = np.arange(N)
     expected = np.abs((1 - 4 * STEP) ** n - (1 - 2 * STEP) ** n)
@@ -187,7 +188,7 @@ def test_versions_of_one_pythonfmu_source_do_not_meet(tmp_path):
 def test_an_fmu_that_fails_is_one_clear_line(tmp_path, body, words):
     build = foreign_builder(tmp_path)
     good, bad = build(), build(body)
-    folder = experiment(tmp_path, initial="{x = 1.0}", output="x", unit="1", inputs="{u = 0.0}")
+    folder = experiment(tmp_path, initial="{x = 1.0}", output="x", unit=BARE, inputs="{u = 0.0}")
     with pytest.raises(FmuError, match=words) as refused:
         compare(good, bad, folder)
     assert bad.name in str(refused.value)
@@ -197,7 +198,7 @@ def test_an_fmu_that_fails_is_one_clear_line(tmp_path, body, words):
 def test_what_is_no_number_is_a_difference_and_is_null(drive, tmp_path):
     build = foreign_builder(tmp_path)
     good, bad = build(), build('self.x = float("nan") if t > 0.5 else self.x')
-    folder = experiment(tmp_path, initial="{x = 1.0}", output="x", unit="1", inputs="{u = 0.0}")
+    folder = experiment(tmp_path, initial="{x = 1.0}", output="x", unit=BARE, inputs="{u = 0.0}")
     assert compare(bad, bad, folder).outputs["x"].largest == 0.0
     found = compare(good, bad, folder, tmp_path / "out")
     assert not found.ok

@@ -33,6 +33,7 @@ noise_std = 0.05
 [estimate]
 parameters.{mu} = {{start = 1.5, std = 0.5, bounds = [0.0, 10.0]}}
 """
+IN_M = 'm"\nmodel_unit = "m'  # for an FMU that states no unit
 RIG = """
 [estimate]
 parameters.mu0 = {start = 0.3, std = 0.1, bounds = [0.02, 0.8]}
@@ -101,7 +102,7 @@ def test_the_page_holds_what_was_found_and_asks_for_nothing(oscillator):
 
 
 def test_the_oscillator_made_with_pythonfmu(foreign, tmp_path):
-    file = write_vdp(tmp_path, foreign(PYTHON_VDP, SHOW_SPEED), ("x", "k"))
+    file = write_vdp(tmp_path, foreign(PYTHON_VDP, SHOW_SPEED), ("x", "k"), IN_M)
     k = estimate(file).estimated["k"]
     assert k["value"] == pytest.approx(MU, abs=3 * k["std_error"])
     assert k["std_error"] < 0.05
@@ -233,7 +234,7 @@ def test_smoothing_and_the_other_filters(vdp, tmp_path):
 def test_a_filter_that_diverges_says_so_and_keeps_what_it_has(foreign, tmp_path):
     step = "if self.x > 1.9 and t > 6.0:\n    return False\n" + PYTHON_VDP.strip()
     result = estimate(
-        write_vdp(tmp_path, foreign(step, SHOW_SPEED), ("x", "k")), tmp_path / "out",
+        write_vdp(tmp_path, foreign(step, SHOW_SPEED), ("x", "k"), IN_M), tmp_path / "out",
         options=Options(process_std={"x": 1e-3, "h": 1e-3}),
     )  # fmt: skip
     assert result.diverged

@@ -134,6 +134,122 @@ def test_statements_hold_or_not_and_show_their_numbers(text, holds_, values):
     np.testing.assert_array_equal(found.values, values)
 
 
+GONE = 5.0  # s, from when on these are not finite
+BROKEN = SIGNALS | {
+    f"{name}.q": Value(np.where(T < GONE, np.sin(7 * T), bad), T, "m")
+    for name, bad in (("nan", math.nan), ("up", math.inf), ("down", -math.inf))
+}
+# about a signal q: what is worked out from all of its samples
+OVER_ALL = [
+    "max(abs(q))",
+    "min(q)",
+    "max(q)",
+    "max(min(q, 1))",
+    "max(max(q, -1))",
+    "mean(q)",
+    "std(q)",
+    "rms(q)",
+    "span(q)",
+    "last(q)",
+    "integral(q)",
+    "crossing(q, 0.5)",
+    "settled(q, 0, 2)",
+    "growth(q)",
+    "frequency(q)",
+    "count(q)",
+    "count(peaks(q))",
+    "max(tanh(q))",
+    "max(q ** 0)",
+    "max(abs(0 / q))",
+    "max(exp(-abs(q)))",
+    "max(derivative(q))",
+    "max(steps(q))",
+    "max(shifted(q, 1))",
+    "max(on(q, a.x))",
+    "at(q, 7)",
+    "rms(q - a.x)",
+    "max(after(q, 1))",
+    "min(max(q), 3)",
+    "first(q) + 0 * last(q)",
+]
+STATEMENTS = [
+    "{} > 0.1",
+    "{} < 0.1",
+    "not ({} > 0.1)",
+    "not {} < 0.1",
+    "not not {} <= 100",
+    "0 < {} < 100",
+    "not (0 < {} < 100)",
+    "{} < 100 and 1 < 2",
+    "{} < 100 or 1 < 2",
+    "1 < 2 or {} < 100",
+    "not ({} < 100 and 2 < 1)",
+    "not (2 < 1 or {} > 100)",
+]
+
+
+@pytest.mark.parametrize("form", STATEMENTS)
+@pytest.mark.parametrize("side", OVER_ALL)
+def test_neither_a_statement_over_what_is_not_finite_nor_its_negation_holds(form, side):
+    for name in ("nan", "up", "down"):
+        text = form.format(side.replace("q", f"{name}.q").replace(f"fre{name}.quency", "frequency"))
+        found = statement(text, "here").verdict(BROKEN.__getitem__)
+        assert found.holds is False, text
+        assert found.problem is not None, text
+        assert f"signal '{name}.q' is not finite from t = 5 s on" in found.problem
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["max(before(nan.q, 5)) < 1.1", "first(nan.q) < 1", "at(nan.q, 2) < 1", "last(between(nan.q, 1, 2)) < 1"],
+)
+def test_what_is_asked_of_the_finite_part_is_answered(text):
+    found = statement(text, "here").verdict(BROKEN.__getitem__)
+    assert found.holds
+    assert found.problem is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("not crossing(a.ramp, 100) < 1", "'crossing(a.ramp, 100)' is not finite"),
+        ("not max(a.F / (a.ramp - a.ramp)) < 1", "'max(a.F / (a.ramp - a.ramp))' is not finite"),
+        ("not settled(a.F, 4, 1 / 0) > 1", "is not finite"),
+        ("not max(a.F ** (1 / 0)) < 1", "is not finite"),
+        (
+            "not last(axis(b.x)) * max(nan.q) < 1",
+            "'last(axis(b.x)) * max(nan.q)' is not finite; signal 'nan.q'",
+        ),
+    ],
+)
+def test_a_number_that_is_not_finite_is_named(text, words):
+    found = statement(text, "here").verdict(BROKEN.__getitem__)
+    assert not found.holds
+    assert words in (found.problem or "")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("count(after(a.x, crossing(nan.q, 0.5))) < 1", "is cut at nan, which is not finite; signal 'nan.q'"),
+        ("not count(before(a.x, crossing(a.ramp, 100))) > 1", "is cut at nan"),
+        ("count(between(a.x, 1, 1 / 0)) > 1", "is cut at 1, inf"),
+        ("first(shifted(a.x, 1 / 0)) < 1", "has a delay of inf"),
+    ],
+)
+def test_a_place_that_is_not_finite_is_no_answer(text, words):
+    with pytest.raises(BadInput, match=r"^here: ") as refused:
+        statement(text, "here").verdict(BROKEN.__getitem__)
+    assert words in str(refused.value)
+
+
+def test_a_contact_table_has_its_shift_for_a_place():
+    table = {"contact.r": Value(np.array([1.0, math.nan]), np.array([0.0, 0.01]), "m")}
+    found = statement("not max(contact.r) > 2", "here").verdict(table.__getitem__)
+    assert not found.holds
+    assert "signal 'contact.r' is not finite from y = 0.01 m on" in (found.problem or "")
+
+
 REFUSED = [
     ("__import__('os').system('true') < 1", "may not stand in a formula"),
     ("(lambda: 1)() < 1", "may not stand"),

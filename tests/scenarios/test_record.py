@@ -245,11 +245,151 @@ def test_a_clipped_source_of_a_derived_output_is_noted(tmp_path):
     assert [(n.kind, n.column) for n in record.notes] == [("unit", "n_wheel"), ("clipped", "omega")]
 
 
-def test_an_fmu_without_units_takes_columns_as_they_are(tmp_path):
-    bare = replace(RIG, variables={n: replace(v, unit=None) for n, v in RIG.variables.items()})
-    record = read(write(tmp_path), bare)
-    assert_allclose(record.runs[0].y[:, 0], table()["n_wheel"], rtol=1e-8)
-    assert kinds(record) == ["unit", "unit"]
+# --- units of an FMU that states none
+
+BARE = replace(RIG, variables={n: replace(v, unit=None) for n, v in RIG.variables.items()})
+IN_RAD = 'unit = "rad/s2"\nmodel_unit = "rad/s2"'
+
+
+def with_units(omega_w: str, torque: str = '"torque"') -> str:
+    """The experiment with other lines on the wheel's speed and its torque."""
+    toml = GOOD.replace('unit = "rpm"', omega_w).replace('unit = "rad/s2"', IN_RAD)
+    return toml.replace('T_P = "torque"', f"T_P = {torque}")
+
+
+def test_a_column_is_converted_to_the_model_unit(tmp_path):
+    torque = '{column = "torque", unit = "kN.m", model_unit = "N.m"}'
+    record = read(write(tmp_path, with_units('unit = "rpm"\nmodel_unit = "rad/s"', torque)), BARE)
+    (run,) = record.runs
+    assert_allclose(run.y[:, 0], table()["omega"], rtol=1e-8)
+    assert_allclose(record.noise_std[0], 0.3 * np.pi / 30)
+    assert_allclose(run.u[:, 0], 1e3 * table()["torque"], atol=1e-3)
+    assert_array_equal(run.u[:, 1], 7.5)
+    assert [n.sentence for n in record.notes] == [
+        "column 'n_wheel' is converted from rpm to rad/s",
+        "column 'torque' is converted from kN.m to N.m",
+    ]
+
+
+def test_an_input_in_a_declared_unit_is_converted_to_that_of_the_fmu(tmp_path):
+    toml = GOOD.replace('T_P = "torque"', 'T_P = {column = "torque", unit = "kN.m"}')
+    assert_allclose(read(write(tmp_path, toml)).runs[0].u[:, 0], 1e3 * table()["torque"], atol=1e-3)
+
+
+def test_what_nobody_says_a_unit_of_is_taken_as_it_is(tmp_path):
+    (run,) = read(write(tmp_path, with_units('unit = "rad/s"\nmodel_unit = "rad/s"')), BARE).runs
+    assert_allclose(run.u[:, 0], table()["torque"], atol=1e-6)
+
+
+def stated_units(folder: Path, torque: str) -> None:
+    (folder / "data.csv.units.json").write_text(f'{{"torque": "{torque}"}}')
+
+
+def test_a_derived_input_is_converted_from_the_unit_that_the_file_states(tmp_path):
+    toml = GOOD.replace('T_P = "torque"', 'T_P = "rate"').replace('= "N.m"', '= "N.m/s"')
+    file = write(tmp_path, toml + '[derived.rate]\nderivative = "torque"\n')
+    stated_units(tmp_path, "kN.m")
+    fmu = replace(RIG, variables=RIG.variables | {"T_P": variable("T_P", "input", "N.m/s")})
+    rate = 1e3 * np.gradient(table()["torque"], table()["time"])
+    assert_allclose(read(file, fmu).runs[0].u[:, 0], rate, rtol=1e-5, atol=1)
+
+
+def test_a_unit_that_the_file_states_of_an_input_needs_the_model_unit_too(tmp_path):
+    speed = 'unit = "rpm"\nmodel_unit = "rad/s"'
+    file = write(tmp_path, with_units(speed))
+    stated_units(tmp_path, "kN.m")
+    with pytest.raises(BadInput) as refused:
+        read(file, BARE)
+    assert_one_clear_line(refused, file, "[inputs] T_P: column 'torque' of")
+    assert 'write model_unit = "..."' in str(refused.value)
+    write(tmp_path, with_units(speed, '{column = "torque", model_unit = "N.m"}'))
+    assert_allclose(read(file, BARE).runs[0].u[:, 0], 1e3 * table()["torque"], atol=1e-3)
+
+
+# the FMU, the lines on the speed and the torque, and words the message must hold
+BAD_UNITS = [
+    (
+        BARE,
+        'unit = "rpm"',
+        '"torque"',
+        "[outputs.omega_w]: the column is in 'rpm', but the FMU states no unit",
+    ),
+    (
+        BARE,
+        'unit = "rpm"',
+        '"torque"',
+        "for 'omega_w' of Testrig to convert it to; write model_unit = \"...\"",
+    ),
+    (BARE, 'unit = "U/min"', '"torque"', "[outputs.omega_w]: unit 'U/min' is not known"),
+    (
+        BARE,
+        'unit = "U/min"\nmodel_unit = "U/min"',
+        '"torque"',
+        "[outputs.omega_w] model_unit = \"U/min\": unit 'U/min' is not known",
+    ),
+    (
+        BARE,
+        'unit = "U/min"\nmodel_unit = "rad/s"',
+        '"torque"',
+        "[outputs.omega_w]: unit 'U/min' is not known",
+    ),
+    (BARE, 'unit = "rpm"\nmodel_unit = "m"', '"torque"', "[outputs.omega_w]: unit 'rpm' does not fit 'm'"),
+    (
+        RIG,
+        'unit = "rpm"\nmodel_unit = "rpm"',
+        '"torque"',
+        "[outputs.omega_w] model_unit = \"rpm\", but 'omega_w' of Testrig is in 'rad/s', as the FMU states; "
+        "leave model_unit out",
+    ),
+    (
+        RIG,
+        'unit = "rpm"\nmodel_unit = "m"',
+        '"torque"',
+        "[outputs.omega_w] model_unit = \"m\": unit 'm' does not fit 'rad/s'",
+    ),
+    (
+        RIG,
+        'unit = "rpm"',
+        '{column = "torque", model_unit = "kN.m"}',
+        "[inputs] T_P model_unit = \"kN.m\", but 'T_P' of Testrig is in 'N.m'",
+    ),
+    (RIG, 'unit = "rpm"', '{column = "torque", unit = "kg"}', "[inputs] T_P: unit 'kg' does not fit 'N.m'"),
+    (
+        BARE,
+        'unit = "rpm"\nmodel_unit = "rad/s"',
+        '{column = "torque", unit = "N.m"}',
+        "[inputs] T_P: the column is in 'N.m', but the FMU states no unit for 'T_P' of Testrig",
+    ),
+    (
+        BARE,
+        'unit = "rpm"\nmodel_unit = "rad/s"',
+        '{column = "torque", units = "N.m"}',
+        "key 'inputs.T_P.units' is not known; did you mean 'unit'?",
+    ),
+    (BARE, 'unit = "rpm"', '{unit = "N.m"}', "key 'inputs.T_P.column' is missing"),
+]
+
+
+@pytest.mark.parametrize(("fmu", "omega_w", "torque", "words"), BAD_UNITS)
+def test_units_that_cannot_be_converted_are_refused(tmp_path, fmu, omega_w, torque, words):
+    file = write(tmp_path, with_units(omega_w, torque))
+    with pytest.raises(BadInput) as refused:
+        read(file, fmu)
+    assert_one_clear_line(refused, file, words)
+
+
+def test_a_model_unit_may_repeat_what_the_fmu_states(tmp_path):
+    record = read(write(tmp_path, with_units('unit = "rpm"\nmodel_unit = "rad/s"')))
+    assert_allclose(record.runs[0].y[:, 0], table()["omega"], rtol=1e-8)
+
+
+def test_a_file_that_contradicts_the_declared_unit_of_an_input_is_refused(tmp_path):
+    toml = GOOD.replace('T_P = "torque"', 'T_P = {column = "torque", unit = "kN.m"}')
+    file = write(tmp_path, toml)
+    stated_units(tmp_path, "N.m")
+    with pytest.raises(BadInput) as refused:
+        read(file)
+    assert_one_clear_line(refused, file, '[inputs] T_P unit = "kN.m", but')
 
 
 # --- clipping

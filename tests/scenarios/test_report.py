@@ -2,12 +2,20 @@
 
 import base64
 import re
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from estimator.closeloop.fitting.calibrate import calibrate
+from estimator.plant import PLANTS
 from scenarios import close_loop
-from scenarios.closing.result import Result
+from scenarios.closing.closing import builder_for, experiment_of, pose
+from scenarios.closing.page import sections
+from scenarios.closing.result import Result, start_values
+from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 from tests.truth.rig import write_null_record
 
 LARGEST = 3_000_000  # bytes of a page that can be sent by mail
@@ -66,3 +74,61 @@ def test_a_record_without_a_discrepancy_has_its_page_and_names_are_escaped(tmp_p
     assert "<b>bold</b>" not in page
     assert "&lt;b&gt;bold&lt;/b&gt; &amp; sons" in page
     assert "nan" not in words(page).lower().split()
+
+
+MORE_OUTPUTS = """
+_first = __init__
+def __init__(self, **kwargs):
+    self._first(**kwargs)
+    self.z, self.w, self.v = 3.0, 4.0, 5.0
+    for name, initial in (("z", Fmi2Initial.exact), ("w", Fmi2Initial.calculated), ("v", Fmi2Initial.approx)):
+        self.register_variable(Real(name, causality=Fmi2Causality.output, initial=initial))
+"""
+
+
+def test_the_page_says_which_start_values_were_fitted_and_why_others_were_not(
+    foreign: Callable[..., Path], tmp_path: Path
+) -> None:
+    """x shows in the residual and z does not; w cannot be set, and the FMU does not say what v is."""
+    ports = 'velocity = "w"\ndisplacement = "v"'
+    text = FOREIGN.replace('velocity = "x"\ndisplacement = "x"', ports)
+    write_foreign(tmp_path, foreign(more=MORE_OUTPUTS), text)
+    e = experiment_of(tmp_path)
+    problem = pose(e, builder_for(e, tmp_path))
+    assert problem.free_states == ("x", "z")
+    _, base, _ = calibrate(problem)
+    PLANTS.close()
+    found = start_values(problem, SimpleNamespace(base=base, built_in=None))
+    assert {name: s["how"] for name, s in found.items()} == {
+        "x": "fitted", "z": "not seen", "v": "not exact", "w": "not settable",
+    }  # fmt: skip
+    assert found["x"]["value"] == pytest.approx(1.0, abs=0.01 + 3 * found["x"]["std_error"])
+    assert found["z"]["value"] == 3.0
+    told = SimpleNamespace(start_values=found)
+    case = SimpleNamespace(problem=problem, result=told, words=SimpleNamespace(unit=lambda _: ""))
+    said = [(s["sentence"], [n for n, _ in s["states"]]) for s in sections.start_values(case)]
+    fitted, unseen, no_start, vague = said
+    assert fitted == ("Start values that were not declared, fitted together with the parameters", ["x"])
+    assert "would not have shown in the residual" in unseen[0]
+    assert unseen[1] == ["z"]
+    assert "takes no start value" in no_start[0]
+    assert no_start[1] == ["w"]
+    assert "can be declared in [initial]" in vague[0]
+    assert vague[1] == ["v"]
+
+
+def test_the_start_values_of_a_file_that_is_held_out_are_told() -> None:
+    runs = [SimpleNamespace(fit=np.array([fits])) for fits in (True, False)]
+    problem = SimpleNamespace(free_states=("x",), record=SimpleNamespace(runs=runs))
+    told = SimpleNamespace(start_values={"x": {"how": "fitted", "value": 1.0, "std_error": 0.1}})
+    case = SimpleNamespace(problem=problem, result=told, words=SimpleNamespace(unit=lambda _: "m"))
+    first, second = sections.start_values(case)
+    assert first["states"][0][1].endswith("m")
+    assert "file that is held out" in second["sentence"]
+
+
+def test_the_result_tells_the_start_values(page: str, demo: tuple[Result, Path]) -> None:
+    """Turning the rig by an angle at the start changes no speed, so that the angles are left."""
+    assert demo[0].start_values == {n: {"how": "not seen", "value": 0.0} for n in ("theta_w", "theta_r")}
+    assert "would not have shown in the residual: theta_w = 0 rad, theta_r = 0 rad." in words(page)
+    assert "fitted together with the parameters:" not in words(page)

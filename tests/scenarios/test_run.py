@@ -63,6 +63,32 @@ def test_what_does_not_come_true_is_said_with_its_numbers(tmp_path):
     assert "max(abs(" in result.failed[0].sentence
 
 
+DIVERGING = """
+id = "diverging"
+question = "Does what is not finite pass for small?"
+duration = 2.0
+step = 0.1
+
+[fmus.a]
+fmu = "{fmu}"
+
+[[expect]]
+that = "not (max(abs(a.x)) > 100)"
+because = "it stays small"
+"""
+
+
+def test_a_signal_that_is_not_finite_is_not_small(tmp_path, foreign):
+    fmu = foreign('self.x = float("nan") if t > 0.95 else 1.0')
+    result, written = ran(tmp_path, DIVERGING.format(fmu=fmu))
+    assert not result.ok
+    [finding] = written["expectations"]
+    assert finding["holds"] is False
+    assert finding["values"] == [None, 100.0]
+    assert "signal 'a.x' is not finite from t = 1.1 s on" in finding["problem"]
+    assert "a.x" in result.failed[0].sentence
+
+
 def test_expectations_go_through_the_variants(tmp_path):
     more = '\n[[expect]]\nthat = "span(light.drive.q_dot) > span(heavy.drive.q_dot)"\nbecause = "inertia"\n'
     more += '\n[[expect]]\nthat = "max(abs(drive.F)) < 99"\nbecause = "soft"\nvariants = ["heavy"]\n'
@@ -85,6 +111,39 @@ def test_csv_columns_of_files_and_tables_are_inputs(tmp_path):
         found.append(read_recording(tmp_path / str(i) / "out" / "run.csv"))
     np.testing.assert_allclose(found[0].data, found[1].data, rtol=1e-12, atol=1e-15)
     assert found[0].units["drive.q"] == "m"
+
+
+BARE = """
+id = "bare"
+question = "Is a force in kN converted for an FMU that states no units?"
+duration = 2.0
+step = 0.1
+
+[fmus.a]
+fmu = "{fmu}"
+
+[inputs]
+"a.u" = {{data = "force.csv", time = "t", column = "kN", {units}}}
+
+[[expect]]
+that = "abs(last(a.x) - 3000) < 1e-6"
+because = "a force of 3 kN is 3000 N"
+"""
+
+
+def test_a_column_for_an_fmu_without_units_needs_the_model_unit(tmp_path, foreign):
+    write(tmp_path, "t,kN\n0,3\n2,3\n", "force.csv")
+    fmu = foreign("self.x = self.u")
+    assert ran(tmp_path, BARE.format(fmu=fmu, units='unit = "kN", model_unit = "N"'))[0].ok
+    for units, words in (
+        ('unit = "kN"', "states no unit for 'a.u' to convert it to; write model_unit"),
+        ('unit = "kN", model_unit = "newton"', "unit 'newton' is not known"),
+        ('unit = "kN", model_unit = "m"', "unit 'kN' does not fit 'm'"),
+    ):
+        with pytest.raises(BadInput) as refused:
+            ran(tmp_path, BARE.format(fmu=fmu, units=units))
+        assert words in str(refused.value)
+        assert "scenario.toml" in str(refused.value)
 
 
 def test_friction_by_name_sets_table_4_1_and_parameters_have_the_last_word(tmp_path):

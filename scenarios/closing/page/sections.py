@@ -88,6 +88,46 @@ def _window(run: Run, mask: BoolArray) -> str:
     return f"{short(t[0], 5)} to {short(t[-1], 5)} s ({mask.sum()} samples)"
 
 
+_STARTS = {
+    "fitted": "Start values that were not declared, fitted together with the parameters",
+    "not seen": (
+        "Start values that were not declared and were left at the FMU's own value, because another value "
+        "would not have shown in the residual"
+    ),
+    "not settable": (
+        "Outputs for which the FMU takes no start value (initial = calculated); a state behind them starts "
+        "at the FMU's own value, and nothing was fitted there"
+    ),
+    "not exact": (
+        "Outputs whose start value the FMU does not say to be exact (initial = exact); it was left at the "
+        "FMU's own value, not fitted, and can be declared in [initial]"
+    ),
+}
+_HELD_OUT = (
+    "In the file that is held out, these start anew: measured ones on a line through the first samples, the "
+    "others at the FMU's own value"
+)
+
+
+def start_values(case: Case) -> Iterator[Row]:
+    """A sentence on each way in which start values that are not declared came about, and these."""
+    found = case.result.start_values
+    for how, sentence in _STARTS.items():
+        states = [(n, _start(case, n, s)) for n, s in found.items() if s["how"] == how]
+        if states:
+            yield {"sentence": sentence, "states": states}
+    free = [n for n in case.problem.free_states if n in found]
+    if free and not all(run.fit.any() for run in case.problem.record.runs):
+        yield {"sentence": _HELD_OUT, "states": [(n, "") for n in free]}
+
+
+def _start(case: Case, name: str, found: Row) -> str:
+    if found["value"] is None:
+        return ""
+    value = with_error(found["value"], found["std_error"]) if "std_error" in found else short(found["value"])
+    return f"{value} {unit(case.words.unit(name))}".rstrip()
+
+
 def laws(case: Case) -> Iterator[tuple[str, list[LawText]]]:
     """Each member of the verdict's class: in words, and its laws."""
     for h in case.found.judgement.members:

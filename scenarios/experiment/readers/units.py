@@ -7,7 +7,7 @@ import numpy as np
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput
-from fmus.units import base_exponents, conversion
+from fmus.units import base_exponents, column_conversion, conversion
 from scenarios.experiment.readers.sheet import Sheet
 
 # usual in measured files, but not in the grammar of units
@@ -47,12 +47,19 @@ class StatedUnits:
                 f'write unit = "{stated}", or correct the file'
             )
 
-    def to(self, column: str, target: str | None, where: str) -> tuple[float, float]:
-        """Factor and offset from the file's unit to another; none where either is not known."""
+    def to(self, column: str, target: str | None, where: str, derived: int = 0) -> tuple[float, float]:
+        """Factor and offset from the file's unit to another; none where the file states none that is known.
+
+        derived: how many times the column is differentiated before. Raises BadInput where the units do not
+        fit, and where a unit is stated but there is none to convert it to.
+        """
         stated = self._known(column, f"it is taken as {target or 'it is'}")
-        if stated is None or target is None:
+        if stated is None:
             return SAME
-        found = conversion(stated, target, f"{where}: column '{column}' of {self._file}")
+        for _ in range(derived):
+            stated = f"({stated})/s"
+        place = f"{where}: column '{column}' of {self._file}"
+        found = column_conversion(stated, target, "the input", place)
         if found != SAME:
             said = f"{self._file.name}: column '{column}' is converted from {stated}, as the file states"
             self.notes.append(Note("unit", column, f"{said}, to {target}"))

@@ -1,0 +1,84 @@
+"""A command that an FMU ends together with the process does not pass for one that has finished."""
+
+import atexit
+import ctypes
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from platform import libc_ver
+from typing import Any
+
+from fmus.host.instance import MESSAGES
+
+ENDED = 2  # exit code where an FMU ended the process
+SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
+
+
+@contextmanager
+def finished_or_said() -> Iterator[None]:
+    """While it lasts, the end of this process by an FMU gives one line and exit code 2, whatever its status.
+
+    That is by `exit` of the C library, by that of Python, or by Python's `os._exit`. Signals and the `_exit`
+    of the C library cannot be caught within the process.
+    """
+    process, really = os.getpid(), os._exit
+
+    def ended(*_: Any) -> None:
+        if os.getpid() != process:  # a copy of this process ends as it likes
+            return
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):  # closed, or nobody reads it
+                stream.flush()
+        shown = f"{SHOW_CURSOR}\n" if sys.stderr.isatty() else ""
+        os.write(2, f"{shown}railfmi: {_sentence()}\n".encode())
+        really(ENDED)
+
+    def at_once(status: int) -> Any:
+        ended()
+        really(status)
+
+    atexit.register(ended)
+    withdraw = _at_exit_of_c(ended)
+    os._exit = at_once  # an FMU in Python shares this interpreter, so that it is caught here
+    try:
+        yield
+    finally:
+        os._exit = really
+        atexit.unregister(ended)
+        withdraw()
+
+
+def _sentence() -> str:
+    """What has happened, with the FMUs that were open."""
+    names = ", ".join(dict.fromkeys(name.rpartition("_")[0] for name in MESSAGES))
+    opened = f"the open FMUs are {names}" if "," in names else f"the open FMU is {names}"
+    who = f"an FMU ({opened})" if names else "an FMU, or a library that it loads,"
+    return (
+        f"{who} ended the process before the command had finished; its results are missing or incomplete; "
+        "'railfmi check' on the FMU tells in which call"
+    )
+
+
+def _at_exit_of_c(ended: Callable[..., None]) -> Callable[[], None]:
+    """Have the C library call a function at `exit`, which Python's atexit does not see when C code calls it.
+
+    The function that is returned withdraws it; the C library must not call Python after Python has ended.
+    """
+    if not (libc_ver()[0] == "glibc" or sys.platform == "darwin"):  # others cannot withdraw it
+        return lambda: None
+    library, withdrawn = ctypes.CDLL(None), list[bool]()
+
+    def at_exit(_: int | None) -> None:
+        if not withdrawn:
+            ended()
+
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(at_exit)
+    mark = ctypes.create_string_buffer(1)  # its address names this function among all that C calls at exit
+    library["__cxa_atexit"](function, None, ctypes.byref(mark))
+
+    def withdraw(_kept: object = function) -> None:
+        withdrawn.append(True)
+        library["__cxa_finalize"](ctypes.byref(mark))  # which calls it once more and forgets it
+
+    return withdraw
