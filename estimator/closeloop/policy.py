@@ -337,5 +337,22 @@ class Policy:
                 for f in fields(group):
                     yield f"{stage.name}.{f.name}", getattr(group, f.name), f
 
+    def table(self) -> str:
+        """All limits as a Markdown table a stage; docs/policy.md holds that of the default."""
+        lines: list[str] = []
+        stage = ""
+        for name, value, about in self.limits():
+            now, _, short = name.partition(".")
+            if now != stage:
+                stage = now
+                lines += ["", f"## {stage.capitalize()}", "", "| limit | value | unit | meaning | source |"]
+                lines += ["|---|---|---|---|---|"]
+            m = about.metadata
+            lines.append(f"| `{short}` | {value:g} | {m['unit']} | {m['meaning']} | {m['source']} |")
+        return "\n".join(lines).strip() + "\n"
+
 
 DEFAULT = Policy()
+
+if __name__ == "__main__":
+    print(DEFAULT.table(), end="")

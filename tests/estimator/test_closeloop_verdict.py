@@ -15,6 +15,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Record, Run
+from tests.helpers.paths import ROOT
 from tests.helpers.verdicts import FAILED, judged
 
 NAMES = get_args(Name)
@@ -117,3 +118,10 @@ def test_the_version_changes_with_every_limit():
     assert len(versions) == 1 + len(LIMITS)
     assert Policy().version == DEFAULT.version
     assert asdict(DEFAULT)["decision"]["telling"] == DEFAULT.decision.telling
+
+
+def test_the_page_of_the_policy_is_that_of_the_default():
+    page = (ROOT / "docs" / "policy.md").read_text(encoding="utf-8")
+    assert page.partition("\n## ")[2] == DEFAULT.table().partition("## ")[2], (
+        "write `python -m estimator.closeloop.policy` below the head of docs/policy.md"
+    )
