@@ -1,0 +1,69 @@
+"""The documents: links lead somewhere, files that are named exist, counts carry their right intervals."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from scipy.stats import binomtest
+from typer.testing import CliRunner
+
+from scenarios.cli.app import app
+from tests.helpers.paths import ROOT
+
+DOCUMENTS = [
+    *ROOT.glob("*.md"),
+    *(f for top in ("docs", "fmus", "benchmarks") for f in (ROOT / top).rglob("*.md")),
+]
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+CODE = re.compile(r"```.*?```", re.S)
+# patterns such as tests/*.py are no files, and NAME stands for what a reader puts there
+NAMED = re.compile(r"(?<![\w/.-])(?:fmus|estimator|scenarios|tests|benchmarks)(?:/[\w.-]+)+(?![\w*/])")
+
+
+def ids(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as they are made of their words."""
+    heads = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", head).strip().lower().replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=ids)
+def test_links_lead_to_files_and_headings(page: Path) -> None:
+    for link in LINK.findall(CODE.sub("", page.read_text(encoding="utf-8"))):
+        if link.startswith("http"):
+            continue
+        file, _, anchor = link.partition("#")
+        target = (page.parent / file).resolve() if file else page
+        assert target.exists(), f"{ids(page)} links to {link}"
+        assert not anchor or anchor in anchors(target), f"{ids(page)} links to {link}"
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=ids)
+def test_files_that_are_named_exist(page: Path) -> None:
+    for name in NAMED.findall(page.read_text(encoding="utf-8")):
+        known = name.rstrip(".")
+        assert "NAME" in known or (ROOT / known).exists(), f"{ids(page)} names {known}"
+
+
+def test_the_scoreboard_gives_the_exact_interval_of_each_count() -> None:
+    text = (ROOT / "docs" / "challenge.md").read_text(encoding="utf-8")
+    rows = re.findall(r"\| (\d+) of (\d+) \| ([\d.]+) % \| ([\d.]+) to ([\d.]+) % \|", text)
+    assert len(rows) >= 15
+    for hits, total, *given in rows:
+        rate = int(hits) / int(total)
+        interval = binomtest(int(hits), int(total)).proportion_ci(0.95, "exact")
+        found = [100 * x for x in (rate, interval.low, interval.high)]
+        assert found == pytest.approx([float(x) for x in given], abs=0.051), f"{hits} of {total}"
+
+
+def test_the_readmes_package_for_other_tools_is_written(tmp_path: Path, monkeypatch) -> None:
+    [line] = re.findall(r"^    railfmi (export-ssp .*?) +#", (ROOT / "README.md").read_text(), re.M)
+    command, scenario, *options = shlex.split(line)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, [command, str(ROOT / scenario), *options, "--kind", "python"])
+    assert done.exit_code == 0, done.output
+    assert [f.suffix for f in tmp_path.iterdir()] == [".ssp"]
