@@ -12,11 +12,7 @@ from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.allowed import allowed
 from estimator.closeloop.decision.detect import detect
 from estimator.closeloop.decision.law_form import confirmed
-from estimator.closeloop.decision.verdict import (
-    confirmed_on_test,
-    judge,
-    without_fits,
-)
+from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
 from estimator.closeloop.diagnostics.diagnostics import honesty
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.fitting.calibrate import calibrate

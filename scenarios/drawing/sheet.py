@@ -104,7 +104,7 @@ def times(record: Record) -> list[Array]:
 
 
 def shade_test(ax: Axes, record: Record) -> None:
-    """Mark the held-out part."""
+    """Mark the test part."""
     for t, run in zip(times(record), record.runs, strict=True):
         if run.test.any():
             held_out = t[run.test]

@@ -61,7 +61,7 @@ Channel = Annotated[str | float | InputColumn, PlainValidator(_column_or_number)
 class Split(Table):
     """Which data effects are fitted on, chosen on and tested on: windows [s] of one file, or files.
 
-    `choose` may be left out: the last part of what identifies is then taken for it.
+    `choose` may be left out: a fifth of what identifies is then taken for it, in pieces spread over it.
     """
 
     identify: Interval | None = None

@@ -193,7 +193,7 @@ def outcome(effects: list[tuple[str, str]], after: float) -> Outcome:
     error = {"q": {"declared": 0.02, "before": 0.014, "after": after, "noise": 6e-6}}
     found = [Effect(kind, at, {}) for kind, at in effects]
     verdict = "traced" if effects else "unexplained"
-    result = Result("silverbox", verdict, found, [], {}, error, 1.0, "", "", {}, {})
+    result = Result("silverbox", verdict, [], "", found, [], {}, error, 1.0, "", "", {}, {})
     return Outcome(BENCHMARKS["silverbox"], result, 2.0)
 
 

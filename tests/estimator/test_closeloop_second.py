@@ -17,11 +17,7 @@ from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.scores import (
-    best_by_label,
-    lead,
-    ranked,
-)
+from estimator.closeloop.hypotheses.scores import best_by_label, lead, ranked
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.candidates import physical_candidates

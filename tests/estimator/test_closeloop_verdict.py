@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimator.closeloop.decision.detect import importance
-from estimator.closeloop.evidence import ANSWER, Check, Name, Verdict, verdict_of
+from estimator.closeloop.evidence import (
+    ANSWER,
+    Check,
+    Name,
+    Verdict,
+    verdict_of,
+)
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT, Policy

@@ -124,7 +124,7 @@ def test_a_force_law_acts_at_each_part_of_its_place_by_the_motion_there(name, ki
             port, chosen = base.ports()[at], of_location(known, kind, at)
             for i, part in enumerate(port.acting, 1):
                 there = cs.vertcat(part.displacement, part.velocity, *part.forces.values())
-                q, v, *gains = values(_compiled("there", base, columns, there, "y"), *own)
+                q, v, *gains = values(_compiled("there", base.calls, columns, there, "y"), *own)
                 number = f"_{i}" if len(port.acting) > 1 else ""
                 mine = chosen | {s: chosen[f"{s}{number}"] for s in RATES.get(kind, ())}
                 force = FORCES[kind](MORE["clock"], MORE["way"], q, v, mine)

@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 
 from fmus.host.fmu import Fmu
 from fmus.vehicle7dof.model import CORNERS, FORCES
-from tests.truth.vehicle import Vehicle
-from tests.truth.vehicle_equations import (
+from tests.helpers.vehicle_equations import (
     BOGIE,
     END,
     INERTIA,
@@ -30,6 +29,7 @@ from tests.truth.vehicle_equations import (
     rails,
     settled,
 )
+from tests.truth.vehicle import Vehicle
 
 
 def test_parameters_are_those_of_the_thesis_and_of_the_truth():

@@ -22,6 +22,15 @@ from fmus.variables import (
 from fmus.vehicle7dof.model import CORNERS, FORCES, Vehicle7dof
 from tests.helpers.everything import values
 from tests.helpers.paths import SHARED
+from tests.helpers.vehicle_equations import (
+    INPUTS,
+    MADE,
+    STATES,
+    P,
+    linear_run,
+    system,
+    vectors,
+)
 from tests.truth.vehicle import (
     NOISE,
     Vehicle,
@@ -30,15 +39,6 @@ from tests.truth.vehicle import (
     simulate,
     single,
     spectrum_rails,
-)
-from tests.truth.vehicle_equations import (
-    INPUTS,
-    MADE,
-    STATES,
-    P,
-    linear_run,
-    system,
-    vectors,
 )
 
 VEHICLE_C = SHARED / "data" / "experiments" / "vehicle-c"

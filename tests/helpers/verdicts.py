@@ -3,7 +3,12 @@
 from collections.abc import Sequence
 from typing import get_args
 
-from estimator.closeloop.evidence import Check, Judgement, Name, Verdict
+from estimator.closeloop.evidence import (
+    Check,
+    Judgement,
+    Name,
+    Verdict,
+)
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 
 FAILED: dict[Verdict, tuple[Name, ...]] = {

@@ -18,7 +18,7 @@ from scenarios.closing.result import Result
 from tests.helpers.paths import ROOT
 from tests.truth.rig import single, write_record
 
-DEMO = ROOT / "scenarios" / "demo" / "rig-drag"
+DEMO = ROOT / "scenarios" / "shipped" / "demo" / "rig-drag"
 SHARED = ROOT.parent / "shared" / "data"
 shared = pytest.mark.skipif(not SHARED.is_dir(), reason="the shared records are not on this machine")
 
@@ -227,7 +227,7 @@ def test_the_told_rig_records(name: str) -> None:
 @pytest.mark.slow
 def test_the_measured_drive_shows_friction_and_an_offset(tmp_path: Path) -> None:
     """EMPS: Janot, Gautier, Brunot 2019; published M 95.11, F_v 203.5, F_c 20.39, offset -3.165."""
-    for file in (ROOT / "scenarios" / "emps").glob("*.toml"):
+    for file in (ROOT / "scenarios" / "shipped" / "emps").glob("*.toml"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     build_python(Drive(), tmp_path)
     result = close_loop(tmp_path, data_dir=SHARED / "benchmarks", jobs=1)

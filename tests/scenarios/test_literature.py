@@ -24,7 +24,7 @@ from scenarios.literature.outcome import Finding, Outcome, table
 from scenarios.literature.row import Row
 from scenarios.literature.twin import twin
 from tests.helpers.native import native
-from tests.truth.rows import truth
+from tests.helpers.rows import truth
 
 ANY_MODEL = [pytest.param(m, id=m) for m in ("testrig", "vehicle7dof", "wheelset")]
 

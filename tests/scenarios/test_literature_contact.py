@@ -27,8 +27,8 @@ from scenarios.literature.conicity_table import Tabled
 from scenarios.literature.contact_force_judged import JUDGED, Judged, gathered
 from scenarios.literature.following import rmse
 from tests.helpers.native import native
-from tests.truth.rows import truth
-from tests.truth.rows_charles import conicity
+from tests.helpers.rows import truth
+from tests.helpers.rows_charles import conicity
 
 NOTHING = np.empty(0)
 

@@ -7,11 +7,7 @@ from itertools import permutations
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.scores import (
-    beats,
-    beyond_noise_of_all,
-    lead,
-)
+from estimator.closeloop.hypotheses.scores import beats, beyond_noise_of_all, lead
 from estimator.closeloop.hypotheses.twins import limits
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array

@@ -5,11 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.decision.verdict import (
-    named,
-    no_law,
-    noticed,
-)
+from estimator.closeloop.decision.verdict import named, no_law, noticed
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost

@@ -88,7 +88,7 @@ def _reached_in_form(
     """The same (n_y,) where the FMU's form leaves a share of each output open.
 
     One effect explains at least half of what was beyond noise in all outputs together; several, which could
-    come near to any form, more. So it is with the whole record, and with the held-out part unless hardly
+    come near to any form, more. So it is with the whole record, and with the part to choose unless hardly
     anything is left in all: an effect may act in one part alone. What was large beyond noise comes within the
     share, what was small does not grow; where all was small, so that it could be form too, several explain
     nearly all. A fault of a sensor may also leave the others as they are, if nearly all goes from its own.

@@ -34,7 +34,7 @@ class BlackBox:
     """What is left with a black box added to the calibrated FMU.
 
     order: number of poles, None where no black box is worth its coefficients; poles: in the plane of z,
-    at steps of `step` s; residuals: of each run (N, n_y); rms: on the held-out part, (n_y,).
+    at steps of `step` s; residuals: of each run (N, n_y); rms: on the test part, (n_y,).
     """
 
     order: int | None

@@ -19,7 +19,12 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.scores import beats, ranked
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
-from estimator.closeloop.screening.free_form import FREE_FORMS, Dependence, dependences, left_out
+from estimator.closeloop.screening.free_form import (
+    FREE_FORMS,
+    Dependence,
+    dependences,
+    left_out,
+)
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.screening.screen import Screening, screen

@@ -21,10 +21,7 @@ from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.search.dating import dated
 from estimator.closeloop.search.growing import from_the_beginning
 from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
-from estimator.closeloop.search.nomination import (
-    nominated,
-    overlooked,
-)
+from estimator.closeloop.search.nomination import nominated, overlooked
 from estimator.closeloop.search.onset import since
 from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.closeloop.search.screened import Screened

@@ -13,23 +13,23 @@ from estimator.closeloop.question.problem import Problem
 from estimator.record import Array, Record
 from scenarios.closing.page.glossary import Glossary
 from scenarios.drawing.sheet import (
-    AFTER,
-    BEFORE,
-    CLOUD,
-    INK,
-    NOISE,
-    Plot,
-    envelope,
-    legend,
-    name_axes,
-    shade_test,
-    sheet,
-    sheets,
-    times,
+AFTER,
+BEFORE,
+CLOUD,
+INK,
+NOISE,
+Plot,
+envelope,
+legend,
+name_axes,
+shade_test,
+sheet,
+sheets,
+times,
 )  # fmt: skip
 from scenarios.drawing.typography import label, unit
 
-SEGMENTS = 8  # of the held-out part, between which the spectrum is averaged
+SEGMENTS = 8  # of the test part, between which the spectrum is averaged
 Series = list[tuple[str, Hypothesis, str]]
 
 
@@ -45,7 +45,7 @@ def series(found: Outcome, free: Hypothesis | None) -> Series:
 
 
 def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
-    """Every output and input over time with the held-out part shaded."""
+    """Every output and input over time with the test part shaded."""
     record = problem.record
     channels = [(n, False, j) for j, n in enumerate(record.outputs)]
     channels += [(n, True, j) for j, n in enumerate(record.inputs)]
@@ -58,7 +58,11 @@ def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
             shade_test(axes[name], record)
             name_axes(axes[name], "", unit(words.unit(name)), f"{name} ({'input' if is_input else 'output'})")
         axes[some[-1][0]].set_xlabel(time_label(record), fontsize=9)
-        yield Plot(f"record{ending}", figure, "The record. The shaded part is held out: no fit has seen it.")
+        yield Plot(
+            f"record{ending}",
+            figure,
+            "The record. The shaded part is the test part, which neither fitting nor choosing has used.",
+        )
 
 
 def residual_plots(
@@ -84,7 +88,7 @@ def residual_plots(
 
 
 def _residual_caption(zoom: bool) -> str:
-    text = "Measured minus simulated in free run, no measured output fed back. Shaded: held out."
+    text = "Measured minus simulated in free simulation, no measured output fed back. Shaded: the test part."
     more = " The lower panels show what is left at the scale of the noise." if zoom else ""
     return f"{text}{more} Dashed: ± 2 standard deviations of the noise."
 
@@ -103,7 +107,7 @@ def draw_residual(ax: Axes, record: Record, shown: Series, j: int, noise: float)
 def spectrum_plots(
     problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None
 ) -> Iterator[Plot]:
-    """Amplitude spectral density of the held-out residual of each output, with the level of the noise."""
+    """Amplitude spectral density of each residual on the test part, with the level of the noise."""
     for ending, some in sheets(problem.record.outputs, 6):
         rows = [some[i : i + 2] for i in range(0, len(some), 2)]
         layout = [row if len(row) == 2 or len(rows) == 1 else [*row, "."] for row in rows]
@@ -118,7 +122,7 @@ def spectrum_plots(
 
 
 SPECTRUM = (
-    "Amplitude spectral density of the residual on the held-out part (Welch's method). "
+    "Amplitude spectral density of the residual on the test part (Welch's method). "
     "Dashed: the level of the noise alone."
 )
 

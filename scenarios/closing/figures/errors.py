@@ -1,4 +1,4 @@
-"""Errors on the held-out part as bars."""
+"""Errors on the test part as bars."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ ALONE = {k: v for k, v in FREE.items() if k != "after"}  # nothing was added
 STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labelled in each decade, by the decades that are shown
 LABELS = 3  # decades that have room for a label
 CAPTION = (
-    "Error on the held-out part in multiples of the noise floor, on a logarithmic scale. The bars begin at "
+    "Error on the test part in multiples of the noise floor, on a logarithmic scale. The bars begin at "
     "the floor, which no model can be expected to pass."
 )
 

@@ -26,7 +26,7 @@ def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypot
     draw_residual(axes["residual"], problem.record, series(found, free), j, found.noise[j])
     name_axes(axes["residual"], time_label(problem.record), label("residual", words.unit(name)), name)
     legend(figure, axes["residual"])
-    caption = f"Residual of {name} in free simulation, held-out part shaded."
+    caption = f"Residual of {name} in free simulation, test part shaded."
     if laws:
         port = laws[0].missing.port.name
         draw_law(axes["law"], laws[0], words)

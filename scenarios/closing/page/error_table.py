@@ -16,7 +16,7 @@ Row = dict[str, str]
 
 
 def error_values(case: Case) -> dict[str, dict[str, float]]:
-    """Errors on the held-out part by output; `after` only where something was added."""
+    """Errors on the test part by output; `after` only where something was added."""
     return {
         output: {k: v for k, v in values.items() if k != "after" or case.found.built_in}
         for output, values in case.result.error.items()

@@ -1,6 +1,6 @@
 """Records for the rows by the truth models, which share no code with the FMUs.
 
-From a shell: python -m tests.truth.rows friction_ukf OUT, then run the row on OUT.
+From a shell: python -m tests.helpers.rows friction_ukf OUT, then run the row on OUT.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numpy as np
 
 from scenarios.literature import ROWS
 from scenarios.literature.case import TIME, Case, Record
+from tests.helpers.rows_charles import of_charles
+from tests.helpers.rows_mal import of_mal, piece
+from tests.helpers.rows_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
 from tests.truth.rig_inputs import Inputs, trapezium
-from tests.truth.rows_charles import of_charles
-from tests.truth.rows_mal import of_mal, piece
-from tests.truth.rows_ward import of_ward
 from tests.truth.vehicle_effects import Law
 
 WRONG_PATCH = {"a": 3.4e-3, "b": 2.4e-3}  # m; the filter believes in a circle of 2.7 mm
