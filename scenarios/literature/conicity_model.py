@@ -129,10 +129,21 @@ class Constant:
 
 
 class Along(Constant):
-    """The irregularity is estimated too (eq. 8 and 9)."""
+    """The irregularity is estimated too (eq. 8 and 9).
+
+    kept: share of it that a sample leaves; 1 is the source's random walk, which knows no bound.
+    """
 
     names: tuple[str, ...] = ("conicity", "d")
+
+    def __init__(self, kept: float = 1.0) -> None:
+        self._kept = np.array([1.0, kept])
 
     def irregularity(self, more: Array) -> Array:
         """See Belief."""
         return more[:, 1]
+
+    def moved(self, more: Array, shift: Array, by: Array) -> Array:
+        """See Belief."""
+        kept: Array = more * self._kept
+        return kept

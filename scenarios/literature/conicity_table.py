@@ -11,12 +11,14 @@ class Tabled(Along):
     """Conicity moves with the slope of a table (eq. 10 and 11); the filter's estimates correct its nodes.
 
     nodes: shifts (m,), m; start, std: of the conicity at each; memory: how much of an estimate's
-    information a sample leaves, since one follows from the other. The curve is redrawn every few samples.
+    information a sample leaves, since one follows from the other; kept: see Along. The curve is redrawn
+    every few samples.
     """
 
     EVERY = 25  # samples
 
-    def __init__(self, nodes: Array, start: float, std: float, memory: float) -> None:
+    def __init__(self, nodes: Array, start: float, std: float, memory: float, kept: float = 1.0) -> None:
+        super().__init__(kept)
         self.nodes, self.values = nodes, np.full(len(nodes), start)
         self._weight, self._memory = np.full(len(nodes), std**-2.0), memory
         self._count = 0
@@ -24,7 +26,7 @@ class Tabled(Along):
 
     def moved(self, more: Array, shift: Array, by: Array) -> Array:
         """See Belief."""
-        after = more.copy()
+        after = super().moved(more, shift, by)
         at = np.clip(shift + by / 2, self.nodes[0], self.nodes[-1])
         after[:, 0] += self._slope(at) * by
         return after

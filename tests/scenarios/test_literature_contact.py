@@ -136,6 +136,14 @@ def test_the_irregularity_must_be_estimated_along():
     assert along < 0.5
 
 
+def test_an_irregularity_that_was_lost_is_found_again():
+    record = truth(case_of("conicity", "generic", duration=12.0, seed=5))
+    found, _ = cone.followed("irregularity too", record)
+    late = record.t > 2.0
+    # less than without any estimate; as a random walk it went off by 38 mm
+    assert rmse(found.value["d"][late], record.columns["y_irr"][late]) < cone.DEVIATION
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["contact_force_ekf", "conicity"])
 def test_the_whole_row_meets_its_targets(tmp_path, name):
