@@ -237,8 +237,9 @@ def oscillation(n: int, size: float, k_3: float, rng: np.random.Generator) -> pd
 @pytest.mark.slow
 def test_the_command_finds_the_hardening_of_another_solvers_oscillator(tmp_path: Path) -> None:
     rng, k_3 = np.random.default_rng(3), 7e5
-    oscillation(6000, 0.05, k_3, rng).to_csv(tmp_path / "silverbox_train.csv", index=False)
-    oscillation(4000, 0.06, k_3, rng).to_csv(tmp_path / "silverbox_test_arrow.csv", index=False)
+    # a force of 0.02 V rms, as in the measured records that the target is for
+    oscillation(6000, 0.017, k_3, rng).to_csv(tmp_path / "silverbox_train.csv", index=False)
+    oscillation(4000, 0.020, k_3, rng).to_csv(tmp_path / "silverbox_test_arrow.csv", index=False)
     out = tmp_path / "out"
     assert main([str(tmp_path), "--out", str(out)]) == 0
     found = json.loads((out / "table.json").read_text())["silverbox"]
