@@ -1,14 +1,26 @@
 """Models by name. Each folder with a model.py that defines a Model is one; there is no other list."""
 
+from pathlib import Path
+
 import fmus
 from fmus.errors import BadInput, did_you_mean
 from fmus.model import Model
-from fmus.registry import classes_in
+from fmus.registry import by_name, classes_in, further_folders
 
-MODELS: dict[str, type[Model]] = {
-    c.name.lower(): c
-    for c in classes_in(fmus, Model, "fmus.*.model")  # type: ignore[type-abstract]  # what is found is concrete
-}
+
+def _found() -> dict[str, type[Model]]:
+    """Models of the package and of RAILFMI_PATH; BadInput for a further folder that would be passed over."""
+    own = {folder.name for folder in Path(__file__).parent.iterdir()}
+    for further in further_folders(fmus.__name__):
+        for folder in sorted(f for f in further.iterdir() if f.is_dir() and f.name not in own):
+            if any(folder.glob("*.py")) and not (folder / "model.py").exists():
+                raise BadInput(f"{folder}: holds no model.py; call the file with the model's class so")
+    # what is found is concrete
+    models = classes_in(fmus, Model, "*/model.py")  # type: ignore[type-abstract]
+    return {name.lower(): model for name, model in by_name(models, "name").items()}
+
+
+MODELS: dict[str, type[Model]] = _found()
 
 
 def model_class(name: str) -> type[Model]:

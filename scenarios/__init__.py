@@ -1,7 +1,24 @@
 """Questions asked of the FMUs: experiments, estimates, closing the loop, scenarios, reports, command line."""
 
-from scenarios.closing.closing import close_loop
-from scenarios.closing.several import close_loops
-from scenarios.estimating.estimating import estimate
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scenarios.closing.closing import close_loop
+    from scenarios.closing.several import close_loops
+    from scenarios.estimating.estimating import estimate
 
 __all__ = ["close_loop", "close_loops", "estimate"]
+
+_HOMES = {
+    "close_loop": "scenarios.closing.closing",
+    "close_loops": "scenarios.closing.several",
+    "estimate": "scenarios.estimating.estimating",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Loaded when asked for, so that the command line can still say what is wrong with a user's file."""
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(_HOMES[name]), name)

@@ -5,12 +5,12 @@ import sys
 from fmus.effects.effect import Effect
 from fmus.effects.site import Site
 from fmus.errors import BadInput, did_you_mean
-from fmus.registry import classes_in
+from fmus.registry import by_name, classes_in
 
-EFFECTS: dict[str, type[Effect]] = {
-    c.kind: c
-    for c in classes_in(sys.modules[__name__], Effect)  # type: ignore[type-abstract]  # what is found is concrete
-}
+EFFECTS: dict[str, type[Effect]] = by_name(
+    classes_in(sys.modules[__name__], Effect),  # type: ignore[type-abstract]  # what is found is concrete
+    "kind",
+)
 
 
 def parse_effect(text: str) -> tuple[type[Effect], str]:

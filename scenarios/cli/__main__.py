@@ -1,5 +1,5 @@
 """`python -m scenarios.cli` is the command `railfmi`."""
 
-from scenarios.cli.app import main
+from scenarios.cli import main
 
 main()

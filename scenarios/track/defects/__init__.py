@@ -2,10 +2,10 @@
 
 import sys
 
-from fmus.registry import classes_in
+from fmus.registry import by_name, classes_in
 from scenarios.track.defects.defect import Defect
 
-DEFECTS: dict[str, type[Defect]] = {
-    c.shape: c
-    for c in classes_in(sys.modules[__name__], Defect)  # type: ignore[type-abstract]  # what is found is concrete
-}
+DEFECTS: dict[str, type[Defect]] = by_name(
+    classes_in(sys.modules[__name__], Defect),  # type: ignore[type-abstract]  # what is found is concrete
+    "shape",
+)

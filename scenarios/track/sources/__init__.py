@@ -2,10 +2,10 @@
 
 import sys
 
-from fmus.registry import classes_in
+from fmus.registry import by_name, classes_in
 from scenarios.track.sources.source import Source
 
-SOURCES: dict[str, type[Source]] = {
-    c.kind: c
-    for c in classes_in(sys.modules[__name__], Source)  # type: ignore[type-abstract]  # what is found is concrete
-}
+SOURCES: dict[str, type[Source]] = by_name(
+    classes_in(sys.modules[__name__], Source),  # type: ignore[type-abstract]  # what is found is concrete
+    "kind",
+)
