@@ -16,7 +16,8 @@ import casadi as cs
 from fmus.component import Component
 from fmus.contact.forces.coefficients import looked_up
 from fmus.contact.forces.friction import CRITICAL, friction_coefficient
-from fmus.contact.forces.laws import selected_law
+from fmus.contact.forces.laws import LAWS, law_codes, selected_law
+from fmus.contact.forces.laws.polach import Polach
 from fmus.contact.geometry.search import FLANGE_ANGLE
 from fmus.effects.effect import Effect
 from fmus.model import Model
@@ -136,9 +137,8 @@ class Wheelset(Model):
     f23 = Parameter("N.m", min=0.0, doc="lateral creep coefficient of spin, 0: Kalker's", source=CHOICE)
     f33 = Parameter("N.m2", min=0.0, doc="moment creep coefficient of spin, 0: Kalker's", source=CHOICE)
     creep_law = Parameter(
-        "1", 4.0, min=0.0, max=4.0, fixed=True, source=CHOICE,
-        doc="0 linear, 1 Shen, 2 FASTSIM, 3 Polach without spin, 4 Polach",
-    )  # fmt: skip
+        "1", float(Polach.code), min=0.0, max=len(LAWS) - 1.0, doc=law_codes(), source=CHOICE, fixed=True
+    )
     contact_search = Parameter(
         "1", 1.0, min=0.0, max=1.0, doc="0 rigid, 1 quasi-elastic", source=CHOICE, fixed=True
     )
@@ -308,7 +308,7 @@ class Wheelset(Model):
             m.f23 / (area * cs.sqrt(area)) * cs.sqrt(m.G),
             m.f33 / area**2 * m.G,
         )
-        linear = m.creep_law < 0.5
+        linear = m.creep_law < 0.5  # code 0
         return [
             cs.if_else(cs.logic_and(linear, own > 0), own, table)
             for own, table in zip(given, kalker, strict=True)

@@ -13,23 +13,47 @@ from fmus.contact.geometry.profile import (
     mirrored,
 )
 from fmus.errors import BadInput, did_you_mean
+from fmus.registry import further_folders
 
 FOLDER = Path(__file__).with_name("profiles")
+PACKAGE = f"{__package__}.profiles"  # by which RAILFMI_PATH mirrors the folder
 METRES = {"m": 1.0, "mm": 1e-3}  # of one unit of length in a file
 UP = {"up": 1, "down": -1}
 
 
+def exact_files() -> dict[str, Path]:
+    """Files of the exact profiles by name; BadInput where a further one has a name that is taken."""
+    found: dict[str, Path] = {}
+    for folder in (FOLDER, *further_folders(PACKAGE)):
+        for file in sorted(folder.glob("*.toml")):
+            if file.stem in found:
+                raise BadInput(
+                    f"{file}: '{file.stem}' is also the name of {found[file.stem]}; rename the file"
+                )
+            found[file.stem] = file
+    return found
+
+
 def exact_names() -> list[str]:
     """Names of the exact profiles."""
-    return sorted(file.stem for file in FOLDER.glob("*.toml"))
+    return sorted(exact_files())
 
 
 @cache
 def exact_profile(name: str) -> Profile:
     """The exact profile of that name; BadInput with the nearest name where there is none."""
-    if name not in exact_names():
-        raise BadInput(f"profile '{name}' is not known; {did_you_mean(name, exact_names())}")
-    declared = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    files = exact_files()
+    if name not in files:
+        raise BadInput(f"profile '{name}' is not known; {did_you_mean(name, files)}")
+    try:
+        return _profile(name, tomllib.loads(files[name].read_text(encoding="utf-8")))
+    except (KeyError, TypeError, ValueError) as error:
+        said = f"key {error}" if isinstance(error, KeyError) else error
+        example = "write it as fmus/contact/geometry/profiles/60E1.toml is"
+        raise BadInput(f"{files[name]}: is not a sound exact profile ({said}); {example}") from error
+
+
+def _profile(name: str, declared: dict[str, Any]) -> Profile:
     length, up = METRES[declared["unit"]], UP[declared["z"]]
     sections = [_section(entry, length, up) for entry in declared["section"]]
     if declared.get("symmetric"):

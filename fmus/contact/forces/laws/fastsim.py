@@ -29,6 +29,7 @@ class Fastsim(CreepLaw):
 
     name = "fastsim"
     code = 2
+    title = "FASTSIM"
 
     def __init__(self, n: Grid = (20, 20)) -> None:
         self.n = n

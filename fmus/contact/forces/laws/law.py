@@ -50,7 +50,8 @@ class CreepLaw(ABC):
     """
 
     name: ClassVar[str]
-    code: ClassVar[int]  # what the parameter creep_law of an FMU selects
+    code: ClassVar[int]  # what the parameter creep_law of an FMU selects; the codes count up from 0
+    title: ClassVar[str] = ""  # in the description of that parameter; its name where it has none
 
     @abstractmethod
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:

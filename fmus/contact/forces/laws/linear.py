@@ -11,6 +11,7 @@ class Linear(CreepLaw):
 
     name = "linear"
     code = 0
+    title = "linear"
 
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:
         """See CreepLaw.forces."""

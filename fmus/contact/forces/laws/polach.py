@@ -19,6 +19,7 @@ class Polach(CreepLaw):
 
     name = "polach"
     code = 4
+    title = "Polach"
 
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:
         """See CreepLaw.forces."""

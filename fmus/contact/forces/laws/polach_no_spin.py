@@ -12,6 +12,7 @@ class PolachNoSpin(CreepLaw):
 
     name = "polach_no_spin"
     code = 3
+    title = "Polach without spin"
 
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:
         """See CreepLaw.forces."""

@@ -18,6 +18,7 @@ class Shen(CreepLaw):
 
     name = "shen"
     code = 1
+    title = "Shen"
 
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:
         """See CreepLaw.forces."""

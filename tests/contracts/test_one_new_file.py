@@ -1,0 +1,168 @@
+"""The README's promises: each of these is one new file, in the package or in a folder of RAILFMI_PATH."""
+
+import os
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from fmus.host.fmu import Fmu
+from tests.helpers.further import Further
+
+PENDULUM = '''
+"""Pendulum: one angle."""
+
+import casadi as cs
+
+from fmus.model import Model
+from fmus.port import Port
+from fmus.variables import Input, Parameter, State, rate
+
+
+class Pendulum(Model):
+    """Pendulum with a torque at its pivot."""
+
+    name = "Pendulum"
+    step_size = 1e-3
+
+    phi = State("rad", 0.1, doc="angle", nominal=0.1)
+    phi_dot = State("rad/s", doc="angular velocity", nominal=0.1)
+    M_ext = Input("N.m", doc="port: torque at the pivot")
+    J = Parameter("kg.m2", 1.0, min=1e-3, doc="inertia", source="this example")
+    k = Parameter("N.m", 9.81, min=0.0, doc="weight times length", source="this example")
+    phi_ddot = rate(phi_dot, "rad/s2", "angular acceleration")
+
+    def derivatives(m):
+        """See Model.derivatives."""
+        return {"phi": m.phi_dot, "phi_dot": (-m.k * cs.sin(m.phi) + m.M_ext) / m.J}
+
+    def ports(m):
+        """The pivot."""
+        return {"pivot": Port(m.phi, m.phi_dot, {"M_ext": 1.0}, "rotation")}
+'''
+LAW = '''
+"""Half of Kalker's linear forces."""
+
+from fmus.contact.forces.laws.law import CreepLaw
+from fmus.contact.forces.laws.linear import linear_forces
+
+
+class Half(CreepLaw):
+    """Half of each linear force."""
+
+    name = "half"
+    code = {code}
+    title = "half of linear"
+
+    def forces(self, c):
+        """See CreepLaw.forces."""
+        return tuple(0.5 * force for force in linear_forces(c))
+'''
+
+
+@pytest.fixture
+def mine(tmp_path):
+    return Further(tmp_path)
+
+
+@pytest.mark.parametrize("package", [True, False], ids=["with __init__", "without __init__"])
+def test_a_model_is_one_file_with_or_without_a_package_around_it(mine, package):
+    mine.write("fmus/pendulum/model.py", PENDULUM)
+    if package:
+        mine.write("fmus/pendulum/__init__.py", "")
+    mine.railfmi("build", "pendulum", "--effect", "viscous_damping@pivot", "--out", "out")
+    assert "passed" in mine.railfmi("check", "out/Pendulum.fmu")
+    with Fmu(mine.work / "out" / "Pendulum.fmu") as pendulum:
+        pendulum.restart(phi=0.01, phi_dot=0.0)
+        for _ in range(100):
+            pendulum.step(1e-2)
+        # 1e-5: of the linear solution, whose error grows with the square of the angle
+        assert pendulum["phi"] == pytest.approx(0.01 * np.cos(np.sqrt(9.81)), abs=1e-5)
+
+
+def test_a_model_gets_the_contract_tests_for_free(mine):
+    mine.write("fmus/pendulum/model.py", PENDULUM)
+    assert mine.passes("tests/contracts/test_models.py", "-k", "pendulum") >= 3
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "words"),
+    [
+        ("fmus/pendulum/modell.py", PENDULUM, "holds no model.py"),
+        ("fmus/testrig/model.py", PENDULUM, "is also the name of"),
+        ("fmus/pendulum/model.py", PENDULUM.replace("Pendulum", "Testrig"), "'Testrig' is also in"),
+        ("fmus/pendulum/model.py", PENDULUM.replace("    name =", "    nam ="), "has no 'name'"),
+        ("fmus/pendulum/model.py", PENDULUM.replace("def deriv", "def driv"), "lacks derivatives"),
+        ("fmus/pendulum/model.py", '"""Nothing."""', "holds no class of Model"),
+        ("fmus/pendulum/model.py", "import nowhere", "No module named 'nowhere'"),
+        ("estimated/pendulum.py", PENDULUM, "holds none of the folders fmus, estimator, scenarios"),
+    ],
+)
+def test_a_further_file_that_cannot_be_used_is_refused_in_one_line(mine, path, text, words):
+    mine.write(path, text)
+    said = mine.refused("build", "pendulum", "--out", "out")
+    assert words in said
+    assert str(mine.folder) in said
+
+
+def test_a_creep_law_is_one_file(mine):
+    mine.write("fmus/contact/forces/laws/half.py", LAW.format(code=5))
+    mine.railfmi("build", "wheelset", "--out", "out")
+    with Fmu(mine.work / "out" / "Wheelset.fmu") as wheelset:
+        law = wheelset.description.variables["creep_law"]
+        assert (law.start, law.max) == (4.0, 5.0)
+        assert "5 half of linear" in law.description
+        forces = []
+        for code in (0.0, 5.0):
+            wheelset.restart(psi=1e-3, creep_law=code)
+            forces.append(wheelset["F_y_left"])
+        assert forces[0] != 0.0
+        assert_allclose(forces[1], forces[0] / 2, rtol=1e-12)
+    said = """
+        from fmus.contact import creep_forces
+        given = (6e-3, 4e-3, 8e4, 0.3, 8e10, 0.28, 1e-3, 0.0, 0.0)
+        print(creep_forces("half", *given)[0] / creep_forces("linear", *given)[0])
+    """
+    assert float(mine.says(said)) == pytest.approx(0.5, rel=1e-12)
+
+
+def test_a_creep_law_whose_code_leaves_a_gap_is_refused(mine):
+    mine.write("fmus/contact/forces/laws/half.py", LAW.format(code=7))
+    assert "has code 7, where the next free one is 5" in mine.refused("build", "wheelset")
+
+
+def test_an_exact_profile_is_one_file(mine):
+    mine.write(
+        "fmus/contact/geometry/profiles/Cone20.toml",
+        """
+        kind = "wheel"
+        unit = "m"
+        z = "up"
+
+        [[section]]
+        y = [-0.06, 0.06]
+        polynomial = [0.0, 0.05]
+        """,
+    )
+    table = (
+        "from fmus.contact import contact_table; print(contact_table('Cone20', '60E1')['delta_left'].max())"
+    )
+    assert float(mine.says(table)) == pytest.approx(np.arctan(0.05), rel=1e-3)
+    mine.railfmi("build", "wheelset", "--wheel", "Cone20", "--out", "out")
+    assert (mine.work / "out" / "Wheelset.fmu").exists()
+
+
+def test_an_exact_profile_that_is_not_sound_is_refused(mine):
+    file = mine.write("fmus/contact/geometry/profiles/Cone20.toml", 'kind = "wheel"\nunit = "m"\n')
+    said = mine.refused("build", "wheelset", "--wheel", "Cone20")
+    assert str(file) in said
+    assert "key 'z'" in said
+
+
+def test_several_folders_may_be_named(mine, tmp_path, monkeypatch):
+    mine.write("fmus/pendulum/model.py", PENDULUM)
+    other = Further(tmp_path / "other")
+    other.write("fmus/swing/model.py", PENDULUM.replace("Pendulum", "Swing"))
+    mine.folder = f"{mine.folder}{os.pathsep}{other.folder}"
+    found = mine.says("from fmus.models import MODELS; print(*MODELS)").split()
+    assert {"pendulum", "swing", "wheelset"} <= set(found)
