@@ -1,21 +1,57 @@
-"""Noise floor, correlation time and weights of residuals."""
+"""Sensor noise: its size, declared or estimated, and the size of a residual that counts as one."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.record import Array, Record
+from estimator.record import Array, BoolArray, Record
 
 # weights of the third difference; white noise of variance 1 leaves variance 20
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
 
 
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Noise of the outputs of a record.
+
+    std: (n_y,) standard deviation, declared or estimated; scale: (n_y,) size of a residual that counts as one
+    in fits and scores, which is the standard deviation where that is declared; declared: (n_y,).
+    """
+
+    std: Array
+    scale: Array
+    declared: BoolArray
+
+    @classmethod
+    def of(cls, record: Record, residuals: Sequence[Array]) -> "Noise":
+        """Noise of a record, from what a fit leaves of each run (N, n_y)."""
+        return cls(noise_floor(record), weights(record, residuals), record.noise_declared)
+
+    @property
+    def known(self) -> bool:
+        """Whether it is declared for all outputs, so that a residual can be seen to be noise."""
+        return bool(self.declared.all())
+
+
+def white_noise(pieces: Iterable[Array], quantised: bool = False) -> float:
+    """Standard deviation of the white noise on pieces (N,) of a channel, by third differences.
+
+    Motion that is smooth over four samples counts little. quantised: differences of zero are left out, as a
+    slow channel with few digits has many of them.
+    """
+    rough = np.abs(np.concatenate([np.convolve(x, DIFFERENCE, "valid") for x in pieces]))
+    if quantised:
+        rough = rough[rough > 0]
+    # 1.4826 turns a median of absolute values into a standard deviation
+    return 1.4826 * float(np.median(rough)) / float(np.linalg.norm(DIFFERENCE)) if rough.size else 0.0
+
+
 def noise_floor(record: Record) -> Array:
     """Standard deviation of each output's noise (n_y,): as declared, else what third differences leave."""
-    measured = []
-    for j in range(len(record.outputs)):
-        rough = np.concatenate([np.convolve(run.y[:, j], DIFFERENCE, "valid") for run in record.runs])
-        measured.append(1.4826 * np.median(np.abs(rough)) / np.linalg.norm(DIFFERENCE))
+    estimated = [white_noise(run.y[:, j] for run in record.runs) for j in range(len(record.outputs))]
     spread = np.std(np.vstack([run.y for run in record.runs]), axis=0)
-    floor = np.where(np.isnan(record.noise_std), measured, record.noise_std)
+    floor = np.where(record.noise_declared, record.noise_std, estimated)
     lowest: Array = np.maximum(floor, 1e-12 * spread + 1e-300)
     return lowest
 
@@ -36,14 +72,14 @@ def correlation_time(residual: Array) -> float:
     return float(max(tau[np.argmax(window)] if window.any() else n / 5, 1.0))
 
 
-def weights(record: Record, residuals: list[Array]) -> Array:
+def weights(record: Record, residuals: Sequence[Array]) -> Array:
     """Size of a residual that counts as one, for each output (n_y,).
 
     Declared noise counts as it is. Otherwise the residual itself says how large it is and, by its
     correlation time, how many of its samples are independent (a composite likelihood).
     """
     size = record.noise_std.copy()
-    for j in np.flatnonzero(np.isnan(size)):
+    for j in np.flatnonzero(~record.noise_declared):
         parts = [r[run.fit, j] for r, run in zip(residuals, record.runs, strict=True) if run.fit.any()]
         tau = np.mean([correlation_time(p) for p in parts])
         size[j] = np.sqrt(np.mean(np.concatenate(parts) ** 2) * tau)

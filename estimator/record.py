@@ -66,6 +66,6 @@ class Record:
     notes: tuple[Note, ...] = ()
 
     @property
-    def floor_known(self) -> bool:
-        """Whether the noise of all outputs is declared, so that a residual can be seen to be noise."""
-        return not np.isnan(self.noise_std).any()
+    def noise_declared(self) -> BoolArray:
+        """For which outputs the noise is declared, (n_y,)."""
+        return np.asarray(~np.isnan(self.noise_std))

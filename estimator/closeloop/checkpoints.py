@@ -14,7 +14,7 @@ from typing import TypeVar, cast
 
 from estimator.closeloop.decision.detect import Detection
 from estimator.closeloop.diagnostics.black_box import BlackBox
-from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.diagnostics.power import Visible
 from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -23,6 +23,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.noise import Noise
 from fmus import codec
 from fmus.host.description import PortNames
 
@@ -31,7 +32,7 @@ Result = TypeVar("Result")
 SUFFIX = ".checkpoint"
 KEPT = (
     Unknown, Candidate, Fit, Hypothesis, Promise, PortNames, MissingForce, Detection, BlackBox, Visible,
-    Honesty, Check, Judgement,
+    Diagnostics, Check, Judgement, Noise,
 )  # fmt: skip
 # a link is not followed, and a pipe is not waited for, even where one takes the file's place at this moment
 SAFELY = (

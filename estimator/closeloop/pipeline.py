@@ -1,7 +1,7 @@
 """The chain: calibrate, detect, nominate, fit jointly, choose, judge, hold the answer against the test."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 
@@ -10,16 +10,18 @@ from joblib import Parallel, delayed
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.allowed import allowed
-from estimator.closeloop.decision.detect import detect
+from estimator.closeloop.decision.detect import Detection, detect
 from estimator.closeloop.decision.law_form import confirmed
+from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
-from estimator.closeloop.diagnostics.diagnostics import honesty
-from estimator.closeloop.evidence import Judgement
+from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
+from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.calibrate import calibrate
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
-from estimator.closeloop.fitting.reweighted import best_weights, fitted_again, rescaled
+from estimator.closeloop.fitting.reweighted import reweighted
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.scores import beats, ranked
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.problem import Problem
@@ -27,8 +29,6 @@ from estimator.closeloop.screening.missing_force import MissingForce, missing_fo
 from estimator.closeloop.search.free_form import free_form
 from estimator.closeloop.search.screened import Screened, screened
 from estimator.closeloop.search.search import Search
-from estimator.noise import noise_floor
-from estimator.record import Array
 
 
 def trace(
@@ -37,117 +37,145 @@ def trace(
     jobs: int = 2,
     seed: int = 0,
     stages: Stages = Stages(),  # noqa: B008 - immutable, keeps nothing
+    fitter: Callable[[Baseline, int], Fitter] = Fitter,
 ) -> Outcome:
-    """Run the whole chain on a problem; `tell` hears what is being done, `stages` keeps what was found."""
+    """Run the whole chain on a problem; `tell` hears what is being done, `stages` keeps what was found.
+
+    fitter: makes what fits hypotheses beside a baseline in so many processes.
+    """
     progress = Progress(tell)
-    found = _traced(problem, progress, jobs, seed, stages)
+    found = _Chain(problem, progress, jobs, seed, stages, fitter).run()
     progress.end()
     return replace(found, seconds=progress.seconds)
 
 
-def _traced(problem: Problem, tell: Progress, jobs: int, seed: int, stages: Stages) -> Outcome:
-    noise = noise_floor(problem.record)
-    tell("calibrate", "calibrating the declared parameters")
-    declared, base, size = stages.done("calibrated", lambda: calibrate(problem))
-    tell("missing force", "inferring the missing force at each port")
-    forces = stages.done("forces", lambda: missing_forces(problem, base.fit.theta, noise))
-    shown = screened(problem, base, noise, size, forces, tell, stages)
-    tell("detect", "testing for a discrepancy against simulated records without one")
-    change, seen = shown.change, shown.screening.fit
-    over_noise = replace(seen, residual=(seen.residual.reshape(-1, len(size)) * size / noise).ravel())
-    regressors = [g for _, g in change]
-    detection = stages.done(
-        "detection",
-        lambda: detect(
-            problem, base, noise, over_noise, regressors, shown.likeness, shown.began,
-            np.random.default_rng(seed),
-        ),
-    )  # fmt: skip
-    tell("honesty", "working out what else would explain, and what could have been seen")
-    level = detection.level / len(detection.figures)
-    owed = stages.done(
-        "honesty",
-        lambda: honesty(problem, base, shown.fit, change, size, level, np.random.default_rng(seed)),
-    )
-    found = (declared, base, noise, size, detection, tuple(forces), tuple(shown.promises))
-    before, early = without_fits(problem, base, detection, noise)
-    if early:
-        return Outcome(*found, (), (), early, owed)
-    search = Search(shown, tell, jobs)
-    singles, pairs = search.run()
-    if not problem.record.floor_known and (singles or pairs):
-        tell("weights", "weighting the residuals by what the best fit leaves")
-        base, size, singles, pairs = stages.done(
-            "weights", lambda: _weighted_anew(shown, singles, pairs, jobs)
+@dataclass(frozen=True)
+class _Chain:
+    """One run of the chain; see `trace`."""
+
+    problem: Problem
+    tell: Progress
+    jobs: int
+    seed: int
+    stages: Stages
+    fitter: Callable[[Baseline, int], Fitter]
+
+    def run(self) -> Outcome:
+        """Calibrate, detect, search, judge, and hold the answer against the test part."""
+        tell, done = self.tell, self.stages.done
+        tell("calibrate", "calibrating the declared parameters")
+        declared, base, noise = done("calibrated", lambda: calibrate(self.problem))
+        baseline = Baseline(self.problem, base, noise)
+        tell("missing force", "inferring the missing force at each port")
+        forces = done("forces", lambda: missing_forces(self.problem, base.fit.theta, noise.std))
+        shown = screened(baseline, forces, tell, self.stages)
+        detection = self._detected(shown)
+        diagnostics = self._diagnosed(shown, detection)
+        before, early = without_fits(baseline, detection)
+        found = Outcome(
+            declared, baseline, detection, tuple(forces), tuple(shown.promises), (), (),
+            early or Judgement(tuple(before), (), ""), diagnostics,
+        )  # fmt: skip
+        return found if early else self._searched(found, shown, before)
+
+    def _detected(self, shown: Screened) -> Detection:
+        self.tell("detect", "testing for a discrepancy against simulated records without one")
+        noise, seen = shown.baseline.noise, shown.screening.fit
+        in_noise = (seen.residual.reshape(-1, len(noise.std)) * noise.scale / noise.std).ravel()
+        regressors = [g for _, g in shown.change]
+        return self.stages.done(
+            "detection",
+            lambda: detect(
+                shown.baseline, replace(seen, residual=in_noise), regressors, shown.likeness, shown.began,
+                np.random.default_rng(self.seed),
+            ),
+        )  # fmt: skip
+
+    def _diagnosed(self, shown: Screened, detection: Detection) -> Diagnostics:
+        self.tell("diagnostics", "working out what else would explain, and what could have been seen")
+        level, rng = detection.level / len(detection.figures), np.random.default_rng(self.seed)
+        return self.stages.done(
+            "diagnostics", lambda: diagnose(shown.baseline, shown.fit, shown.change, level, rng)
         )
-        shown = replace(shown, base=base, size=size)
-        found = (declared, base, noise, size, *found[4:])
-    singles, pairs, judgement = _answered(shown, forces, search, singles, pairs, tell)
-    tell("test", "holding the answer against the test part")
-    judgement = confirmed_on_test(problem, base, judgement, size).after(before)
-    if judgement.verdict == "unexplained":
-        tell("free form", "fitting a force of free form")
-        curve = stages.done("free form", lambda: free_form(problem, base, forces, size, jobs, singles))
-        if curve and beats(problem, curve, base, size, "test"):
-            owed = replace(owed, free_form=curve)
-    return Outcome(*found, tuple(singles), tuple(pairs), judgement, owed)
 
-
-def _weighted_anew(
-    shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], jobs: int
-) -> tuple[Hypothesis, Array, list[Hypothesis], list[Hypothesis]]:
-    """Base, size of a residual that counts as one, singles and pairs, best first, all by new weights."""
-    problem, before = shown.problem, shown.size
-    size = best_weights(problem, [*singles, *pairs])
-    ones, twos = (fitted_again(problem, found, before, size, jobs) for found in (singles, pairs))
-    return rescaled(shown.base, before, size), size, ranked(problem, ones, size), ranked(problem, twos, size)
-
-
-def _answered(
-    shown: Screened, forces: Sequence[MissingForce], search: Search,
-    singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], tell: Progress,
-) -> tuple[list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
-    """Single hypotheses and pairs, best first, and their judgement, whose members are as it saw them.
-
-    What is named has its errors taken from the sum of squares, which may also move it. It is judged again
-    with these, until nothing is named that was not judged so: each is asked once, so that this ends.
-    """
-    problem, size, done = shown.problem, shown.size, shown.stages.done
-    asked: set[tuple[str, ...]] = set()
-    denied: Hypothesis | None = None
-    for turn in count():
-        tell("verdict", "asking whether it is the law's curve")
-        leading, judgement = _judged(shown, forces, singles, pairs, f"verdict {turn}")
-        alone = leading.members and not judgement.members and len(leading.members[0].candidates) == 1
-        if alone and denied is None:
-            denied = leading.members[0]
-            singles = search.instead(denied, singles)
-            continue
-        members = [h for h in judgement.members if h.key not in asked]
-        if not members:
-            break
-        tell("intervals", "asking how far its parameters may be from there")
-        found = done(f"intervals {turn}", partial(_profiled, problem, members, size, search.jobs))
-        asked |= {h.key for h in members}
-        final = {h.key: h for h in found}
-        singles, pairs = (
-            ranked(problem, [final.get(h.key, h) for h in some], size) for some in (singles, pairs)
+    def _searched(self, found: Outcome, shown: Screened, before: Sequence[Check]) -> Outcome:
+        """The outcome where a discrepancy is to be explained; before: the checks that said so."""
+        singles, pairs = self._search(shown).run()
+        if not shown.baseline.noise.known and (singles or pairs):
+            self.tell("weights", "weighting the residuals by what the best fit leaves")
+            shown, singles, pairs = self._weighted_anew(shown, singles, pairs)
+        baseline = shown.baseline
+        singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
+        self.tell("test", "holding the answer against the test part")
+        judgement = confirmed_on_test(baseline, judgement).after(before)
+        found = replace(
+            found, baseline=baseline, singles=tuple(singles), pairs=tuple(pairs), judgement=judgement
         )
-    return list(singles), list(pairs), judgement.of([*singles, *pairs])
+        if judgement.verdict != "unexplained":
+            return found
+        self.tell("free form", "fitting a force of free form")
+        fitter = self.fitter(baseline, self.jobs)
+        curve = self.stages.done("free form", lambda: free_form(fitter, found.forces, singles))
+        if curve and baseline.beats(curve, baseline.hypothesis, "test"):
+            return replace(found, free_form=curve)
+        return found
+
+    def _search(self, shown: Screened) -> Search:
+        return Search(shown, self.fitter(shown.baseline, self.jobs), self.tell)
+
+    def _weighted_anew(
+        self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]
+    ) -> tuple[Screened, list[Hypothesis], list[Hypothesis]]:
+        """What was screened, singles and pairs, best first, by the noise that the best fit leaves."""
+        base, noise, (ones, twos) = self.stages.done(
+            "weights", lambda: reweighted(self.fitter(shown.baseline, self.jobs), [singles, pairs])
+        )
+        baseline = replace(shown.baseline, hypothesis=base, noise=noise)
+        form = form_of(baseline)
+        return replace(shown, baseline=baseline), form.ranked(ones), form.ranked(twos)
+
+    def _answered(
+        self, shown: Screened, forces: Sequence[MissingForce],
+        singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
+    ) -> tuple[list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
+        """Single hypotheses and pairs, best first, and their judgement, whose members are as it saw them.
+
+        What is named has its errors taken from the sum of squares, which may also move it. It is judged again
+        with these, until nothing is named that was not judged so: each is asked once, so that this ends.
+        """
+        form, fitter = form_of(shown.baseline), self.fitter(shown.baseline, self.jobs)
+        asked: set[tuple[str, ...]] = set()
+        denied: Hypothesis | None = None
+        for turn in count():
+            self.tell("verdict", "asking whether it is the law's curve")
+            leading, judgement = self._judged(shown, forces, singles, pairs, f"verdict {turn}")
+            alone = leading.members and not judgement.members and len(leading.members[0].candidates) == 1
+            if alone and denied is None:
+                denied = leading.members[0]
+                singles = self._search(shown).instead(denied, singles)
+                continue
+            members = [h for h in judgement.members if h.key not in asked]
+            if not members:
+                break
+            self.tell("intervals", "asking how far its parameters may be from there")
+            found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, members))
+            asked |= {h.key for h in members}
+            final = {h.key: h for h in found}
+            singles, pairs = (form.ranked([final.get(h.key, h) for h in some]) for some in (singles, pairs))
+        return list(singles), list(pairs), judgement.of([*singles, *pairs])
+
+    def _judged(
+        self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
+        pairs: Sequence[Hypothesis], stage: str,
+    ) -> tuple[Judgement, Judgement]:  # fmt: skip
+        """What the comparison says, and what is left of it where each law must be the force's curve."""
+        baseline, done = shown.baseline, self.stages.done
+        judged = done(f"allowed {stage}", lambda: allowed(baseline, singles))
+        leading = judge(baseline, judged, pairs, shown.began).of([*singles, *pairs])
+        return leading, done(stage, lambda: confirmed(baseline, leading, forces))
 
 
-def _judged(
-    shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
-    pairs: Sequence[Hypothesis], stage: str,
-) -> tuple[Judgement, Judgement]:  # fmt: skip
-    """What the comparison says, and what is left where each law is asked whether it is the force's curve."""
-    problem, base, size, done = shown.problem, shown.base, shown.size, shown.stages.done
-    judged = done(f"allowed {stage}", lambda: allowed(problem, singles, size))
-    leading = judge(problem, base, judged, pairs, shown.noise, size, shown.began).of([*singles, *pairs])
-    return leading, done(stage, lambda: confirmed(problem, base, leading, forces, size))
-
-
-def _profiled(problem: Problem, members: Sequence[Hypothesis], size: Array, jobs: int) -> list[Hypothesis]:
+def _profiled(fitter: Fitter, members: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses with their errors as the sum of squares says."""
-    tasks = (delayed(profiled)(problem, h, size) for h in members)
-    return list(Parallel(min(jobs, len(members)))(tasks))
+    tasks = (delayed(profiled)(fitter.alone, h) for h in members)
+    return list(Parallel(min(fitter.jobs, len(members)))(tasks))

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from estimator.closeloop.decision.equivalence import becomes
-from estimator.closeloop.decision.verdict import gap_closed
-from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.decision.model_form import gap_closed
+from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.diagnostics.power import Visible
 from estimator.closeloop.evidence import Check, Verdict
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.scores import lead
+from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.regressors import is_wave
@@ -94,7 +93,7 @@ def result_of(
     augmented: Sequence[Path],
 ) -> Result:
     """Put an outcome into the contract's words; augmented: files of the augmented FMU, the FMU first."""
-    members, honesty, curve = found.judgement.members, found.honesty, found.free_form
+    members, diagnostics, curve = found.judgement.members, found.diagnostics, found.free_form
     best = found.built_in or found.base
     rms = errors(problem, found, best)
     outputs = problem.record.outputs
@@ -120,8 +119,8 @@ def result_of(
         notes=[n.sentence for n in problem.record.notes],
         augmented_fmu=augmented[0].name if augmented else "",
         augmented_files=[file.name for file in augmented],
-        power=[_line(v) for v in honesty.power] if honesty else [],
-        nomination=_nomination(honesty) if honesty else {},
+        power=[_line(v) for v in diagnostics.power] if diagnostics else [],
+        nomination=_nomination(diagnostics) if diagnostics else {},
         free_form=_curve(curve) if curve else {},
         seconds={stage: round(s, 2) for stage, s in found.seconds.items()},
         start_values=start_values(problem, found),
@@ -162,8 +161,8 @@ def errors(problem: Problem, found: Outcome, best: Hypothesis) -> dict[str, Arra
     if wrong:
         compared["placebo"] = wrong
     rms = {k: h.rms(problem, "test") for k, h in compared.items()}
-    if found.honesty:
-        rms["black_box"] = found.honesty.black_box.rms
+    if found.diagnostics:
+        rms["black_box"] = found.diagnostics.black_box.rms
     return rms | {"noise": found.noise}
 
 
@@ -197,7 +196,7 @@ def _line(v: Visible) -> dict[str, Any]:
     return {"kind": v.kind, "location": v.location, "parameter": v.parameter, **sizes, "shape": v.shape}
 
 
-def _nomination(h: Honesty) -> dict[str, Any]:
+def _nomination(h: Diagnostics) -> dict[str, Any]:
     stable = {label: share for label, share in h.stability.items() if share > 0}
     return {"decoy_gain": h.decoy_gain, "stability": stable}
 
@@ -240,7 +239,7 @@ def alternatives(problem: Problem, found: Outcome) -> list[Alternative]:
         Alternative(
             "+".join(c.kind for c in h.candidates),
             "+".join(c.location for c in h.candidates),
-            -lead(problem, best, h, found.size)[0],
+            -found.baseline.lead(best, h)[0],
         )
         for h in rejected
     ]

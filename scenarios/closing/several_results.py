@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from estimator.closeloop.decision.verdict import gap_closed
+from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.several.chart import chart
 from estimator.closeloop.several.common import Common
 from estimator.closeloop.several.estimates import Estimates

@@ -12,7 +12,7 @@ from estimator.filters.observability import needed
 from estimator.filters.process_noise import motion
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.unknown_input import UnknownInput
-from estimator.noise import DIFFERENCE
+from estimator.noise import white_noise
 from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
@@ -138,9 +138,7 @@ def noise_of(record: Record) -> Array:
     for j in np.flatnonzero(np.isnan(found)):
         seen = record.runs[0].y[:, j]
         seen = seen[np.isfinite(seen)]
-        rough = np.convolve(seen, DIFFERENCE, "valid")
-        measured = 1.4826 * float(np.median(np.abs(rough))) / float(np.linalg.norm(DIFFERENCE))
-        found[j] = max(measured, 1e-9 * float(np.std(seen)), 1e-300)
+        found[j] = max(white_noise([seen]), 1e-9 * float(np.std(seen)), 1e-300)
     return found
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.noise import white_noise
 from estimator.record import Array, Note
 from fmus.errors import BadInput
 
@@ -103,7 +104,7 @@ def clipped(x: Array) -> list[tuple[float, int]]:
     repeat itself. A stop from full speed within some four samples looks the same.
     """
     found = []
-    quantum, noise = _quantum(x), _noise(x)
+    quantum, noise = _quantum(x), white_noise([x], quantised=True)
     for sign in (1.0, -1.0):
         z = sign * x
         top = z.max()
@@ -124,14 +125,6 @@ def _quantum(x: Array) -> float:
     """The smallest difference between two values of a channel, x: (N,), not constant."""
     steps = np.diff(np.unique(x))
     return float(steps[steps > 1e-9 * np.ptp(x)].min())
-
-
-def _noise(x: Array) -> float:
-    """Standard deviation of the white noise on a channel, x: (N,); smooth motion counts little."""
-    fourth = np.abs(np.diff(x, 4))
-    fourth = fourth[fourth > 0]
-    # the fourth difference of white noise has 70 times its variance; 1.4826 turns a median into a deviation
-    return 1.4826 * float(np.median(fourth)) / 70**0.5 if fourth.size else 0.0
 
 
 def _unbraked(before: Array, quantum: float, noise: float) -> bool:

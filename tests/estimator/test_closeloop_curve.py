@@ -10,10 +10,11 @@ from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import (
     confirmed,
     curvature,
-    curve_check,
     misnamed,
 )
+from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.evidence import Judgement
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT
@@ -22,6 +23,7 @@ from estimator.closeloop.search.screened import screened
 from estimator.closeloop.search.search import Search
 from estimator.closeloop.several.transfer import Traced
 from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.baselines import baseline
 from tests.helpers.carriage import (
     Force,
     coulomb,
@@ -76,9 +78,9 @@ def asked(builder: ModelBuilder, resistance: Force, kind: str, seed: int) -> Tra
 )
 def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
     traced = asked(builder, resistance, kind, seed)
-    o, here = traced.found, traced.problem
-    assert max(curvature(here, o.singles[0], o.forces, o.size)) < NOTICED
-    told = confirmed(here, o.base, o.judgement, o.forces, o.size)
+    o = traced.found
+    assert max(curvature(o.baseline, o.singles[0], o.forces)) < NOTICED
+    told = confirmed(o.baseline, o.judgement, o.forces)
     assert (told.verdict, told.members) == (o.judgement.verdict, o.judgement.members)
     assert told.checks[-1].name == "the force follows the law"
     assert told.checks[-1].passed
@@ -97,7 +99,7 @@ def test_the_right_law_leaves_no_curve(builder, resistance, kind, seed):
 def test_a_law_that_is_near_is_not_named(builder, resistance, kind, over, seed):
     traced = asked(builder, resistance, kind, seed)
     o = traced.found
-    told = confirmed(traced.problem, o.base, o.judgement, o.forces, o.size)
+    told = confirmed(o.baseline, o.judgement, o.forces)
     assert (told.verdict, told.members) == ("unexplained", ())
     assert f"over the {over} at carriage" in told.reason
     assert f"nearest was {kind}@carriage" in told.reason
@@ -105,19 +107,20 @@ def test_a_law_that_is_near_is_not_named(builder, resistance, kind, over, seed):
 
 def test_it_is_not_asked_where_what_is_left_is_no_measure(builder):
     traced = asked(builder, root(60.0, 120.0), "coulomb_friction", 1)
-    o, here = traced.found, traced.problem
-    unknown = replace(here, record=replace(here.record, noise_std=np.array([1e-3, np.nan])))
-    assert confirmed(unknown, o.base, o.judgement, o.forces, o.size) is o.judgement
+    o = traced.found
+    noise = replace(o.baseline.noise, declared=np.array([True, False]))
+    assert confirmed(replace(o.baseline, noise=noise), o.judgement, o.forces) is o.judgement
 
 
 @pytest.mark.parametrize(("truth", "told"), [(coulomb(40.0), "traced"), (root(60.0, 120.0), "unexplained")])
 def test_where_the_form_is_open_it_is_asked_against_other_curves(builder, truth, told):
     traced = asked(builder, truth, "coulomb_friction", 1)
-    o, here = traced.found, replace(traced.problem, form_error=0.05)
-    own, elsewhere = curvature(here, o.singles[0], o.forces, o.size)
+    o = traced.found
+    opened = o.baseline.asked(replace(traced.problem, form_error=0.05))
+    own, elsewhere = curvature(opened, o.singles[0], o.forces)
     assert elsewhere > 0
-    assert curvature(traced.problem, o.singles[0], o.forces, o.size) == (own, 0.0)
-    assert confirmed(here, o.base, o.judgement, o.forces, o.size).verdict == told
+    assert curvature(o.baseline, o.singles[0], o.forces) == (own, 0.0)
+    assert confirmed(opened, o.judgement, o.forces).verdict == told
 
 
 @pytest.mark.parametrize(
@@ -141,7 +144,8 @@ def test_an_open_form_may_leave_a_curve_that_is_little_of_it(left, own, elsewher
         for squares in (3e4, 1000 + left)
     )
     asked = [SimpleNamespace(policy=DEFAULT, form_error=form) for form in (0.0, 0.02)]
-    assert [not curve_check(a, h, base, own, elsewhere).passed for a in asked] == [closed, opened]
+    limits = [form_of(baseline(a, base)).curve_limit(h, elsewhere) for a in asked]
+    assert [own > limit for limit in limits] == [closed, opened]
 
 
 def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
@@ -150,7 +154,7 @@ def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:
     o = looked_at("one", here, kinds).found
     fitted = {h.candidates[0].kind: h for h in o.singles}
     told = judged("ambiguous", tuple(fitted[k] for k in kinds), "this record cannot tell them apart")
-    return confirmed(here, o.base, told, o.forces, o.size)
+    return confirmed(o.baseline, told, o.forces)
 
 
 def test_of_a_class_the_law_stays_that_no_curve_denies(builder):
@@ -172,13 +176,13 @@ def test_of_several_laws_each_is_what_its_name_says(builder):
     both = replace(
         h, candidates=(replace(h.candidates[0], kind="parameter_offset", location="m"), *h.candidates)
     )
-    told = confirmed(here, o.base, judged("several", (both,), "both"), o.forces, o.size)
+    told = confirmed(o.baseline, judged("several", (both,), "both"), o.forces)
     assert told.verdict == "unexplained"
     assert "over the velocity at carriage" in told.reason
     rounded = {n: v / 1e3 if n.endswith("v_s") else v for n, v in h.fit.theta.items()}
     sharp = replace(both, fit=replace(h.fit, values=np.array([rounded[u.name] for u in h.fit.unknowns])))
     told = judged("several", (sharp,), "both")
-    assert confirmed(here, o.base, told, o.forces, o.size).members == told.members
+    assert confirmed(o.baseline, told, o.forces).members == told.members
 
 
 def test_of_a_class_no_law_stays_where_curves_deny_all_over_that_motion(builder):
@@ -202,18 +206,18 @@ def test_rounded_friction_is_named_where_any_other_curve_would_show(builder):
     assert not misnamed(h, o.forces, DEFAULT.decision.fastest)
     assert h.theta["coulomb_friction_carriage_v_s"] == pytest.approx(ROUNDED, rel=0.05)
     told = judged("traced", (h,), "it accounts for the residual")
-    assert confirmed(here, o.base, told, o.forces, o.size).members == told.members
+    assert confirmed(o.baseline, told, o.forces).members == told.members
     # where the form is open other curves may pass for it, and where it explains little
-    assert confirmed(replace(here, form_error=0.05), o.base, told, o.forces, o.size).members == ()
+    assert confirmed(o.baseline.asked(replace(here, form_error=0.05)), told, o.forces).members == ()
     little = replace(o.base, fit=replace(o.base.fit, residual=h.fit.residual * 1.01))
-    assert confirmed(here, little, told, o.forces, o.size).members == ()
+    assert confirmed(replace(o.baseline, hypothesis=little), told, o.forces).members == ()
 
 
 def test_a_law_that_is_denied_gives_way_to_the_right_one(builder):
     here = problem(builder, record(to_and_fro(2.0), lambda t, q, v: 300.0 * abs(v) * v, 3))
     o = looked_at("one", here, ("viscous_damping",)).found
-    shown = screened(here, o.base, o.noise, o.size, o.forces, Progress(lambda _: None), Stages())
-    search = Search(shown, Progress(lambda _: None), 1)
+    shown = screened(o.baseline, o.forces, Progress(lambda _: None), Stages())
+    search = Search(shown, Fitter(o.baseline), Progress(lambda _: None))
     singles = search.instead(o.singles[0], o.singles)
     assert singles[0].label == "quadratic_damping@carriage"
     assert singles[0].theta["quadratic_damping_carriage_c"] == pytest.approx(300.0, rel=0.02)

@@ -8,23 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.decision.detect import importance
-from estimator.closeloop.decision.equivalence import becomes, equivalent
-from estimator.closeloop.decision.verdict import (
-    completes,
-    judge,
-    reached,
-    whole,
-)
+from estimator.closeloop.decision.equivalence import equivalent
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.decision.verdict import completes, judge
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.twins import limits
+from estimator.closeloop.hypotheses.relations import becomes, limits
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.closing.result import effects_of
+from tests.helpers.baselines import baseline
 from tests.helpers.verdicts import DETECTED
 
 SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
@@ -32,14 +28,18 @@ T = np.arange(2.0 * SAMPLES)
 FORM = 0.2  # of an output, so 6 times the noise
 
 
-def matters(*residual, **how) -> bool:
-    return importance(*residual, **how) >= 1.0
+def matters(problem: Problem, h: Hypothesis, likeness: float = 1.0, clear: bool = False) -> bool:
+    return form_of(baseline(problem, h, NOISE)).importance(likeness, False, clear) >= 1.0
 
 
 def asked(form_error: float = 0.0) -> Problem:
     y = SIGNAL * np.sqrt(2) * np.sin(T)[:, None] * np.ones(2)
     run = Run(T, y[:, :0], y, T < SAMPLES, T >= SAMPLES, T >= SAMPLES)
     return Problem(lambda _: Path(), Record((run,), (), ("a", "b"), NOISE), {}, {}, form_error=form_error)
+
+
+def alike(best: Hypothesis, found: list[Hypothesis], form: float = 0.0) -> list[Hypothesis]:
+    return equivalent(baseline(asked(form), noise=NOISE), best, found)
 
 
 def left(*rms: float) -> Hypothesis:
@@ -54,7 +54,7 @@ def left(*rms: float) -> Hypothesis:
     [((1.0, 1.0), False), ((1.02, 0.98), False), ((1.0, 1.2), True), ((3.0, 1.0), True)],
 )
 def test_what_chance_makes_of_noise_does_not_matter(rms, matter):
-    assert matters(asked(), left(*rms), NOISE) is matter
+    assert matters(asked(), left(*rms)) is matter
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_what_chance_makes_of_noise_does_not_matter(rms, matter):
     ],
 )
 def test_both_parts_matter_and_less_of_what_is_like_an_effect(early, late, clear, matter):
-    assert matters(asked(), in_parts(early, late), NOISE, clear=clear) is matter
+    assert matters(asked(), in_parts(early, late), clear=clear) is matter
 
 
 def in_parts(early: float, late: float) -> Hypothesis:
@@ -89,15 +89,15 @@ def in_parts(early: float, late: float) -> Hypothesis:
     ],
 )
 def test_an_open_form_leaves_what_is_like_no_effect_alone(rms, likeness, matter):
-    assert matters(asked(FORM), left(*rms), NOISE, likeness) is matter
+    assert matters(asked(FORM), left(*rms), likeness) is matter
 
 
 @given(st.floats(1.0, 20.0), st.floats(1.0, 20.0), st.floats(0.0, 1.0))
 def test_less_matters_where_the_form_is_open(a, b, likeness):
-    if matters(asked(FORM), left(a, b), NOISE, likeness):
-        assert matters(asked(), left(a, b), NOISE)
+    if matters(asked(FORM), left(a, b), likeness):
+        assert matters(asked(), left(a, b))
     assert likeness >= DEFAULT.detection.open_form_likeness or not matters(
-        asked(FORM), left(min(a, 5.9), min(b, 5.9)), NOISE, likeness
+        asked(FORM), left(min(a, 5.9), min(b, 5.9)), likeness
     )
 
 
@@ -120,7 +120,7 @@ def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
         asked(form),
         replace(left(*after), candidates=(law("constant_force", 0, 0.0).candidates[0],)),
     )
-    assert tuple(reached(problem, one, left(*before), NOISE, NOISE).tolist()) == found
+    assert tuple(form_of(baseline(problem, left(*before), NOISE)).reached(one).tolist()) == found
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
 )
 def test_a_fault_of_a_sensor_takes_nearly_all_from_its_own_output(before, after, at, found):
     fault = replace(left(*after), candidates=(Candidate("sensor_gain", at, ()),))
-    assert reached(asked(FORM), fault, left(*before), NOISE, NOISE).all() == found
+    assert form_of(baseline(asked(FORM), left(*before), NOISE)).reached(fault).all() == found
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_where_the_form_is_open_an_effect_may_act_in_one_part(early, late, found
 
     base, one = hypothesis(5.0, 3.0), hypothesis(early, late)
     one = replace(one, candidates=law("constant_force", 0, 0.0).candidates)
-    assert reached(asked(FORM), one, base, NOISE, NOISE).all() == found
+    assert form_of(baseline(asked(FORM), base, NOISE)).reached(one).all() == found
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def test_where_the_form_is_open_an_effect_may_act_in_one_part(early, late, found
 def test_several_effects_account_for_more_of_what_could_be_form(before, after, found):
     two = tuple(law(kind, 0, 0.0).candidates[0] for kind in ("constant_force", "viscous_damping"))
     several = replace(left(*after), candidates=two)
-    assert reached(asked(FORM), several, left(*before), NOISE, NOISE).all() == found
+    assert form_of(baseline(asked(FORM), left(*before), NOISE)).reached(several).all() == found
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_several_effects_account_for_more_of_what_could_be_form(before, after, f
 )
 def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
     base = in_parts(early, late)
-    told = judge(asked(), base, [base], [], NOISE, NOISE).after(DETECTED)
+    told = judge(baseline(asked(), base, NOISE), [base], []).after(DETECTED)
     assert told.verdict == "unexplained"
     assert said in told.reason
     assert bool(told.next_experiment) == (said != "nearest was")
@@ -201,7 +201,7 @@ def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
 )
 def test_what_no_effect_explains_may_be_another_form(form, rms, began, verdict):
     base = left(rms, 1.1)
-    assert judge(asked(form), base, [base], [], NOISE, NOISE, began).after(DETECTED).verdict == verdict
+    assert judge(baseline(asked(form), base, NOISE), [base], [], began).after(DETECTED).verdict == verdict
 
 
 # ---- simpler laws
@@ -221,7 +221,7 @@ def law(kind: str, extra: int, gain: float) -> Hypothesis:
 )
 def test_further_unknowns_have_to_be_worth_their_price(gain, stays):
     complex_one, simple = law("stribeck_friction", 2, gain), law("coulomb_friction", 0, 0.0)
-    [only] = equivalent(asked(), complex_one, [complex_one, simple], NOISE)
+    [only] = alike(complex_one, [complex_one, simple])
     assert only.candidates[0].kind == stays
 
 
@@ -240,19 +240,19 @@ def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(for
     complex_one = replace(complex_one, fit=replace(complex_one.fit, residual=left * one))
     denied = replace(simple, fit=replace(simple.fit, residual=np.sqrt(left**2 + 1.25) * one))
     assert cost(denied) - cost(complex_one) > DEFAULT.decision.noticed
-    [only] = equivalent(asked(form), complex_one, [complex_one, denied], NOISE)
+    [only] = alike(complex_one, [complex_one, denied], form)
     assert only.candidates[0].kind == stays
 
 
 def test_where_the_motion_does_not_show_the_curve_what_lies_between_stays():
     """At one speed constant, Coulomb and viscous are alike; Coulomb friction becomes viscous damping."""
     found = [law(kind, extra, 0.0) for kind, extra in (("coulomb_friction", 1), ("viscous_damping", 0))]
-    assert [h.label for h in equivalent(asked(), found[0], found, NOISE)] == ["viscous_damping@wheel"]
+    assert [h.label for h in alike(found[0], found)] == ["viscous_damping@wheel"]
     more = [law("stribeck_friction", 3, 0.0), *found, law("constant_force", 0, 0.0)]
-    kinds = {h.candidates[0].kind for h in equivalent(asked(), more[0], more, NOISE)}
+    kinds = {h.candidates[0].kind for h in alike(more[0], more)}
     assert kinds == {"coulomb_friction", "viscous_damping", "constant_force"}
     curved = [h for h in more if h.candidates[0].kind != "viscous_damping"]
-    kinds = {h.candidates[0].kind for h in equivalent(asked(), curved[0], curved, NOISE)}
+    kinds = {h.candidates[0].kind for h in alike(curved[0], curved)}
     assert kinds == {"coulomb_friction", "constant_force"}  # Stribeck's is Coulomb's there
 
 
@@ -264,7 +264,7 @@ def test_a_group_of_parameters_stands_for_one_of_them():
     inside = replace(one, candidates=(replace(one.candidates[0], location="k_A"),))
     outside = replace(other, candidates=(replace(one.candidates[0], location="F_n"),))
     for best in (group, inside):
-        assert equivalent(asked(), best, [group, inside, outside], NOISE)[-2:] == [group, outside]
+        assert alike(best, [group, inside, outside])[-2:] == [group, outside]
 
 
 @pytest.mark.parametrize("kind", sorted(EFFECTS))
@@ -299,7 +299,7 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
     [(1.2, 1.0, True), (1.2, 1.05, True), (1.2, 1.15, False), (60.0, 45.0, False), (60.0, 1.0, True)],
 )
 def test_a_second_effect_accounts_for_most_of_what_the_first_leaves(one, two, complete):
-    assert completes(asked(), left(two, 1.0), left(one, 1.0), NOISE) is complete
+    assert completes(baseline(asked(), noise=NOISE), left(two, 1.0), left(one, 1.0)) is complete
 
 
 @pytest.mark.parametrize(
@@ -311,8 +311,9 @@ def test_a_pair_leaves_little_of_what_a_single_effect_leaves(one, two, all_of_it
         h = left(1.0, 1.0)
         return replace(h, fit=replace(h.fit, residual=np.sqrt(mean_square) * h.fit.residual))
 
-    assert whole(asked(), fitted(two), [fitted(5.0), fitted(one)]) is all_of_it
-    assert whole(asked(), fitted(two), [])
+    form = form_of(baseline(asked(), noise=NOISE))
+    assert form.whole(fitted(two), [fitted(5.0), fitted(one)]) is all_of_it
+    assert form.whole(fitted(two), [])
 
 
 def test_a_pair_becomes_a_simpler_one_in_either_order():

@@ -21,9 +21,10 @@ from estimator.closeloop.diagnostics.decoys import (
     leading,
     lines,
 )
-from estimator.closeloop.diagnostics.diagnostics import honesty
+from estimator.closeloop.diagnostics.diagnostics import diagnose
 from estimator.closeloop.diagnostics.power import Visible, power, threshold
 from estimator.closeloop.diagnostics.stability import stability
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -42,6 +43,7 @@ from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
 from scenarios.closing.report import write_report
 from scenarios.closing.result import result_of
+from tests.helpers.baselines import baseline
 from tests.helpers.verdicts import judged
 
 SEEDS = st.integers(0, 10_000)
@@ -433,10 +435,11 @@ def nameless(drive: ModelBuilder) -> tuple[Problem, Outcome, Hypothesis | None]:
     """A record that no law explains, what the chain would have of it, and the force of free form."""
     asked, base = base_of(drive_record(law, np.random.default_rng(12)), drive)
     forces = missing_forces(asked, {}, NOISE)
-    found = free_form(asked, base, forces, NOISE, 1)
+    asking = baseline(asked, base, NOISE)
+    found = free_form(Fitter(asking), forces)
     detection = Detection(0.01, 0.006, {"size of the held-out residual": 50.0}, 1.0)
     told = judged("unexplained", (), "nothing fits")
-    return asked, Outcome(base, base, NOISE, NOISE, detection, tuple(forces), (), (base,), (), told), found
+    return asked, Outcome(base, asking, detection, tuple(forces), (), (base,), (), told), found
 
 
 def test_a_force_without_a_name_becomes_a_curve_and_a_better_fmu(
@@ -456,7 +459,7 @@ def test_a_force_without_a_name_becomes_a_curve_and_a_better_fmu(
     assert np.all(curve.std[visited] < 1.0)  # N
 
 
-def test_the_page_and_the_result_hold_what_a_report_owes(
+def test_the_page_and_the_result_hold_what_stands_beside_the_finding(
     nameless: tuple[Problem, Outcome, Hypothesis | None], tmp_path: Path
 ) -> None:
     asked, outcome, curve = nameless
@@ -469,8 +472,8 @@ def test_the_page_and_the_result_hold_what_a_report_owes(
     screening = Screening(asked, outcome.base.fit, NOISE, outcome.forces)
     change = list(zip(chosen, screening.changes(chosen), strict=True))
     rng = np.random.default_rng(1)
-    owed = honesty(asked, outcome.base, screening.fit, change, NOISE, LEVEL, rng, curve)
-    told = replace(outcome, honesty=owed)
+    beside = diagnose(outcome.baseline, screening.fit, change, LEVEL, rng)
+    told = replace(outcome, diagnostics=beside, free_form=curve)
     result = result_of("<nameless>", asked, told, 1.0, ())
     write_report(tmp_path, asked, told, result)
     result.write(tmp_path / "result.json")
@@ -500,4 +503,4 @@ def test_the_page_and_the_result_hold_what_a_report_owes(
 
 def test_no_force_of_free_form_where_nothing_is_missing(drive: ModelBuilder) -> None:
     asked, base = base_of(drive_record(np.zeros_like, np.random.default_rng(13)), drive)
-    assert free_form(asked, base, missing_forces(asked, {}, NOISE), NOISE, 1) is None
+    assert free_form(Fitter(baseline(asked, base, NOISE)), missing_forces(asked, {}, NOISE)) is None

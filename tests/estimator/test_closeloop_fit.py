@@ -12,10 +12,12 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.fitting import likelihood_profile as likelihood
 from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.slopes import (
     FADED,
     FINE,
     PARTS,
+    STEP,
     Slopes,
 )
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -24,6 +26,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Run
+from tests.helpers.baselines import baseline
 
 # ---- derivatives along secants
 
@@ -40,7 +43,7 @@ class Curved:
     def simulate(self, x: np.ndarray) -> np.ndarray:
         return x[0] * np.exp(-x[1] * self.t) * np.sin(x[2] * self.t)
 
-    record, free_states = SimpleNamespace(floor_known=True), ()
+    record, free_states = SimpleNamespace(noise_declared=np.array([True])), ()
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         self.count += 1
@@ -85,7 +88,7 @@ class Rugged:
     policy = DEFAULT
 
     phase: float
-    record, free_states = SimpleNamespace(floor_known=False), ()  # no secants
+    record, free_states = SimpleNamespace(noise_declared=np.array([False])), ()  # no secants
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         x, t0 = theta["x"], theta["step_force_wheel_t0"]
@@ -193,7 +196,7 @@ class Summed:
 
     a: float
     b: float
-    record, free_states = SimpleNamespace(floor_known=True), ()
+    record, free_states = SimpleNamespace(noise_declared=np.array([True])), ()
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         t = np.linspace(0.0, 1.0, 400)
@@ -254,7 +257,7 @@ class Playing:
         y = np.clip(self.q, -0.2, 0.2) + 0.2 * np.random.default_rng(seed).standard_normal(len(t))
         every = np.ones(len(t), bool)
         run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
-        self.record = SimpleNamespace(runs=(run,), floor_known=True, outputs=("y",))
+        self.record = SimpleNamespace(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         [run] = self.record.runs
@@ -273,7 +276,7 @@ def test_errors_reach_as_far_as_the_valley_does(monkeypatch):
     true, held, wider = {"k": 1.0, "gap": 0.2}, [], []
     for seed in range(40):
         asked, h = played(seed)
-        found = likelihood.profiled(asked, h, np.array([0.2])).fit
+        found = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), h).fit
         assert found.theta == h.fit.theta
         held += [abs(found.theta[n] - v) < 1.96 * found.std[n] for n, v in true.items()]
         wider += [found.std[n] / h.fit.std[n] for n in true]
@@ -286,10 +289,14 @@ def test_errors_of_a_linear_law_stay(monkeypatch):
     monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
     asked, h = played(1)
     linear = replace(h, candidates=(Candidate("constant_force", "spring", h.candidates[0].amplitudes),))
-    assert_allclose(likelihood.profiled(asked, linear, np.array([0.2])).fit.covariance, h.fit.covariance)
-    wide = likelihood.profiled(asked, h, np.array([0.2])).fit.std
-    asked.record.floor_known = False  # weights then come from what the best fit leaves, and serve as well
-    again = likelihood.profiled(asked, h, np.array([0.2])).fit.std
+    assert_allclose(
+        likelihood.profiled(Fitter(baseline(asked, noise=0.2)), linear).fit.covariance, h.fit.covariance
+    )
+    wide = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), h).fit.std
+    asked.record.noise_declared = np.array(
+        [False]
+    )  # weights then come from what the best fit leaves, and serve as well
+    again = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), h).fit.std
     assert again == pytest.approx(wide, rel=1e-3)  # the way there is another one, without secants
 
 
@@ -301,7 +308,7 @@ class Beginning(Playing):
         self.q = np.where((t > 3.0) & (t < 3.3), 0.0, np.sin(2 * np.pi * 3.0 * t))
         every = np.ones(len(t), bool)
         self.record = SimpleNamespace(
-            runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),), floor_known=True
+            runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),), noise_declared=np.array([True])
         )
         y = 0.1 * np.random.default_rng(seed).standard_normal((len(t), 1))
         y -= self.identify_residual({"d": 1.0, "d_t0": moment}) - t[:, None]
@@ -326,7 +333,7 @@ def test_errors_of_a_moment_reach_over_a_rest(monkeypatch):
     for seed in range(40):
         true, start = np.random.default_rng(seed).uniform(3.05, 3.25, 2)
         asked, h = begun(true, start, seed)
-        found = likelihood.profiled(asked, h, np.array([0.1])).fit
+        found = likelihood.profiled(Fitter(baseline(asked, noise=0.1)), h).fit
         before.append(abs(h.fit.theta["d_t0"] - true) < 1.96 * h.fit.std["d_t0"])
         after.append(abs(found.theta["d_t0"] - true) < 1.96 * found.std["d_t0"])
         assert found.std["d_t0"] < 3.0
@@ -334,19 +341,21 @@ def test_errors_of_a_moment_reach_over_a_rest(monkeypatch):
     assert np.mean(after) > 0.9
 
 
+class Refitter(Fitter):
+    """Fits without an FMU."""
+
+    def finished(self, promises, unknowns=None, guess=None, step=STEP):
+        """See Fitter."""
+        problem, size = self.baseline.problem, self.baseline.noise.scale
+        fits = [fit(problem, p.candidates[0].unknowns, size, p.start) for p in promises]
+        return [Hypothesis(p.candidates, found, ()) for p, found in zip(promises, fits, strict=True)]
+
+
 def test_a_moment_a_swing_off_is_fitted_again(monkeypatch):
     monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
-    monkeypatch.setattr(
-        likelihood,
-        "finished",
-        lambda problem, rest, promises, size, jobs: [
-            Hypothesis(p.candidates, fit(problem, p.candidates[0].unknowns, size, p.start), ())
-            for p in promises
-        ],
-    )
-    monkeypatch.setattr(likelihood, "settled", lambda problem, h, size: h)
+    monkeypatch.setattr(likelihood, "refined", lambda _, h: h)
     asked, h = begun(5.0, 5.0, 0)
     off = asked.identify_residual({"d": 1.0, "d_t0": 5.35}).ravel() / 0.1
     stayed = replace(h, fit=replace(h.fit, values=np.array([1.0, 5.35]), residual=off))
-    found = likelihood.profiled(asked, stayed, np.array([0.1])).fit
+    found = likelihood.profiled(Refitter(baseline(asked, noise=0.1)), stayed).fit
     assert found.theta["d_t0"] == pytest.approx(5.0, abs=0.03)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from estimator.closeloop.decision.verdict import gap_closed
+from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
 from estimator.closeloop.question.problem import Problem, Unknown

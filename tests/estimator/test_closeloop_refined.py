@@ -1,6 +1,6 @@
 """The end of a fit whose sum of squares is rugged, and errors that reach what it allows."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.closeloop.fitting import likelihood_profile as likelihood
-from estimator.closeloop.fitting import refined as settled
+from estimator.closeloop.fitting import refined
 from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.slopes import FINE, STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -19,6 +20,7 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Run
+from tests.helpers.baselines import baseline
 
 SIZE = np.array([0.1])
 AMPLITUDE, STIFFNESS = Unknown("q", 1.0, 0.0, np.inf, 1.0), Unknown("k", 10.0, 0.0, np.inf, 10.0)
@@ -39,7 +41,7 @@ class Swinging:
         self.true = {"q": 1.0, "k": k}
         y = noise * np.random.default_rng(seed).standard_normal((len(t), 1)) + swing(t, self.true)
         self.record = SimpleNamespace(
-            runs=(Run(t, y, y, every, ~every, ~every),), floor_known=True, outputs=("y",)
+            runs=(Run(t, y, y, every, ~every, ~every),), noise_declared=np.array([True]), outputs=("y",)
         )
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
@@ -52,12 +54,19 @@ def swing(t: Array, theta: Mapping[str, float]) -> Array:
     return theta["q"] * np.cos(np.sqrt(theta["k"]) * t)[:, None]
 
 
-def refit(
-    problem: Problem, rest: Sequence[Unknown], promises: Sequence[Promise], size: Array, jobs: int,
-    step: float = STEP,
-) -> list[Hypothesis]:  # fmt: skip
-    """As `finished`, without an FMU."""
-    return [at_rest(problem, p.candidates[0], size, p.start, step) for p in promises]
+class Refitter(Fitter):
+    """Fits without an FMU."""
+
+    def finished(
+        self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
+        guess: Mapping[str, Array] | None = None, step: float = STEP,
+    ) -> list[Hypothesis]:  # fmt: skip
+        """See Fitter."""
+        return [at_rest(self.baseline.problem, p.candidates[0], SIZE, p.start, step) for p in promises]
+
+
+def fitter(asked: Problem) -> Refitter:
+    return Refitter(baseline(asked, noise=SIZE))
 
 
 def at_rest(
@@ -74,21 +83,11 @@ def swung(seed: int, off: float) -> tuple[Swinging, Hypothesis]:
     return asked, at_rest(asked, law, SIZE, {"q": 1.0, "k": 10.0 + off})
 
 
-@pytest.fixture
-def again(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Hypothesis]]:
-    """Fits without an FMU in place of those with one."""
-    monkeypatch.setattr(settled, "finished", refit)
-    monkeypatch.setattr(likelihood, "finished", refit)
-    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
-    return refit
-
-
-@pytest.mark.usefixtures("again")
 @settings(max_examples=20)
 @given(seed=st.integers(0, 1000), off=st.floats(-0.25, 0.26))
 def test_finer_differences_lead_on_where_the_usual_ones_come_to_rest(seed, off):
     asked, h = swung(seed, off)
-    found = settled.settled(asked, h, SIZE)
+    found = refined.refined(fitter(asked), h)
     assert cost(found) <= cost(h)
     assert found.fit.theta["k"] == pytest.approx(10.0, abs=5 * found.fit.std["k"])
     assert cost(found) < 1.1 * len(found.fit.residual)
@@ -99,29 +98,28 @@ def test_the_usual_differences_do_come_to_rest_beside():
     assert all(cost(h) > 2 * len(h.fit.residual) for h in short)
 
 
-def test_where_noise_alone_is_left_nothing_is_fitted_again(monkeypatch):
-    monkeypatch.setattr(settled, "finished", lambda *_, **__: pytest.fail("fitted again"))
+def test_where_noise_alone_is_left_nothing_is_fitted_again():
     asked, h = swung(1, 0.0)
-    assert cost(h) < settled.RUGGED * len(h.fit.residual)
-    assert settled.settled(asked, h, SIZE) is h
+    assert cost(h) < refined.RUGGED * len(h.fit.residual)
+    assert refined.refined(fitter(asked), h) is h
 
 
-def test_what_fits_worse_is_not_taken_and_worth_is_kept(again):
+def test_what_fits_worse_is_not_taken_and_worth_is_kept():
     asked, h = swung(2, BESIDE)
     h = replace(h, worth={"stiffness_change@spring": 7.0})
     worse = replace(h, fit=replace(h.fit, residual=2 * h.fit.residual))
-    assert settled.lower(h, [worse]) is h
-    [better] = again(asked, (), [Promise(h.candidates, 0.0, h.theta)], SIZE, 1, FINE)
-    assert settled.lower(h, [worse, better]).worth == h.worth
+    assert refined.lower(h, [worse]) is h
+    [better] = fitter(asked).finished([Promise(h.candidates, 0.0, h.theta)], step=FINE)
+    assert refined.lower(h, [worse, better]).worth == h.worth
 
 
-@pytest.mark.usefixtures("again")
-def test_errors_hold_the_true_values_where_the_fit_had_come_to_rest_beside():
+def test_errors_hold_the_true_values_where_the_fit_had_come_to_rest_beside(monkeypatch):
     """As often as they say, and they are narrower than beside."""
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
     held, narrower = [], []
     for seed in range(40):
         asked, h = swung(seed, BESIDE)
-        found = likelihood.profiled(asked, h, SIZE).fit
+        found = likelihood.profiled(fitter(asked), h).fit
         held += [abs(found.theta[n] - v) < 1.96 * found.std[n] for n, v in asked.true.items()]
         narrower.append(found.std["k"] / h.fit.std["k"])
     assert np.mean(held) > 0.9

@@ -11,6 +11,7 @@ import pytest
 
 from estimator.closeloop import pipeline as chain
 from estimator.closeloop.checkpoints import SUFFIX, Stages
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.search import screened, search
 from fmus import codec
 from fmus.errors import BadInput
@@ -86,15 +87,15 @@ def test_a_run_goes_on_where_it_stopped(carriage: Path, in_one_go: str, tmp_path
     """What was found before the interruption is not sought again, and the result is that of one go."""
     out = tmp_path / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(search, "to_the_end", interrupted)
+        patch.setattr(search, "dated", interrupted)
         assert close(carriage, out) == 130
     assert "--resume" in capsys.readouterr().err
     assert not (out / "result.json").exists()
     with pytest.MonkeyPatch.context() as patch:
-        for done in ("calibrate", "missing_forces", "detect", "honesty"):
+        for done in ("calibrate", "missing_forces", "detect", "diagnose"):
             patch.setattr(chain, done, refused)
         patch.setattr(screened, "onset", refused)
-        patch.setattr(search, "briefly", refused)
+        patch.setattr(Fitter, "briefly", refused)
         assert close(carriage, out, "--resume") == 0
     assert not (out / STAGES).exists()
     assert found(out) == in_one_go
@@ -122,7 +123,7 @@ def test_planted_checkpoints_run_nothing(carriage: Path, in_one_go: str, tmp_pat
     """Pickles in place of the checkpoints of an interrupted run: it is worked out again, as in one go."""
     out, mark = tmp_path / "out", tmp_path / "ran"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(search, "to_the_end", interrupted)
+        patch.setattr(search, "dated", interrupted)
         assert close(carriage, out) == 130
     kept = sorted((out / STAGES).iterdir())
     assert len(kept) > 4

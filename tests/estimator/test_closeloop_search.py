@@ -10,13 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from estimator.closeloop.decision.equivalence import becomes
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.hypotheses.twins import twins, with_twins
+from estimator.closeloop.hypotheses.relations import becomes, twins, with_twins
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.grouped import group_size, grouped
@@ -37,6 +36,7 @@ from estimator.plant import between
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
+from tests.helpers.baselines import baseline
 from tests.helpers.native import native
 
 FREE = (-np.inf, np.inf)
@@ -362,7 +362,7 @@ class Line:
     t: np.ndarray
     y: np.ndarray
     builder: None = None
-    record, free_states, policy = SimpleNamespace(floor_known=True), (), DEFAULT
+    record, free_states, policy = SimpleNamespace(noise_declared=np.array([True])), (), DEFAULT
 
     def identify_residual(self, theta):
         return (self.y - theta["a"] * self.t)[:, None]
@@ -378,8 +378,8 @@ def test_what_sets_in_is_noticed_and_what_was_before_is_found(share, seed):
     t = np.linspace(0.0, 10.0, 5000)
     y = 2.0 * t + 0.1 * np.random.default_rng(seed).standard_normal(len(t))
     base = Hypothesis((), replace(nothing_calibrated(t), unknowns=(Unknown("a", 1.0, -9.0, 9.0, 1.0),)), ())
-    assert onset(Line(t, y), base, np.array([0.1]), DEFAULT.search.sets_in_times) is None
-    found = onset(Line(t, y + 3.0 * (t > 10.0 * share)), base, np.array([0.1]), DEFAULT.search.sets_in_times)
+    assert onset(baseline(Line(t, y), base, 0.1), DEFAULT.search.sets_in_times) is None
+    found = onset(baseline(Line(t, y + 3.0 * (t > 10.0 * share)), base, 0.1), DEFAULT.search.sets_in_times)
     assert found is not None
     assert abs(found[0] - share) <= 1.0 / BLOCKS
     assert found[1].theta["a"] == pytest.approx(2.0, abs=0.1)

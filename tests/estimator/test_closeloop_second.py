@@ -11,23 +11,25 @@ from hypothesis import strategies as st
 
 from estimator.closeloop import progress
 from estimator.closeloop.decision import allowed as allowing
-from estimator.closeloop.decision.verdict import one_curve, outgrown
-from estimator.closeloop.fitting import rounds
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.decision.verdict import one_curve
+from estimator.closeloop.fitting import fitter
 from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.scores import best_by_label, lead, ranked
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.screen import Screening
-from estimator.closeloop.search import dating, pairs
+from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
 from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.record import Run
 from fmus.effects import EFFECTS
 from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.baselines import baseline
 from tests.helpers.carriage import (
     looked_at,
     problem,
@@ -116,10 +118,8 @@ def test_a_law_and_its_limits_are_over_the_same_motion_or_none(kind):
 def test_a_law_is_outgrown_where_more_gains_much_more_than_chance(before, enough, richer, counts):
     simple, base = several(("coulomb_friction", "wheel"), squares=2e4), several(squares=2e4 + before)
     for gain, expected in ((0.0, False), (0.9 * enough, False), (1.1 * enough, counts)):
-        assert (
-            outgrown(SimpleNamespace(policy=DEFAULT), simple, several(*richer, squares=2e4 - gain), base)
-            is expected
-        )
+        form = form_of(baseline(SimpleNamespace(policy=DEFAULT, form_error=0.0), base))
+        assert form.outgrown(simple, several(*richer, squares=2e4 - gain)) is expected
 
 
 class Seen:
@@ -138,7 +138,7 @@ class Seen:
         (20.0, 0.99, []),
     ],
 )
-def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch, second, least, asked):
+def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, least, asked):
     rng = np.random.default_rng(3)
     laws = [one(kind, at) for kind in ("viscous_damping", "cubic_stiffness") for at in ("wheel", "roller")]
     change = [(c, rng.standard_normal((4000, 1))) for c in laws]
@@ -147,8 +147,11 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(monkeypatch,
     residual = rng.standard_normal(4000) - second * g["viscous_damping@roller"]
     found = Fit(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
     fitted = []
-    monkeypatch.setattr(pairs, "hypotheses", lambda _p, _b, promises, *_: fitted.extend(promises) or [])
-    beside(SimpleNamespace(policy=DEFAULT), None, Hypothesis((best,), found, ()), Seen(), change, least, 1)
+    asking = SimpleNamespace(
+        baseline=baseline(SimpleNamespace(policy=DEFAULT)),
+        hypotheses=lambda promises, _: fitted.extend(promises) or [],
+    )
+    beside(asking, Hypothesis((best,), found, ()), Seen(), change, least)
     assert [p.candidates[1].label for p in fitted] == asked
     assert all(p.candidates[0] is best for p in fitted)
 
@@ -163,9 +166,9 @@ def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_sugg
     o = looked_at("spring", asked, ("cubic_stiffness",)).found
     offers = [(kind, "carriage") for kind in ("cubic_stiffness", "harmonic_excitation")]
     candidates = physical_candidates(offers, asked.builder.outside(), asked.record, o.forces)
-    screening = Screening(asked, o.base.fit, o.size, o.forces)
+    screening = Screening(asked, o.base.fit, o.baseline.noise.scale, o.forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
-    found, _ = try_pairs(asked, o.base, screening, o.singles, change, o.noise, 1)
+    found, _ = try_pairs(Fitter(o.baseline), screening, o.singles, change)
     both = min(found, key=cost)
     assert both.theta["harmonic_excitation_carriage_f"] == pytest.approx(2.3, abs=0.01)
     assert both.theta["cubic_stiffness_carriage_k_3"] == pytest.approx(2e3, rel=0.02)
@@ -186,7 +189,7 @@ class Swinging:
         t = np.linspace(0.0, 20.0, 4000)
         fit = t < 15.0
         self.run = Run(t, t[:, None], self.simulate(t, 1.0, moment), fit, ~fit, ~fit)
-        self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
+        self.record = SimpleNamespace(runs=(self.run,), noise_declared=np.array([True]), outputs=("y",))
         self.free_states = ()
 
     def simulate(self, t: np.ndarray, size: float, moment: float) -> np.ndarray:
@@ -211,9 +214,9 @@ def test_a_moment_some_swings_off_is_found(moment, off):
     h = Hypothesis((late,), start, tuple(asked.residuals(start.theta)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(dating, "built", lambda problem, _: problem)
-        patch.setattr(rounds, "built", lambda problem, _: problem)
-        patch.setattr(rounds, "together", lambda problem, promises: [problem] * len(promises))
-        [best] = dating.dated(asked, (), [h], size, 1)
+        patch.setattr(fitter, "built", lambda problem, _: problem)
+        patch.setattr(fitter, "together", lambda problem, promises: [problem] * len(promises))
+        [best] = dating.dated(Fitter(baseline(asked, noise=size)), [h])
     assert best.theta["step_t0"] == pytest.approx(moment, abs=0.01)
     assert cost(best) <= cost(h)
 
@@ -232,7 +235,7 @@ class Saturating:
         self.late = 1.0 * (t > 40.0)
         noise = 0.1 * rng.standard_normal(len(t))
         self.run = Run(t, t[:, None], (3.0 + 2.0 * self.late + noise)[:, None], fit, ~fit, ~fit)
-        self.record = SimpleNamespace(runs=(self.run,), floor_known=True, outputs=("y",))
+        self.record = SimpleNamespace(runs=(self.run,), noise_declared=np.array([True]), outputs=("y",))
         self.form_error = 0.0
 
     def residuals(self, theta: Mapping[str, float]) -> list[np.ndarray]:
@@ -252,17 +255,18 @@ def friction_known(asked: Saturating, kind: str, c: float, error: float) -> Hypo
 @given(st.floats(0.3, 3.7), st.floats(0.3, 3.7), st.integers(0, 50))
 @settings(max_examples=25, deadline=None)
 def test_where_a_fit_came_to_rest_is_no_evidence(one, other, seed):
-    asked, size = Saturating(seed), np.array([0.1])
+    asked = Saturating(seed)
+    asking = baseline(asked, noise=0.1)
     found = [
         friction_known(asked, kind, c, 1.2)
         for kind, c in (("constant_force", one), ("coulomb_friction", other))
     ]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(allowing, "built", lambda problem, _: problem)
-        told = allowing.allowed(asked, ranked(asked, found, size), size)
+        told = allowing.allowed(asking, form_of(asking).ranked(found))
         sure = [friction_known(asked, h.candidates[0].kind, h.theta["c"], 1e-4) for h in found]
-        still = allowing.allowed(asked, ranked(asked, sure, size), size)
-    assert abs(lead(asked, *told, size)[0]) < 3.0
+        still = allowing.allowed(asking, form_of(asking).ranked(sure))
+    assert abs(asking.lead(*told)[0]) < 3.0
     for h in told:
         assert h.rms(asked, "choose") == pytest.approx(0.1, rel=0.1)
     for h in sure:  # what is known stays
@@ -271,10 +275,10 @@ def test_where_a_fit_came_to_rest_is_no_evidence(one, other, seed):
 
 
 def test_what_leaves_more_than_noise_is_not_helped():
-    asked, size = Saturating(1), np.array([0.1])
+    asked = Saturating(1)
     h = friction_known(asked, "constant_force", 1.0, 1.2)
     wrong = replace(h, fit=replace(h.fit, residual=2 * h.fit.residual))
-    assert allowing.allowed(asked, [wrong], size) == [wrong]
+    assert allowing.allowed(baseline(asked, noise=0.1), [wrong]) == [wrong]
 
 
 # ---- progress

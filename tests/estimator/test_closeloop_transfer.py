@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2, kstest
 
-from estimator.closeloop.decision.verdict import gap_closed
-from estimator.closeloop.fitting.rounds import finished
+from estimator.closeloop.decision.model_form import gap_closed
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
 from estimator.closeloop.hypotheses.promise import Promise
@@ -339,8 +339,7 @@ def test_an_effect_is_found_again_beside_another_one(builder: ModelBuilder) -> N
     parts = {p.label.partition("@")[0]: p for p in both.found.promises}
     pair = [parts[k].candidates[0] for k in ("coulomb_friction", "constant_force")]
     promise = Promise(tuple(pair), 0.0, {**parts["coulomb_friction"].start, **parts["constant_force"].start})
-    base, size = both.found.base, both.found.size
-    fitted = finished(both.problem, base.fit.unknowns, [promise], size, 1)
+    fitted = Fitter(both.found.baseline).finished([promise])
     two = judged("several", tuple(fitted), "two")
     both = replace(both, found=replace(both.found, judgement=two))
     [found] = transfers(one, both)

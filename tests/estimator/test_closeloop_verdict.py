@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.decision.detect import importance
+from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.evidence import (
     ANSWER,
     Check,
@@ -21,8 +21,14 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Record, Run
+from tests.helpers.baselines import baseline
 from tests.helpers.paths import ROOT
 from tests.helpers.verdicts import FAILED, judged
+
+
+def importance(at, h, likeness=1.0, sets_in=False, noise=np.ones(2)):  # noqa: B008
+    return form_of(baseline(at, h, noise)).importance(likeness, sets_in, False)
+
 
 NAMES = get_args(Name)
 passing = st.fixed_dictionaries({name: st.booleans() for name in NAMES})
@@ -62,8 +68,8 @@ def test_what_is_left_unexplained_stays_so_if_more_is_found_beyond_noise(passed)
 def test_a_larger_residual_matters_no_less(a, b, more, form):
     at = replace(asked(2), form_error=form)
     for sets_in in (False, True):
-        less = importance(at, left(a, b), np.ones(2), 0.5, sets_in)
-        assert importance(at, left(more * a, more * b), np.ones(2), 0.5, sets_in) >= less
+        less = importance(at, left(a, b), 0.5, sets_in)
+        assert importance(at, left(more * a, more * b), 0.5, sets_in) >= less
 
 
 @given(st.floats(0.0, 50.0), st.floats(0.0, 50.0), st.floats(1e-6, 1e6), st.sampled_from([0.0, 0.2]))
@@ -73,9 +79,9 @@ def test_neither_the_order_of_outputs_nor_their_units_matter(a, b, unit, form):
     scaled = replace(at, record=replace(at.record, runs=(replace(run, y=run.y * [unit, 1.0]),)))
     one, other = left(a, b), left(b, a)
     in_units = replace(one, residuals=(one.residuals[0] * [unit, 1.0],))
-    expected = pytest.approx(importance(at, one, np.ones(2)), rel=1e-9)
-    assert importance(at, other, np.ones(2)) == expected
-    assert importance(scaled, in_units, np.array([unit, 1.0])) == expected
+    expected = pytest.approx(importance(at, one), rel=1e-9)
+    assert importance(at, other) == expected
+    assert importance(scaled, in_units, noise=np.array([unit, 1.0])) == expected
 
 
 @pytest.mark.parametrize("verdict", sorted(FAILED))

@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 
 from estimator.closeloop.decision.detect import Detection
+from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import judge
 from estimator.closeloop.fitting.calibrate import calibrate
-from estimator.closeloop.fitting.rounds import finished
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.hypotheses.scores import ranked
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.several.transfer import Traced
-from estimator.noise import noise_floor
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
 from tests.helpers.verdicts import DETECTED, judged
@@ -108,17 +108,17 @@ def problem(builder: ModelBuilder, made: Record, speed: float = 0.0) -> Problem:
 
 def looked_at(name: str, asked: Problem, kinds: Sequence[str], quiet: bool = False) -> Traced:
     """What the chain finds where it tries these kinds of effects alone; quiet: where it need not try."""
-    noise = noise_floor(asked.record)
-    declared, base, size = calibrate(asked)
-    forces = missing_forces(asked, base.fit.theta, noise)
+    declared, base, noise = calibrate(asked)
+    baseline = Baseline(asked, base, noise)
+    forces = missing_forces(asked, base.fit.theta, noise.std)
     offered = [(k, "carriage") for k in kinds]
     candidates = physical_candidates(offered, asked.builder.outside(), asked.record, forces)
     promises = [_promise(c, base.fit.theta) for c in candidates]
-    singles = ranked(asked, finished(asked, base.fit.unknowns, promises, size, 1), size)
+    singles = form_of(baseline).ranked(Fitter(baseline).finished(promises))
     none = judged("no_discrepancy", (), "nothing")
-    said = none if quiet else judge(asked, base, singles, (), noise, size).after(DETECTED)
+    said = none if quiet else judge(baseline, singles, ()).after(DETECTED)
     detection = Detection(0.01, 0.0, {}, 1.0)
-    found = (declared, base, noise, size, detection, tuple(forces), tuple(promises), tuple(singles), ())
+    found = (declared, baseline, detection, tuple(forces), tuple(promises), tuple(singles), ())
     return Traced(name, asked, Outcome(*found, said))
 
 

@@ -11,41 +11,41 @@ import numpy as np
 from scipy.linalg import pinvh
 from scipy.optimize import least_squares
 
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
-from estimator.closeloop.hypotheses.scores import leaves_noise, ranked
-from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
 STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
 
 
-def allowed(problem: Problem, found: Sequence[Hypothesis], size: Array) -> list[Hypothesis]:
+def allowed(baseline: Baseline, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Ranked single hypotheses, those that leave noise alone in the part to identify as their errors allow.
 
     Only their residuals differ, and only where the part to choose sets them apart or from noise.
     """
-    limits = problem.policy.decision
-    alike = [h for h in found if problem.record.floor_known and leaves_noise(problem, h)][
-        : limits.errors_laws
-    ]
-    if not alike or not _set_apart(problem, alike, size):
+    if not baseline.noise.known:
         return list(found)
-    moved = {id(h): _as_errors_allow(problem, h, size) for h in alike}
-    return ranked(problem, [moved.get(id(h), h) for h in found], size)
+    alike = [h for h in found if baseline.leaves_noise(h)][: baseline.policy.decision.errors_laws]
+    if not alike or not _set_apart(baseline, alike):
+        return list(found)
+    moved = {id(h): _as_errors_allow(baseline, h) for h in alike}
+    return form_of(baseline).ranked([moved.get(id(h), h) for h in found])
 
 
-def _set_apart(problem: Problem, alike: Sequence[Hypothesis], size: Array) -> bool:
-    limits = problem.policy
-    scores = [float(h.scores(problem, size).sum()) for h in alike]
-    samples = alike[0].of(problem, "choose").size
+def _set_apart(baseline: Baseline, alike: Sequence[Hypothesis]) -> bool:
+    limits = baseline.policy
+    scores = [float(baseline.scores(h).sum()) for h in alike]
+    samples = alike[0].of(baseline.problem, "choose").size
     worst = samples + limits.detection.chance * np.sqrt(2 * samples)
     return max(scores) - min(scores) > limits.decision.errors_apart or -2 * max(scores) > worst
 
 
-def _as_errors_allow(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
+def _as_errors_allow(baseline: Baseline, h: Hypothesis) -> Hypothesis:
     """The hypothesis with the residuals of values near its own, by their covariance, that fit the rest."""
+    problem, size = baseline.problem, baseline.noise.scale
     here, unknowns, best = built(problem, h.candidates), h.fit.unknowns, h.fit.values
     error = np.sqrt(np.diag(h.fit.covariance))
     if not np.all(error > 0):

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.fitting.slopes import STEP
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
-from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 
 LIKENESS = "likeness to an effect"
-TINY = 1e-300  # of a signal or a noise that is zero
 
 
 @dataclass(frozen=True)
@@ -46,19 +45,21 @@ class Detection:
 
 
 def detect(
-    problem: Problem, base: Hypothesis, noise: Array, screened: Fit, regressors: Sequence[Array],
-    likeness: float, sets_in: bool, rng: np.random.Generator,
+    baseline: Baseline, screened: Fit, regressors: Sequence[Array], likeness: float, sets_in: bool,
+    rng: np.random.Generator,
 ) -> Detection:  # fmt: skip
-    """Test the base hypothesis' residual.
+    """Test the residual of the calibrated FMU.
 
-    screened: its fit as it was screened, residual over `noise`; regressors: changes (m, k) of that residual;
-    likeness, sets_in: see `matters`.
+    screened: its fit as it was screened, residual in units of the noise; regressors: changes (m, k) of that
+    residual; likeness: share of what is beyond noise that one effect could explain, by linear regression;
+    sets_in: whether the residual sets in during the record. A residual matters by what it has beyond noise,
+    and beyond what chance makes of that, in any output and either part of the record, compared with the
+    signal and with the noise.
     """
-    limits = problem.policy.detection
-    runs = problem.record.runs
+    limits, runs = baseline.policy.detection, baseline.problem.record.runs
     fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
-    left = np.concatenate(base.residuals)[unseen] / noise
-    slopes = _sensitivities(problem, base, noise)
+    left = np.concatenate(baseline.hypothesis.residuals)[unseen] / baseline.noise.std
+    slopes = _sensitivities(baseline)
     g = _directions(screened.jacobian, regressors) if regressors else None
     observed = _figures(left, limits.slow_blocks)
     n = slopes.shape[2]
@@ -81,65 +82,19 @@ def detect(
         figures[name] = float(value / np.quantile(reference, 0.95))
     p_value = min(1.0, len(p_values) * float(min(p_values)))
     clear = figures.get(LIKENESS, 0.0) >= limits.clear_likeness
-    return Detection(
-        limits.level, p_value, figures, importance(problem, base, noise, likeness, sets_in, clear)
-    )
+    size = form_of(baseline).importance(likeness, sets_in, clear)
+    return Detection(limits.level, p_value, figures, size)
 
 
-def importance(
-    problem: Problem,
-    base: Hypothesis,
-    noise: Array,
-    likeness: float = 1.0,
-    sets_in: bool = False,
-    clear: bool = False,
-) -> float:
-    """How large a residual is beside the least that matters, in any output and either part of the record.
-
-    From 1 on it matters. Compared with the signal and with the noise is what it has beyond noise, beyond what
-    chance makes of that too. Where the FMU's form leaves something open, what no fit has seen counts alone;
-    less than form leaves matters only if one effect could explain much of it, or if it sets in during the
-    record, as no form does. likeness: share of what is beyond noise that one effect could explain, by linear
-    regression; clear: whether it is so much like one that noise never is.
-    """
-    limits = problem.policy.detection
-    signal, rms, form_open = signal_size(problem), base.rms(problem, "unseen"), problem.form_error > 0
-    beyond = _beyond(problem, base, noise, "unseen")
-    if not form_open:
-        beyond = np.maximum(beyond, _beyond(problem, base, noise, "fit"))
-    least = limits.noise_share_of_effects if clear and not form_open else limits.noise_share
-    lowest = np.minimum(limits.signal_share * signal, least * noise)
-    telling = float(np.max(beyond / np.maximum(lowest, TINY)))
-    if not form_open:
-        return telling
-    form = np.maximum(problem.form_error * signal, TINY)
-    large = float(np.max(np.minimum(beyond / form, rms / (limits.open_form_noises * noise))))
-    return max(large, telling) if sets_in or likeness >= limits.open_form_likeness else large
-
-
-def _beyond(problem: Problem, base: Hypothesis, noise: Array, part: Part) -> Array:
-    """Root mean square (n_y,) of what a part of the record has beyond noise and what chance makes of it."""
-    residual = base.of(problem, part)
-    chance = 1 + problem.policy.detection.chance * np.sqrt(2 / max(len(residual), 1))
-    return np.asarray(np.sqrt(np.maximum(np.mean(residual**2, axis=0) - chance * noise**2, 0.0)))
-
-
-def signal_size(problem: Problem) -> Array:
-    """Root mean square of each output on the parts that no fit has seen, (n_y,)."""
-    measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
-    return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
-
-
-def _sensitivities(problem: Problem, base: Hypothesis, noise: Array) -> Array:
-    """Derivatives of the whole residual by the unknowns, (N, n_y, n)."""
-    columns = []
+def _sensitivities(baseline: Baseline) -> Array:
+    """Derivatives of the whole residual, in units of the noise, by the unknowns, (N, n_y, n)."""
+    base, problem = baseline.hypothesis, baseline.problem
+    here, columns = np.concatenate(base.residuals), []
     for u in base.fit.unknowns:
         h = STEP * u.scale
         moved = problem.residuals({**base.fit.theta, u.name: base.fit.theta[u.name] + h})
-        change = np.concatenate(moved) - np.concatenate(base.residuals)
-        columns.append(change / noise / h)
-    shape = np.concatenate(base.residuals).shape
-    return np.stack(columns, axis=2) if columns else np.zeros((*shape, 0))
+        columns.append((np.concatenate(moved) - here) / baseline.noise.std / h)
+    return np.stack(columns, axis=2) if columns else np.zeros((*here.shape, 0))
 
 
 def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:

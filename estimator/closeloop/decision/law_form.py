@@ -5,67 +5,61 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.decision.verdict import named, no_law, noticed
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.decision.verdict import named, no_law
 from estimator.closeloop.evidence import Check, Judgement, Name
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
-from estimator.closeloop.hypotheses.scores import leaves_noise
-from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.free_form import FREE_FORMS, offered
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.screen import Screening, screen
-from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import ForceLaw
 
 FOLLOWS: Name = "the force follows the law"
 
 
-def confirmed(
-    problem: Problem, base: Hypothesis, judgement: Judgement, forces: Sequence[MissingForce], size: Array
-) -> Judgement:
+def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[MissingForce]) -> Judgement:
     """The judgement, without its best member where a law of that is not the curve that the force follows.
 
     Then those of its class stay that are not denied so; for a single law only if one of them is a curve over
     the same motion; else it is `unexplained`.
     Asked where noise is declared: else what is left is no measure.
     """
-    if not judgement.members or not problem.record.floor_known:
+    if not judgement.members or not baseline.noise.known:
         return judgement
     best, *others = judgement.members
-    check = _follows(problem, best, base, forces, size)
+    check = _follows(baseline, best, forces)
     if check.passed:
         return replace(judgement, checks=(*judgement.checks, check))
-    rest = [m for m in others if _follows(problem, m, base, forces, size).passed]
+    rest = [m for m in others if _follows(baseline, m, forces).passed]
     if len(best.candidates) == 1 and not any(motion(m) == motion(best) for m in rest):
         rest = []
     if rest:
         return named(rest).after(judgement.checks)
-    wrong = doubted(problem, best, base, forces)
+    wrong = doubted(baseline, best, forces)
     return no_law(best, wrong[0] if wrong else None, check).after(judgement.checks)
 
 
-def _follows(
-    problem: Problem, h: Hypothesis, base: Hypothesis, forces: Sequence[MissingForce], size: Array
-) -> Check:
+def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> Check:
     """Whether the laws of a hypothesis are what their names say, and a single one the curve of its force."""
-    wrong = doubted(problem, h, base, forces)
+    wrong = doubted(baseline, h, forces)
     if wrong or len(h.candidates) > 1:
         return Check.most(FOLLOWS, len(wrong), 0)
-    return curve_check(problem, h, base, *curvature(problem, h, forces, size))
+    own, elsewhere = curvature(baseline, h, forces)
+    return Check.most(FOLLOWS, own, form_of(baseline).curve_limit(h, elsewhere))
 
 
-def doubted(
-    problem: Problem, h: Hypothesis, base: Hypothesis, forces: Sequence[MissingForce]
-) -> list[Candidate]:
+def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
     """Laws of a hypothesis that with its values are not what their names say, as far as the record tells."""
     wrong = misnamed(h, forces)
-    if problem.form_error > 0 or not wrong:
+    if not form_of(baseline).exact or not wrong:
         return wrong
-    nowhere = misnamed(h, forces, problem.policy.decision.fastest)
-    return [c for c in wrong if c in nowhere or not told_apart(problem, h, c, base)]
+    nowhere = misnamed(h, forces, baseline.policy.decision.fastest)
+    return [c for c in wrong if c in nowhere or not told_apart(baseline, h, c)]
 
 
 def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0) -> list[Candidate]:
@@ -85,13 +79,13 @@ def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0
     return found
 
 
-def told_apart(problem: Problem, h: Hypothesis, c: Candidate, base: Hypothesis) -> bool:
+def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate) -> bool:
     """Whether a curve that passes for one of its laws would show in what is left, and noise alone is left."""
-    limits = problem.policy.decision
-    if not over_what(c) or not leaves_noise(problem, h):
+    limits = baseline.policy.decision
+    if not over_what(c) or not baseline.leaves_noise(h):
         return False
     alone = len(h.candidates) == 1
-    explained = cost(base) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
+    explained = cost(baseline.hypothesis) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
     near = limits.open_curve_explained if len(c.unknowns) <= limits.plain_law else limits.rounded
     return near * explained > limits.noticed
 
@@ -107,26 +101,7 @@ def over_what(c: Candidate) -> str:
     return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
-def curve_check(problem: Problem, h: Hypothesis, base: Hypothesis, own: float, elsewhere: float) -> Check:
-    """Whether the law of a hypothesis is the curve of its force; own, elsewhere: see `curvature`.
-
-    It is not where a curve is most of what the law leaves, and plain; or much of what the law explains. Where
-    the FMU's form leaves something open, right laws leave some curve too: there it has to be much of both,
-    and no less than a curve over any other motion, as another form looks like one everywhere.
-    """
-    limits = problem.policy.decision
-    plain, left = max(limits.noticed, limits.curve_of_noise * len(h.fit.residual)), h.fit.beyond_noise
-    if problem.form_error > 0:
-        explained = cost(base) - cost(h)
-        least = max(plain, limits.open_curve_left * left, limits.open_curve_explained * explained)
-        return Check.most(FOLLOWS, own, max(least, limits.open_curve_elsewhere * elsewhere))
-    least = min(max(plain, limits.second_share * left), noticed(problem, h, base))
-    return Check.most(FOLLOWS, own, least)
-
-
-def curvature(
-    problem: Problem, h: Hypothesis, forces: Sequence[MissingForce], size: Array
-) -> tuple[float, float]:
+def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> tuple[float, float]:
     """Fall of the sum of squares that a free curve beside a hypothesis' law would bring, by regression.
 
     Of a curve over the law's own motion; and, where the FMU's form leaves something open, the most of one
@@ -136,9 +111,10 @@ def curvature(
     mine = [(kind, location) for kind, law in FREE_FORMS.items() if law.against == over]
     if not mine:
         return 0.0, 0.0
-    offers = offered(problem, forces) if problem.form_error > 0 else mine
+    problem = baseline.problem
+    offers = mine if form_of(baseline).exact else offered(problem, forces)
     curves = physical_candidates(offers, problem.builder.outside(), problem.record, forces)
-    screening = Screening(built(problem, h.candidates), h.fit, size)
+    screening = Screening(built(problem, h.candidates), h.fit, baseline.noise.scale)
     change = screening.changes(curves)
     gains = {False: 0.0, True: 0.0}
     for p in screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)]):

@@ -1,4 +1,4 @@
-"""What a report owes its reader beside the finding: what others reach, and what could have been seen."""
+"""Beside the finding: what a model without physics reaches, and what effects could have been seen."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,46 +9,41 @@ from estimator.closeloop.diagnostics.black_box import BlackBox, black_box
 from estimator.closeloop.diagnostics.decoys import decoy_gain
 from estimator.closeloop.diagnostics.power import Visible, power
 from estimator.closeloop.diagnostics.stability import stability
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.regressors import Changes
-from estimator.record import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Honesty:
+class Diagnostics:
     """black_box: a model without physics on the same record; power: the smallest effects that would have been
     shown; decoy_gain: what chance regressors reach of Promise.gain; stability: by kind@location, the share of
-    halves of the record in which it leads; free_form: where nothing explains, a curve that comes nearer."""
+    halves of the record in which it leads."""
 
     black_box: BlackBox
     power: tuple[Visible, ...]
     decoy_gain: float
     stability: Mapping[str, float]
-    free_form: Hypothesis | None = None
 
 
-def honesty(
-    problem: Problem,
-    base: Hypothesis,
+def diagnose(
+    baseline: Baseline,
     screened: Fit,
     change: Changes,
-    size: Array,
     level: float,
     rng: np.random.Generator,
-    free_form: Hypothesis | None = None,
-) -> Honesty:
-    """All of it, from the calibrated FMU `base`, its fit as it was screened, and the screening's changes.
+) -> Diagnostics:
+    """All of it, from the calibrated FMU, its fit as it was screened, and the screening's changes.
 
-    size: (n_y,) that the residual was weighted with; level: of the test for likeness to any effect.
+    level: of the test for likeness to any effect.
     """
-    return Honesty(
+    problem, base, size = baseline.problem, baseline.hypothesis, baseline.noise.scale
+    return Diagnostics(
         black_box(problem.record, base.residuals, size),
         tuple(power(screened, change, level, rng, room=room(problem, base.theta))),
         decoy_gain(screened, change, len(size), rng),
         stability(screened, change, rng),
-        free_form,
     )
 
 

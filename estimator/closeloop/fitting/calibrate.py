@@ -5,18 +5,17 @@ import numpy as np
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.noise import noise_floor, weights
-from estimator.record import Array
+from estimator.noise import Noise, noise_floor, weights
 
 ROUGH = 1e-3  # gain of a step that is enough where much is left unexplained
 NEAR = 2.0  # mean square, in units of a residual that counts as one, from which down it is not
 SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is left alone
 
 
-def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
-    """Hypotheses without effects, declared and calibrated, and the size of a residual that counts as one.
+def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
+    """Hypotheses without effects, declared and calibrated, and the noise of the record.
 
-    Where noise is not declared that size depends on the residual, so the calibration is repeated with it.
+    Where noise is not declared its scale depends on the residual, so the calibration is repeated with it.
     """
     record = problem.record
     states = _start_unknowns(problem)
@@ -28,14 +27,14 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Array]:
         for n, (low, high) in problem.calibrate.items()
     ]
     unknowns = [*parameters, *states]
-    base, size = declared, weights(record, list(declared.residuals))
-    for _ in range(1 if record.floor_known else 2):
-        found = fit(problem, unknowns, size, base.fit.theta, gain=ROUGH)
+    base, noise = declared, Noise.of(record, declared.residuals)
+    for _ in range(1 if noise.known else 2):
+        found = fit(problem, unknowns, noise.scale, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < NEAR:
-            found = fit(problem, unknowns, size, found.theta)
+            found = fit(problem, unknowns, noise.scale, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
-        size = weights(record, list(base.residuals))
-    return declared, base, size
+        noise = Noise.of(record, base.residuals)
+    return declared, base, noise
 
 
 def _start_unknowns(problem: Problem) -> list[Unknown]:

@@ -82,7 +82,7 @@ def fit(
     slopes = Slopes(residual, scale, high, [(known or {}).get(n) for n in names], fading, begun, steps)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
-    secants = not known and problem.record.floor_known
+    secants = not known and bool(problem.record.noise_declared.all())
     x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, secants)
     r, jacobian = residual(x), slopes.at(x)
     middle = _middle(x, jacobian, scale, low, high)

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.fitting.fit import fit, weighted
-from estimator.closeloop.fitting.refined import lower, settled
-from estimator.closeloop.fitting.rounds import finished
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.refined import lower, refined
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -28,7 +28,7 @@ DEEPER = 4.0  # by how much the sum of squares has to be lower somewhere, to go 
 ROUNDS = 2  # of going on from a lower place
 
 
-def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
+def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis with the standard errors of its laws widened to where the sum of squares says no.
 
     Of each parameter the wider side counts. Where the valley turns out to be deeper elsewhere, the hypothesis
@@ -36,14 +36,15 @@ def profiled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
     are linear in their parameters stay as they are. Moments are tried one after the other, as the sum of
     squares is rugged in them.
     """
+    problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     before: list[Hypothesis] = []
     for _ in range(ROUNDS):
-        h = settled(problem, h, size)
+        h = refined(fitter, h)
         wider, deeper = _profiles(problem, h, size)
         if not deeper:
             break
         there = Promise(h.candidates, 0.0, {**h.theta, **deeper})
-        now = lower(h, finished(problem, h.others, [there], size, 1))
+        now = lower(h, fitter.alone.finished([there], h.others))
         if now is h:
             break
         before, h = [*before, h], now

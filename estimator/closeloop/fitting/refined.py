@@ -7,21 +7,18 @@ look past them, and the fit comes to rest beside the lowest; finer ones lead on 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from estimator.closeloop.fitting.rounds import finished, from_there
+from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.fitting.slopes import FINE
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost, mean_square
-from estimator.closeloop.hypotheses.scores import leaves_noise
-from estimator.closeloop.question.problem import Problem
-from estimator.record import Array
 
 RUGGED = 1.05  # mean square of a residual, in units of noise, from which finer differences are tried
 
 
-def settled(problem: Problem, h: Hypothesis, size: Array) -> Hypothesis:
+def refined(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis where finer differences lead it, if more than noise is left and that is lower."""
-    if leaves_noise(problem, h) or mean_square(h) < RUGGED:
+    if fitter.baseline.leaves_noise(h) or mean_square(h) < RUGGED:
         return h
-    return lower(h, finished(problem, h.others, from_there([h]), size, 1, step=FINE))
+    return lower(h, fitter.alone.finished(from_there([h]), h.others, step=FINE))
 
 
 def lower(h: Hypothesis, again: Sequence[Hypothesis]) -> Hypothesis:

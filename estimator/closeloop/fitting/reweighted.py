@@ -10,18 +10,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.fitting.rounds import finished, from_there
+from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.scores import best_by_label
-from estimator.closeloop.question.problem import Problem
-from estimator.noise import weights
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
+from estimator.noise import Noise
 from estimator.record import Array
 
 
-def best_weights(problem: Problem, found: Sequence[Hypothesis]) -> Array:
-    """Size of a residual that counts as one, (n_y,), from what the best of the fits leaves."""
-    return weights(problem.record, list(min(found, key=cost).residuals))
+def reweighted(
+    fitter: Fitter, found: Sequence[Sequence[Hypothesis]]
+) -> tuple[Hypothesis, Noise, list[list[Hypothesis]]]:
+    """The base, the noise that the best of all hypotheses leaves, and each list in units of that."""
+    baseline = fitter.baseline
+    best = min((h for some in found for h in some), key=cost)
+    before, noise = baseline.noise.scale, Noise.of(baseline.problem.record, best.residuals)
+    base = rescaled(baseline.hypothesis, before, noise.scale)
+    anew = replace(fitter, baseline=replace(baseline, hypothesis=base, noise=noise))
+    return base, noise, [_fitted_again(anew, some, before) for some in found]
 
 
 def rescaled(h: Hypothesis, before: Array, size: Array) -> Hypothesis:
@@ -33,16 +38,13 @@ def rescaled(h: Hypothesis, before: Array, size: Array) -> Hypothesis:
     )
 
 
-def fitted_again(
-    problem: Problem, found: Sequence[Hypothesis], before: Array, size: Array, jobs: int
-) -> list[Hypothesis]:
-    """All hypotheses in units of the new size, best first on the identify part; leading ones fitted anew."""
-    moved = best_by_label(rescaled(h, before, size) for h in found)
-    leading = [h for h in moved if h.candidates][: problem.policy.search.reweighted]
+def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Array) -> list[Hypothesis]:
+    """All hypotheses in the fitter's units, best first on the identify part; leading ones fitted anew."""
+    moved = best_by_label(rescaled(h, before, fitter.baseline.noise.scale) for h in found)
+    leading = [h for h in moved if h.candidates][: fitter.baseline.policy.search.reweighted]
     if not leading:
         return moved
-    again = finished(problem, leading[0].others, from_there(leading), size, jobs)
-    return best_by_label([*moved, *again])
+    return best_by_label([*moved, *fitter.finished(from_there(leading), leading[0].others)])
 
 
 def _errors(fit: Fit, residual: Array, jacobian: Array) -> Array:

@@ -1,6 +1,6 @@
 """A hypothesis: candidates fitted jointly with the calibrated parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -102,3 +102,12 @@ def cost(h: Hypothesis) -> float:
 def mean_square(h: Hypothesis) -> float:
     """Of the residual on the part that was fitted."""
     return cost(h) / len(h.fit.residual)
+
+
+def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
+    """Of several hypotheses with the same labels the one that fits better; best first."""
+    best: dict[tuple[str, ...], Hypothesis] = {}
+    for h in found:
+        if h.key not in best or cost(h) < cost(best[h.key]):
+            best[h.key] = h
+    return sorted(best.values(), key=cost)

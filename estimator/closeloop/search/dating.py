@@ -10,28 +10,26 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.closeloop.fitting.fit import weighted
-from estimator.closeloop.fitting.rounds import finished
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.onset import begins, moments_near
 from estimator.closeloop.hypotheses.promise import Promise, built
-from estimator.closeloop.hypotheses.scores import best_by_label
-from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 
 
-def dated(
-    problem: Problem, unknowns: Sequence[Unknown], found: Sequence[Hypothesis], size: Array, jobs: int
-) -> list[Hypothesis]:
+def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """All hypotheses, best first on the identify part; leading ones fitted again from a better moment."""
-    limits = problem.policy.search
+    limits = fitter.baseline.policy.search
+    problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     tried = [h for h in found[: limits.dated] if begins(h) and cost(h) < limits.dated_rival * cost(found[0])]
-    moments = Parallel(n_jobs=jobs)(delayed(_moment)(problem, h, size) for h in tried)
+    moments = Parallel(n_jobs=fitter.jobs)(delayed(_moment)(problem, h, size) for h in tried)
     again = [
         Promise(h.candidates, 0.0, {**h.fit.theta, begins(h)[0]: moment})
         for h, moment in zip(tried, moments, strict=True)
         if moment is not None
     ]
-    return best_by_label([*found, *finished(problem, unknowns, again, size, jobs)]) if again else list(found)
+    return best_by_label([*found, *fitter.finished(again)]) if again else list(found)
 
 
 def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:

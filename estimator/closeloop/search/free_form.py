@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from estimator.closeloop.fitting.rounds import hypotheses
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.scores import beats, ranked
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.free_form import (
@@ -58,31 +58,28 @@ class Curve:
 
 
 def free_form(
-    problem: Problem,
-    base: Hypothesis,
-    forces: Sequence[MissingForce],
-    size: Array,
-    jobs: int,
-    near: Sequence[Hypothesis] = (),
+    fitter: Fitter, forces: Sequence[MissingForce], near: Sequence[Hypothesis] = ()
 ) -> Hypothesis | None:
     """The force of free form that is best on the part to choose, fitted jointly; None where none is better.
 
     near: effects that came nearest, best first, whose ports are tried too. Better than the base means by
     TELLING standard errors over blocks of that part.
     """
-    limits = problem.policy.search
+    baseline, problem = fitter.baseline, fitter.baseline.problem
+    base = baseline.hypothesis
     candidates = [c for d in dependences(problem, forces) for c in _candidates(problem, d, forces)]
     if not candidates:
         return None
-    screening = Screening(problem, base.fit, size, forces)
+    screening = Screening(problem, base.fit, baseline.noise.scale, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     calibration = Calibration.of(screening.fit)
     chosen = [resolved(calibration, c, g) for c, g in promising(screening.fit, change, near)]
     promises = screen(screening.fit, [((c,), g) for c, g in chosen if c.amplitudes])
     # a strong law differs from its linear picture, and then a start without it is the better one
     promises += [replace(p, start=base.fit.theta) for p in promises]
-    found = ranked(problem, hypotheses(problem, base, promises, size, jobs, limits.finalist_pairs), size)
-    better = [h for h in found if cost(h) < cost(base) and beats(problem, h, base, size)]
+    fitted = fitter.hypotheses(promises, baseline.policy.search.finalist_pairs)
+    found = form_of(baseline).ranked(fitted)
+    better = [h for h in found if cost(h) < cost(base) and baseline.beats(h, base)]
     return better[0] if better else None
 
 

@@ -13,17 +13,11 @@ from dataclasses import replace
 from joblib import Parallel, delayed
 
 from estimator.closeloop.fitting.fit import NEAR, fit
-from estimator.closeloop.fitting.rounds import (
-    finished,
-    from_there,
-    hypothesis,
-    together,
-)
+from estimator.closeloop.fitting.fitter import Fitter, from_there, hypothesis, together
 from estimator.closeloop.fitting.slopes import FINE
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost, mean_square
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost, mean_square
 from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.hypotheses.scores import best_by_label
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 
@@ -34,21 +28,17 @@ SHAPES = 2  # of each label, the most promising ones; of one that sets in the be
 
 
 def from_the_beginning(
-    problem: Problem,
-    base: Hypothesis,
-    found: Sequence[Hypothesis],
-    promises: Sequence[Promise],
-    size: Array,
-    jobs: int,
+    fitter: Fitter, found: Sequence[Hypothesis], promises: Sequence[Promise]
 ) -> list[Hypothesis]:
     """All hypotheses, best first on the identify part, the leading ones perhaps better than found so far."""
-    limits = problem.policy.search
+    limits, jobs = fitter.baseline.policy.search, fitter.jobs
+    problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     physical = [p for p in promises if not p.candidates[0].is_fault]
     fitted = [h.label for h in found if not h.candidates[0].is_fault]
     leading = dict.fromkeys(
         [*fitted[: limits.grown], *list(dict.fromkeys(p.label for p in physical))[: limits.grown]]
     )
-    unknowns = base.fit.unknowns
+    unknowns = fitter.baseline.hypothesis.fit.unknowns
     declared = {u.name: u.start for u in unknowns}
     states = {n: v for n, v in declared.items() if n in problem.free_states}
     started = replace(problem, declared={**problem.declared, **states})
@@ -68,14 +58,14 @@ def from_the_beginning(
         if mean_square(h) < limits.grown_rival * mean_square(alive[0][0])
     )
     grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
-    again = finished(problem, unknowns, from_there(grown[: limits.grown]), size, jobs)
+    again = fitter.finished(from_there(grown[: limits.grown]))
     best = best_by_label([*found, *grown, *again])
     rugged = [
         h
         for h in best[: limits.grown_refined]
         if mean_square(h) > NEAR and cost(h) < limits.grown_rival * cost(best[0])
     ]
-    return best_by_label([*best, *finished(problem, unknowns, from_there(rugged), size, jobs, step=FINE)])
+    return best_by_label([*best, *fitter.finished(from_there(rugged), step=FINE)])
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from estimator.closeloop.fitting.fit import fit, weighted
-from estimator.closeloop.fitting.rounds import fitted
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.question.problem import Problem
@@ -31,13 +31,14 @@ GENTLE = 0.3  # of the amplitudes that the linear picture asks for: the other st
 GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
 
 
-def onset(problem: Problem, base: Hypothesis, size: Array, times: float) -> tuple[float, Fit] | None:
+def onset(baseline: Baseline, times: float) -> tuple[float, Fit] | None:
     """Share of the identify part after which the residual is another, and the FMU's fit to what was before.
 
     times: as large its mean square has to be. None where there is no such moment, or where nothing is to be
     calibrated.
     """
-    unknowns, found, chance = base.fit.unknowns, [], problem.policy.search.sets_in_chance
+    problem, size = baseline.problem, baseline.noise.scale
+    unknowns, found, chance = baseline.hypothesis.fit.unknowns, [], baseline.policy.search.sets_in_chance
     for early in EARLY if unknowns else ():
         before = fit(problem.beginning(early), unknowns, size)
         squares = _blocks(problem, before, size)
@@ -70,26 +71,20 @@ def grown(squares: Array, first: int, times: float, level: float) -> int | None:
     return k if after.mean() > times * before.mean() and chance < level else None
 
 
-def since(
-    problem: Problem,
-    at: tuple[float, Fit],
-    candidates: Sequence[Candidate],
-    size: Array,
-    jobs: int,
-) -> list[Promise]:
+def since(fitter: Fitter, at: tuple[float, Fit], candidates: Sequence[Candidate]) -> list[Promise]:
     """Promises of what can set in about the moment, best first.
 
     Ranked by the first moments after it; the leading ones again by short fits to some more of the record,
     all else held at what the FMU was before, since a strong change differs from its linear picture.
     """
-    limits = problem.policy.search
+    limits, problem = fitter.baseline.policy.search, fitter.baseline.problem
     share, before = at
-    promises = _by_response(problem, at, candidates, size)
+    promises = _by_response(problem, at, candidates, fitter.baseline.noise.scale)
     leading, rest = promises[: limits.sudden_fits], promises[limits.sudden_fits :]
     held = replace(problem, declared={**problem.declared, **before.theta})
     part = held.beginning(min(1.0, share + LONGER * AFTER))
     gentle = [replace(p, start=_scaled(p, GENTLE)) for p in leading]
-    tried = fitted(part, (), [*leading, *gentle], size, TRIES, jobs)
+    tried = fitter.asked(part).fitted([*leading, *gentle], TRIES, ())
     better = [Promise(h.candidates, 0.0, {**before.theta, **h.fit.theta}) for h in tried]
     return [*better, *rest]
 

@@ -6,17 +6,17 @@ from itertools import combinations
 
 import numpy as np
 
-from estimator.closeloop.fitting.rounds import finished, hypotheses
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import (
     Promise,
     built,
     distinct,
     label,
 )
-from estimator.closeloop.hypotheses.scores import best_by_label, idle
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.grouped import grouped_fit
@@ -31,30 +31,28 @@ Changes = Sequence[tuple[Candidate, Array]]
 
 
 def try_pairs(
-    problem: Problem, base: Hypothesis, screening: Screening, singles: Sequence[Hypothesis], change: Changes,
-    noise: Array, jobs: int,
-) -> tuple[list[Hypothesis], list[Hypothesis]]:  # fmt: skip
+    fitter: Fitter, screening: Screening, singles: Sequence[Hypothesis], change: Changes
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
 
-    screening, change: of the base and the single candidates; noise: (n_y,) of the outputs.
+    screening, change: of the base and the single candidates.
 
     Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
     """
-    limits = problem.policy.search
-    size = screening.size
+    baseline, limits = fitter.baseline, fitter.baseline.policy.search
     physical = [(c, g) for c, g in change if not c.is_fault]
     alone = {s.label: s for s in singles if s.candidates and not s.candidates[0].is_fault}
-    promises = _from_base(problem, screening.fit, physical)
+    promises = _from_base(baseline.problem, screening.fit, physical)
     if alone:
-        promises += _partners(problem, screening, list(alone.values())[: limits.paired], physical, noise)
-    found = hypotheses(problem, base, promises, size, jobs, limits.finalist_pairs)
-    reached = min((cost(h) for h in singles), default=cost(base))
-    doubtful = [h for h in found if idle(problem, h) and cost(h) < reached]
-    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in idle(problem, h)]
-    freed = finished(problem, base.fit.unknowns, without, size, jobs) if without else []
+        promises += _partners(baseline, screening, list(alone.values())[: limits.paired], physical)
+    found = fitter.hypotheses(promises, limits.finalist_pairs)
+    reached = min((cost(h) for h in singles), default=cost(baseline.hypothesis))
+    doubtful = [h for h in found if baseline.idle(h) and cost(h) < reached]
+    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in baseline.idle(h)]
+    freed = fitter.finished(without) if without else []
     least = {h.label: cost(h) for h in best_by_label([*alone.values(), *freed])}
     found = [replace(h, worth=_worth(h, least)) if h in doubtful else h for h in found]
-    return [h for h in found if not idle(problem, h)], freed
+    return [h for h in found if not baseline.idle(h)], freed
 
 
 def _rest(h: Hypothesis, c: Candidate) -> tuple[Candidate, ...]:
@@ -68,24 +66,23 @@ def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
 
 
 def beside(
-    problem: Problem, base: Hypothesis, best: Hypothesis, screening: Screening, change: Changes, least: float,
-    jobs: int,
-) -> list[Hypothesis]:  # fmt: skip
+    fitter: Fitter, best: Hypothesis, screening: Screening, change: Changes, least: float
+) -> list[Hypothesis]:
     """Fitted pairs of a hypothesis that explains with what its residual is still like, without idle members.
 
     screening, change: of the base, whose linear picture is near enough to see whether there is anything;
     least: share of what is left beyond noise that a second effect has to explain.
     """
-    limits = problem.policy.search
+    baseline, limits = fitter.baseline, fitter.baseline.policy.search
     fit = grouped_fit(best.fit, len(screening.size), screening.group)
     enough = limits.second_effect**2 * len(best.fit.residual) / len(screening.size)
     promises = [
-        p for p in _with(problem, best, fit, change) if p.gain > max(enough, least * fit.beyond_noise)
+        p
+        for p in _with(baseline.problem, best, fit, change)
+        if p.gain > max(enough, least * fit.beyond_noise)
     ]
-    found = (
-        hypotheses(problem, base, promises, screening.size, jobs, limits.finalist_pairs) if promises else []
-    )
-    return [h for h in found if not idle(problem, h)]
+    found = fitter.hypotheses(promises, limits.finalist_pairs) if promises else []
+    return [h for h in found if not baseline.idle(h)]
 
 
 def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:
@@ -101,11 +98,7 @@ def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:
 
 
 def _partners(
-    problem: Problem,
-    screening: Screening,
-    leading: Sequence[Hypothesis],
-    change: Changes,
-    noise: Array,
+    baseline: Baseline, screening: Screening, leading: Sequence[Hypothesis], change: Changes
 ) -> list[Promise]:
     """Pairs of the leading single effects and what could explain most of what each leaves.
 
@@ -114,12 +107,12 @@ def _partners(
     force suggests (the frequency of a second effect does not show beside a first one ten times its size); the
     others are too, in the shapes that they have, where that is quick.
     """
-    quick = len(change) * len(screening.fit.residual) < QUICK
+    problem, quick = baseline.problem, len(change) * len(screening.fit.residual) < QUICK
     found = []
     for i, h in enumerate(leading):
         others = [c for c, _ in change if c.label != h.label]
         if i == 0:
-            fit, seen = _beside(problem, h, others, screening.size, noise)
+            fit, seen = _beside(baseline, h, others)
         elif quick:
             here = Screening(built(problem, h.candidates), h.fit, screening.size)
             fit, seen = here.fit, list(zip(others, here.changes(others), strict=True))
@@ -130,18 +123,17 @@ def _partners(
     return distinct([p for _, p in found])[: problem.policy.search.pairs]
 
 
-def _beside(
-    problem: Problem, h: Hypothesis, others: Sequence[Candidate], size: Array, noise: Array
-) -> tuple[Fit, Changes]:
+def _beside(baseline: Baseline, h: Hypothesis, others: Sequence[Candidate]) -> tuple[Fit, Changes]:
     """The fit of a hypothesis as it is screened with its effect in the FMU, and the changes by all others.
 
     These are in the shapes that what it leaves suggests.
     """
+    problem = baseline.problem
     here, builder, labels = built(problem, h.candidates), problem.builder, {c.label for c in others}
-    forces = missing_forces(here, h.theta, noise)
+    forces = missing_forces(here, h.theta, baseline.noise.std)
     offered = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     partners = [c for c in offered if c.label in labels]
-    screening = Screening(here, h.fit, size, forces)
+    screening = Screening(here, h.fit, baseline.noise.scale, forces)
     return screening.fit, list(zip(partners, screening.changes(partners), strict=True))
 
 

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from estimator.closeloop.checkpoints import Stages
+from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import explains
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -26,20 +28,12 @@ class Screened:
     fit: of the screening, as changes are compared with it.
     """
 
-    problem: Problem
-    base: Hypothesis
-    noise: Array
-    size: Array
+    baseline: Baseline
     screening: Screening
     fit: Fit
     change: list[tuple[Candidate, Array]]
     promises: list[Promise]
     stages: Stages
-
-    @property
-    def floor_known(self) -> bool:
-        """See Record."""
-        return self.problem.record.floor_known
 
     @property
     def beyond_noise(self) -> float:
@@ -52,10 +46,14 @@ class Screened:
         return max((p.gain for p in self.promises), default=0.0) / max(self.beyond_noise, 1.0)
 
     @property
+    def problem(self) -> Problem:
+        """The question."""
+        return self.baseline.problem
+
+    @property
     def open_to_form(self) -> bool:
         """Whether the residual could be another form of the FMU, as it is like no effect."""
-        limits = self.problem.policy.detection
-        return self.problem.form_error > 0 and self.likeness < limits.open_form_likeness
+        return form_of(self.baseline).could_be(self.likeness)
 
     @property
     def began(self) -> bool:
@@ -65,34 +63,24 @@ class Screened:
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
         """What set in during the record; see `onset`."""
-        limits = self.problem.policy.search
+        limits = self.baseline.policy.search
         least = limits.sets_in_times_open if self.open_to_form else limits.sets_in_times
-        return self.stages.done("onset", lambda: onset(self.problem, self.base, self.size, least))
+        return self.stages.done("onset", lambda: onset(self.baseline, least))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
-        """Whether one of them accounts for the residual."""
-        return self.floor_known and any(
-            explains(self.problem, h, self.base, self.noise, self.size) for h in found
-        )
+        """Whether one of them accounts for the residual; that cannot be seen where noise is not declared."""
+        return self.baseline.noise.known and any(explains(self.baseline, h) for h in found)
 
 
-def screened(
-    problem: Problem,
-    base: Hypothesis,
-    noise: Array,
-    size: Array,
-    forces: Sequence[MissingForce],
-    tell: Progress,
-    stages: Stages,
-) -> Screened:
-    """Screen every candidate by its effect on the linearised FMU; size: (n_y,), see Outcome."""
-    builder = problem.builder
+def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress, stages: Stages) -> Screened:
+    """Screen every candidate by its effect on the linearised FMU."""
+    problem, builder = baseline.problem, baseline.problem.builder
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
-    candidates += fault_candidates(problem.record, noise)
+    candidates += fault_candidates(problem.record, baseline.noise.std)
     tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
-    screening = Screening(problem, base.fit, size, forces)
+    screening = Screening(problem, baseline.hypothesis.fit, baseline.noise.scale, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     # bounds that another form pushes against say nothing of effects
-    fit = screening.fit if problem.form_error > 0 else loose(screening.fit)
+    fit = loose(screening.fit) if form_of(baseline).exact else screening.fit
     promises = screen(fit, [((c,), g) for c, g in change])
-    return Screened(problem, base, noise, size, screening, fit, change, promises, stages)
+    return Screened(baseline, screening, fit, change, promises, stages)

@@ -4,17 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from estimator.closeloop.fitting.rounds import (
-    briefly,
-    finished,
-    hypotheses,
-    to_the_end,
-)
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.decision.model_form import ModelForm, form_of
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.promise import Promise, distinct
-from estimator.closeloop.hypotheses.scores import best_by_label, ranked
-from estimator.closeloop.hypotheses.twins import twins, with_twins
+from estimator.closeloop.hypotheses.relations import twins, with_twins
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_moments
 from estimator.closeloop.screening.regressors import Calibration, Changes
@@ -30,11 +25,11 @@ from estimator.closeloop.search.simpler import simpler
 
 @dataclass(frozen=True)
 class Search:
-    """Fits what the screening promises; `tell` hears what is being done, `jobs` processes work at it."""
+    """Fits what the screening promises; `tell` hears what is being done."""
 
     screened: Screened
+    fitter: Fitter
     tell: Progress
-    jobs: int
 
     def run(self) -> tuple[list[Hypothesis], list[Hypothesis]]:
         """Single hypotheses and pairs, best first."""
@@ -46,7 +41,7 @@ class Search:
         if s.explained(ones[:1]):
             pairs = [*pairs, *self._beside(ones[0])]
         twos = s.stages.done("simpler pairs", lambda: self._replaced(pairs))
-        return ranked(s.problem, with_twins(ones, self._alike), s.size), twos
+        return self._form.ranked(with_twins(ones, self._alike)), twos
 
     def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The single hypotheses with other laws over the motion of one, fitted from where it is."""
@@ -55,11 +50,13 @@ class Search:
         if not promises:
             return list(singles)
         self.tell("renamed", "fitting other laws over the same motion")
-        found = s.stages.done(
-            "renamed", lambda: finished(s.problem, s.base.fit.unknowns, promises, s.size, self.jobs)
-        )
+        found = s.stages.done("renamed", lambda: self.fitter.finished(promises))
         better = with_twins([f for f in found if cost(f) < cost(h)], self._alike)
-        return ranked(s.problem, best_by_label([*better, *singles]), s.size) if better else list(singles)
+        return self._form.ranked(best_by_label([*better, *singles])) if better else list(singles)
+
+    @property
+    def _form(self) -> ModelForm:
+        return form_of(self.screened.baseline)
 
     @cached_property
     def _alike(self) -> Mapping[str, tuple[str, ...]]:
@@ -78,7 +75,7 @@ class Search:
         s, labels = self.screened, {c.label for c, _ in self._single}
         limits = s.problem.policy.search
         promises = at_their_moments(s.screening, s.fit, s.promises, limits.nominees_in_shapes)
-        start = s.base.fit.theta
+        start = s.baseline.hypothesis.fit.theta
         return [replace(p, start={**start, **p.start}) for p in promises if p.label in labels]
 
     def _brief(self) -> tuple[list[Hypothesis], list[Promise]]:
@@ -96,16 +93,13 @@ class Search:
             "brief fits",
             f"fitting the {len(rest)} most promising effects inside the FMU, with the declared parameters",
         )
-        brief = s.stages.done("brief", lambda: self._briefly(rest))
+        brief = s.stages.done("brief", lambda: self.fitter.briefly(rest))
         brief = best_by_label([*faults, *brief])
-        if (
-            s.problem.form_error > 0
-            and brief
-            and brief[0].fit.beyond_noise > limits.overlooked_share * s.beyond_noise
-        ):
+        left = brief[0].fit.beyond_noise if brief else 0.0
+        if not self._form.exact and left > limits.overlooked_share * s.beyond_noise:
             further = overlooked(s.problem.policy, self._promises, rest, s.problem.calibrate)
             self.tell("overlooked", f"fitting {len(further)} more, which calibration may have hidden")
-            more = s.stages.done("overlooked", lambda: self._briefly(further))
+            more = s.stages.done("overlooked", lambda: self.fitter.briefly(further))
             brief = best_by_label([*more, *brief])
         if faults or not (s.open_to_form or any(sets_in(h) for h in brief[: limits.nominees_in_shapes])):
             return brief, []
@@ -117,38 +111,26 @@ class Search:
         self, brief: Sequence[Hypothesis], sudden: Sequence[Promise]
     ) -> tuple[list[Hypothesis], list[Hypothesis]]:
         """Leading hypotheses fitted to the end, and pairs of effects where none of them explains."""
-        s, jobs = self.screened, self.jobs
-        problem, base, size = s.problem, s.base, s.size
+        s, fitter = self.screened, self.fitter
         self.tell("long fits", "fitting the leading ones to the end")
-        finals = s.stages.done("singles", lambda: to_the_end(problem, base, brief, size, jobs))
-        alone = s.stages.done("dated", lambda: dated(problem, base.fit.unknowns, finals, size, jobs))
-        if s.floor_known and not s.explained(alone):
+        finals = s.stages.done("singles", lambda: fitter.to_the_end(brief))
+        alone = s.stages.done("dated", lambda: dated(fitter, finals))
+        if s.baseline.noise.known and not s.explained(alone):
             self.tell("growing", "fitting the leading ones to a growing part of the record")
             found, hopes = alone, [*sudden, *self._promises]
-            alone = s.stages.done(
-                "growing", lambda: from_the_beginning(problem, base, found, hopes, size, jobs)
-            )
+            alone = s.stages.done("growing", lambda: from_the_beginning(fitter, found, hopes))
         if s.explained(alone):
             return alone, []
         self.tell("pairs", "trying pairs of effects")
-        pairs, freed = s.stages.done(
-            "pairs", lambda: try_pairs(problem, base, s.screening, alone, self._single, s.noise, jobs)
-        )
+        pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, alone, self._single))
         return best_by_label([*alone, *freed]), pairs
 
     def _beside(self, one: Hypothesis) -> list[Hypothesis]:
         """Pairs of one effect that explains and a second."""
         s = self.screened
         self.tell("second", "looking at what is left for a second effect")
-        least = s.problem.policy.detection.open_form_likeness if s.problem.form_error > 0 else 0.0
-        return s.stages.done(
-            "beside", lambda: beside(s.problem, s.base, one, s.screening, self._single, least, self.jobs)
-        )
-
-    def _briefly(self, promises: Sequence[Promise]) -> list[Hypothesis]:
-        """Brief fits, best first."""
-        s = self.screened
-        return briefly(s.problem, s.base, promises, s.size, self.jobs)
+        least = 0.0 if self._form.exact else s.problem.policy.detection.open_form_likeness
+        return s.stages.done("beside", lambda: beside(self.fitter, one, s.screening, self._single, least))
 
     def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:
         """Faults that account for the residual, fitted to the end, and what is still to be tried.
@@ -161,9 +143,9 @@ class Search:
         likely = [
             p for p in chosen if p.candidates[0].is_fault and p.gain > limits.likely_fault * s.beyond_noise
         ]
-        if not likely or not s.floor_known:
+        if not likely or not s.baseline.noise.known:
             return [], list(chosen)
-        faults = hypotheses(s.problem, s.base, likely, s.size, self.jobs, limits.nominated_faults)
+        faults = self.fitter.hypotheses(likely, limits.nominated_faults)
         if not s.explained(faults):
             return [], list(chosen)
         others = [p for p in chosen if p not in likely]
@@ -181,19 +163,19 @@ class Search:
         if not s.came:
             return [], []
         physical = [c for c, _ in self._single if not c.is_fault]
-        promises = since(s.problem, s.came, physical, s.size, self.jobs)
-        return promises, briefly(s.problem, s.base, promises[: limits.sudden], s.size, self.jobs, known=False)
+        promises = since(self.fitter, s.came, physical)
+        return promises, self.fitter.briefly(promises[: limits.sudden], known=False)
 
     def _replaced(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Hypotheses ranked, other laws in place of those of the best one where that may be the answer."""
         s = self.screened
-        found = ranked(s.problem, best_by_label(found), s.size)
-        if not found or (s.floor_known and not s.explained(found[:1])):
+        found = self._form.ranked(best_by_label(found))
+        if not found or (s.baseline.noise.known and not s.explained(found[:1])):
             return found
         promises = simpler(found, [c for c, _ in s.change])
         promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)
-        more = finished(s.problem, s.base.fit.unknowns, distinct(promises), s.size, self.jobs)
-        return ranked(s.problem, best_by_label([*found, *more]), s.size)
+        more = self.fitter.finished(distinct(promises))
+        return self._form.ranked(best_by_label([*found, *more]))
 
 
 def sets_in(h: Hypothesis) -> bool:

@@ -6,7 +6,7 @@ from itertools import product
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise, distinct, key
-from estimator.closeloop.hypotheses.twins import limits
+from estimator.closeloop.hypotheses.relations import limits
 
 
 def simpler(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> list[Promise]:

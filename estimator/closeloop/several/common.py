@@ -116,7 +116,7 @@ def _own(r: Traced, labels: Sequence[str], found: Sequence[Transfer]) -> Hypothe
 def _part(r: Traced, own: Hypothesis, labels: Sequence[str]) -> Part:
     effects = tuple(sorted((c for c in own.candidates if c.label in labels), key=lambda c: c.label))
     beside = tuple(c for c in own.candidates if c.label not in labels)
-    return Part(r.problem, effects, beside, r.found.base.fit.unknowns, r.found.size, own.fit.theta)
+    return Part.of(r.found.baseline, effects, beside, own.fit.theta)
 
 
 def _fitted(parts: Sequence[Part], alone: Sequence[Hypothesis]) -> tuple[Together, tuple[float, ...]] | None:
@@ -155,4 +155,4 @@ def _compared(
 
 
 def _accounts(r: Traced, h: Hypothesis) -> bool:
-    return explains(r.problem, h, r.found.base, r.found.noise, r.found.size)
+    return explains(r.found.baseline, h)

@@ -1,5 +1,7 @@
 """A record's part in a fit of several."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from estimator.closeloop.fitting.fit import fit, weighted
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -31,6 +34,15 @@ class Part:
     calibrated: tuple[Unknown, ...]
     size: Array
     start: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls, baseline: Baseline, effects: Sequence[Candidate], beside: Sequence[Candidate],
+        start: Mapping[str, float],
+    ) -> Part:  # fmt: skip
+        """The part of a baseline's record."""
+        calibrated, size = baseline.hypothesis.fit.unknowns, baseline.noise.scale
+        return cls(baseline.problem, tuple(effects), tuple(beside), calibrated, size, start)
 
     @cached_property
     def built(self) -> Problem:

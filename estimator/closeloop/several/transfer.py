@@ -11,11 +11,11 @@ from typing import Literal
 from joblib import Parallel, delayed
 
 from estimator.closeloop.decision.verdict import explains
-from estimator.closeloop.fitting.rounds import finished
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.hypotheses.scores import beats, lead
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.several.chart import chart
@@ -27,7 +27,6 @@ from estimator.closeloop.several.estimates import (
 )
 from estimator.closeloop.several.joint import fit_together
 from estimator.closeloop.several.part import Part
-from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
@@ -92,10 +91,7 @@ class _Task:
     source: str
     target: str
     member: Hypothesis
-    problem: Problem
-    base: Hypothesis
-    noise: Array
-    size: Array
+    baseline: Baseline
     explanation: Hypothesis | None
     quiet: bool
     known: Hypothesis | None
@@ -126,7 +122,7 @@ def _task(a: Traced, member: Hypothesis, b: Traced) -> _Task | str:
     labels = {c.label for c in here}
     own = (h for h in b.found.judgement.members if labels <= {c.label for c in h.candidates})
     return _Task(
-        a.name, b.name, member, b.problem, b.found.base, b.found.noise, b.found.size, b.explanation, b.quiet,
+        a.name, b.name, member, b.found.baseline, b.explanation, b.quiet,
         next(own, None), tuple(_promises(a, member, b, tuple(here))),
     )  # fmt: skip
 
@@ -175,7 +171,7 @@ def said_of(h: Hypothesis, labels: Sequence[str]) -> Estimates:
 
 def _transferred(task: _Task) -> Transfer:
     t, labels = task, [c.label for c in task.member.candidates]
-    own = t.known or next(iter(finished(t.problem, t.base.fit.unknowns, t.promises, t.size, 1)), None)
+    own = t.known or next(iter(Fitter(t.baseline).finished(t.promises)), None)
     if own is None:
         return Transfer(t.source, t.target, t.member, "impossible", "the FMU does not run with it")
     said = said_of(t.member, labels)
@@ -195,10 +191,10 @@ def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequen
     labels = {c.label for c in t.member.candidates}
     effects = tuple(c for c in own.candidates if c.label in labels)
     rest = t.explanation.fit.theta if t.explanation and beside else {}
-    starts = [{**rest, **own.fit.theta}, {**own.fit.theta, **t.base.fit.theta, **rest}]
+    starts = [{**rest, **own.fit.theta}, {**own.fit.theta, **t.baseline.hypothesis.fit.theta, **rest}]
     parts = []
     for start in starts:
-        part = Part(t.problem, effects, tuple(beside), t.base.fit.unknowns, t.size, start)
+        part = Part.of(t.baseline, effects, beside, start)
         given = {**part.chart.turned(start), **values}
         first = part.residual(given)
         parts.append((float(first @ first), replace(part, start=part.chart.native(given))))
@@ -212,12 +208,12 @@ def _judged(
     """Whether the effect carries over, and why it is said."""
     a, b, label = t.source, t.target, t.member.label
     far = f"{apart.distance:.3g} standard errors apart"
-    if any(explains(t.problem, h, t.base, t.noise, t.size) for h in (held, own)):
+    if any(explains(t.baseline, h) for h in (held, own)):
         if t.explanation and not t.known and _outdone(t, own, t.explanation):
             return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} does so better"
-        if explains(t.problem, held, t.base, t.noise, t.size):
+        if explains(t.baseline, held):
             return "confirmed", f"{label} with the values of {a} accounts for {b} too"
-        if apart.p_value >= t.problem.policy.decision.different:
+        if apart.p_value >= t.baseline.policy.decision.different:
             return "agrees", f"{label} accounts for {b} with values that agree with those of {a}, {far}"
         return "differs", f"{label} accounts for {b} with other values only, {far}"
     if t.explanation is None:
@@ -225,8 +221,8 @@ def _judged(
     labels = {c.label for c in t.member.candidates}
     beside = [c for c in t.explanation.candidates if c.label not in labels]
     both = _held(t, own, values, beside) if beside else held
-    worse = beats(t.problem, t.explanation, both, t.size) and (
-        not t.quiet or apart.p_value < t.problem.policy.decision.different
+    worse = t.baseline.beats(t.explanation, both) and (
+        not t.quiet or apart.p_value < t.baseline.policy.decision.different
     )
     by = "needs no effect" if t.quiet else f"is accounted for by {t.explanation.label}"
     if worse:
@@ -236,6 +232,6 @@ def _judged(
 
 def _outdone(t: _Task, own: Hypothesis, explanation: Hypothesis) -> bool:
     """Whether what the other record found is better there, and by more than a small difference of form."""
-    mean, _ = lead(t.problem, explanation, own, t.size)
-    matters = mean >= t.problem.policy.decision.alike * -float(explanation.scores(t.problem, t.size).sum())
-    return matters and beats(t.problem, explanation, own, t.size)
+    b = t.baseline
+    matters = b.lead(explanation, own)[0] >= b.policy.decision.alike * -float(b.scores(explanation).sum())
+    return matters and b.beats(explanation, own)

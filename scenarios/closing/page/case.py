@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
@@ -22,9 +22,9 @@ class Case:
     words: Glossary
 
     @property
-    def honesty(self) -> Honesty | None:
+    def diagnostics(self) -> Diagnostics | None:
         """What the report owes its reader beside the finding."""
-        return self.found.honesty
+        return self.found.diagnostics
 
     @property
     def best(self) -> Hypothesis:

@@ -21,7 +21,7 @@ Row = dict[str, str]
 
 def power_rows(case: Case) -> list[tuple[str, list[Row]]]:
     """Rows by kind of effect, ready to print; none where no statement was made."""
-    statement = case.honesty.power if case.honesty else ()
+    statement = case.diagnostics.power if case.diagnostics else ()
     units = parameter_units(case, statement)
     return [
         (

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.closeloop.decision.verdict import explains, reached
-from estimator.closeloop.diagnostics.diagnostics import Honesty
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.decision.verdict import explains
+from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.evidence import Check
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.scores import idle, lead
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
@@ -33,12 +33,12 @@ def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
     """All rejected hypotheses, best first on the part to choose."""
     best = found.chosen or found.base
     others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
-    others.sort(key=lambda h: lead(problem, best, h, found.size)[0])
+    others.sort(key=lambda h: found.baseline.lead(best, h)[0])
     return [_row(problem, found, h) for h in others]
 
 
 def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
-    score, error = lead(problem, found.chosen or found.base, h, found.size)
+    score, error = found.baseline.lead(found.chosen or found.base, h)
     return Rejected(
         title(h),
         [number(v) for v in h.rms(problem, "test")],
@@ -49,7 +49,7 @@ def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
 
 def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """Why a hypothesis was rejected, most telling first."""
-    weak = idle(problem, h, found.base)
+    weak = found.baseline.idle(h)
     for c in weak:
         z = h.significance(found.base)[h.candidates.index(c)]
         which = f" of {candidate_words(c)}" if len(h.candidates) > 1 else ""
@@ -57,12 +57,12 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
             f"only {number(z, 2)} standard errors from zero ({problem.policy.decision.significant:g} needed)"
         )
         yield f"size{which} {from_zero if z >= NIL else 'zero'}"
-    if weak or not explains(problem, h, found.base, found.noise, found.size):
+    if weak or not explains(found.baseline, h):
         yield from _left(problem, found, h)
         return
     if found.chosen is None:
         return
-    score, error = lead(problem, found.chosen, h, found.size)
+    score, error = found.baseline.lead(found.chosen, h)
     if score > 0 and error > 0:
         yield f"worse than the best by {number(score / error, 2)} standard errors"
     elif len(h.candidates) > len(found.chosen.candidates):
@@ -71,8 +71,8 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 
 def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     """What a hypothesis leaves of the residual, where that is too much."""
-    over, declared = h.rms(problem, "choose") / found.noise, ~np.isnan(problem.record.noise_std)
-    short = np.flatnonzero(declared & ~reached(problem, h, found.base, found.noise, found.size))
+    over, declared = h.rms(problem, "choose") / found.noise, found.baseline.noise.declared
+    short = np.flatnonzero(declared & ~form_of(found.baseline).reached(h))
     if short.size:
         j = short[np.argmax(over[short])]
         yield f"leaves {number(over[j], 2)} times the noise in {problem.record.outputs[j]}"
@@ -88,7 +88,7 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 
 
 def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
-    squares: Array = (h.rms(problem, "choose") / found.size) ** 2
+    squares: Array = (h.rms(problem, "choose") / found.baseline.noise.scale) ** 2
     return squares
 
 
@@ -117,17 +117,17 @@ def detection_words(problem: Problem, found: Outcome) -> str:
     )
 
 
-def chance_words(found: Outcome, honesty: Honesty) -> str:
+def chance_words(found: Outcome, diagnostics: Diagnostics) -> str:
     """What decoys reached, and how stable the nomination of the finding is."""
     chi2 = float(found.base.fit.residual @ found.base.fit.residual)
     words = "No regressor of this record is broad enough in frequency to be held against chance ones."
-    if honesty.decoy_gain:
-        reached = percent(honesty.decoy_gain / chi2)
+    if diagnostics.decoy_gain:
+        reached = percent(diagnostics.decoy_gain / chi2)
         words = f"Ones that mean nothing but have the spectra of the leading ones explain {reached} of it."
     named = [c for h in found.judgement.members for c in h.candidates]
     for label, name in {c.label: candidate_words(c) for c in named}.items():
-        if label in honesty.stability:
-            often = percent(honesty.stability[label])
+        if label in diagnostics.stability:
+            often = percent(diagnostics.stability[label])
             words += f" In {often} of random halves of the record {name} is among the leading ones."
     return f"In the screening, effects were ranked by what they explain of the residual. {words}"
 

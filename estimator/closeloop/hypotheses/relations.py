@@ -1,7 +1,12 @@
-"""Effects that no record can tell apart, since they act on the FMU in the same way: one is fitted for all."""
+"""How effects are related whatever the record: exact twins, a law at a limit of another, parts of a group.
+
+Twins act on the FMU in the same way, so that no record can tell them apart and one is fitted for all. What a
+record does not tell apart is found in decision/equivalence.py.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -54,3 +59,31 @@ def _moved(h: Hypothesis, location: str) -> Hypothesis:
 def limits(kind: str) -> tuple[str, ...]:
     """Kinds of effects that one becomes at a limit; none of a sensor's fault."""
     return EFFECTS[kind].becomes if kind in EFFECTS else ()
+
+
+def one_way(h: Hypothesis) -> set[tuple[str, str]]:
+    """Kind and location of what its laws are in a motion that keeps its sign."""
+    return {(kind, c.location) for c in h.candidates if c.kind in EFFECTS for kind in EFFECTS[c.kind].one_way}
+
+
+def includes(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether one says of a group of parameters what the other says of one of them, so that both are true."""
+    if len(h.candidates) != 1 or len(other.candidates) != 1 or h is other:
+        return False
+    (group,), (c,) = h.candidates, other.candidates
+    names = [u.name.removeprefix(group.prefix).partition("_")[2] for u in group.amplitudes]
+    return group.kind == c.kind and c.location in names
+
+
+def becomes(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether a hypothesis turns into another one, which is simpler, at a limit of its shape."""
+    if h is other or len(h.candidates) != len(other.candidates):
+        return False
+    return any(_member_by_member(h.candidates, order) for order in permutations(other.candidates))
+
+
+def _member_by_member(candidates: Sequence[Candidate], others: Sequence[Candidate]) -> bool:
+    pairs = list(zip(candidates, others, strict=True))
+    same = [a.label == b.label for a, b in pairs]
+    simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
+    return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))

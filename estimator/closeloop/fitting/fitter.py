@@ -1,0 +1,164 @@
+"""Joint fits of hypotheses by simulation: brief ones to all that is promised, long ones to what leads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from estimator.closeloop.fitting.fit import REFUSED, fit
+from estimator.closeloop.fitting.slopes import STEP
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
+from estimator.closeloop.hypotheses.promise import Promise, built
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Array
+from fmus.effects import EFFECTS
+from fmus.host.fmu import FmuError
+
+BRIEF, LONG = 4, 20  # steps of a fit to rank it, and to finish it
+GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
+FURTHER_ROUNDS, LAST = 4, 2  # of LONG fits of the leading finalists, where they have not converged
+ABOARD = 6  # effects in one FMU
+
+Columns = Mapping[str, Array]  # derivatives (m,) of the weighted residual by the name of an unknown
+
+
+@dataclass(frozen=True)
+class Fitter:
+    """Fits hypotheses to the record of a baseline; jobs: processes that work at it."""
+
+    baseline: Baseline
+    jobs: int = 1
+
+    @property
+    def alone(self) -> Fitter:
+        """The same in one process."""
+        return replace(self, jobs=1)
+
+    def asked(self, problem: Problem) -> Fitter:
+        """The same for another form of the question."""
+        return replace(self, baseline=self.baseline.asked(problem))
+
+    def hypotheses(self, promises: Sequence[Promise], finalists: int) -> list[Hypothesis]:
+        """Fit each promise briefly, and to the end the best of those that better the base; best first."""
+        return self.to_the_end(self.briefly(promises), finalists)
+
+    def briefly(self, promises: Sequence[Promise], known: bool = True) -> list[Hypothesis]:
+        """A fit of few evaluations to each promise, best first on the identify part; one a label.
+
+        Start states, which hardly matter for the ranking, stay where the base has them, with the derivatives
+        that the base has. known: what the base's other unknowns do is taken from the base too.
+        """
+        problem, base = self.baseline.problem, self.baseline.hypothesis.fit
+        states = {n: v for n, v in base.theta.items() if n in problem.free_states}
+        started = self.asked(replace(problem, declared={**problem.declared, **states}))
+        others = [u for u in base.unknowns if u.name not in states]
+        found = started.fitted(promises, BRIEF, others, base.columns if known else None)
+        return [replace(h, fit=h.fit.extended(base, states)) for h in found]
+
+    def to_the_end(self, brief: Sequence[Hypothesis], finalists: int | None = None) -> list[Hypothesis]:
+        """The finalists of brief fits fitted to the end, and all others as they are; best first."""
+        limits, base = self.baseline.policy.search, self.baseline.hypothesis
+        limit = min([limits.worth_a_fit * cost(base), *(limits.hopeless * cost(h) for h in brief)])
+        hopeful = [h for h in brief if cost(h) < limit][: finalists or limits.finalists]
+        done: list[Hypothesis] = []
+        for part in (hopeful[: limits.first_finalists], hopeful[limits.first_finalists :]):
+            again = [
+                Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta})
+                for h in part
+                if not done or cost(h) < limits.rival * cost(done[0])
+            ]
+            done = best_by_label([*done, *self.finished(again, guess=base.fit.columns)])
+        keys = {h.key for h in done}
+        return best_by_label([*done, *(h for h in brief if h.key not in keys)])
+
+    def finished(
+        self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
+        guess: Columns | None = None, step: float = STEP,
+    ) -> list[Hypothesis]:  # fmt: skip
+        """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain.
+
+        unknowns: beside those of the candidates, by default those of the base; guess, step: see `fit`.
+        """
+        rival = self.baseline.policy.search.rival
+        found = self.fitted(promises, LONG, unknowns, guess=guess, step=step)
+        for _ in range(FURTHER_ROUNDS):
+            short = [h for h in found[:LAST] if not h.fit.converged and cost(h) < rival * cost(found[0])]
+            if not short:
+                break
+            before = sum(cost(h) for h in short)
+            rest = [h for h in found if h not in short]
+            longer = self.fitted(from_there(short), LONG, unknowns, step=step)
+            found = best_by_label([*rest, *short, *longer])
+            if sum(cost(h) for h in longer) > GAINS * before:
+                break
+        return found
+
+    def fitted(
+        self, promises: Sequence[Promise], evaluations: int, unknowns: Sequence[Unknown] | None = None,
+        known: Columns | None = None, guess: Columns | None = None, step: float = STEP,
+    ) -> list[Hypothesis]:  # fmt: skip
+        """Fit each promise with so many evaluations; one hypothesis a label, best first.
+
+        unknowns: as of `finished`; known, guess, step: see `fit`.
+        """
+        problem, size = self.baseline.problem, self.baseline.noise.scale
+        others = self.baseline.hypothesis.fit.unknowns if unknowns is None else unknowns
+        where = together(problem, promises)
+        tasks = (
+            delayed(hypothesis)(here, others, p, size, evaluations, known, guess, step)
+            for here, p in zip(where, promises, strict=True)
+        )
+        return best_by_label(h for h in Parallel(n_jobs=self.jobs)(tasks) if h is not None)
+
+
+def hypothesis(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    promise: Promise,
+    size: Array,
+    evaluations: int,
+    known: Columns | None = None,
+    guess: Columns | None = None,
+    step: float = STEP,
+) -> Hypothesis | None:
+    """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
+
+    known, guess, step: see `fit`. None where the FMU does not run with them, or runs away: a residual that is
+    not finite, or of the size that stands for a refusal, is no answer.
+    """
+    here = built(problem, promise.candidates)
+    own = [u for c in promise.candidates for u in c.unknowns]
+    found = fit(here, [*unknowns, *own], size, promise.start, None, evaluations, known, guess, step=step)
+    try:
+        residuals = here.residuals(found.theta)
+    except FmuError:
+        return None
+    if not all(np.all(np.abs(r) < REFUSED * size) for r in residuals):
+        return None
+    return Hypothesis(promise.candidates, found, tuple(residuals))
+
+
+def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
+    """For each promise the problem with an FMU that has its effects and those of some others, all off.
+
+    To build an FMU may take longer than the fits with it. Effects with a memory would cost steps.
+    """
+    labels = sorted({(c.kind, c.location) for p in promises for c in p.candidates if not c.is_fault})
+    light = [(kind, at) for kind, at in labels if not EFFECTS[kind].states("translation")]
+    size = ABOARD if problem.builder.quick else 1
+    groups = [light[i : i + size] for i in range(0, len(light), size)]
+    found = []
+    for p in promises:
+        own = {(c.kind, c.location) for c in p.candidates}
+        group = next((g for g in groups if own <= set(g)), [])
+        found.append(problem.with_effects(sorted({*problem.effects, *group})))
+    return found
+
+
+def from_there(found: Sequence[Hypothesis]) -> list[Promise]:
+    """Promises that begin where hypotheses are."""
+    return [Promise(h.candidates, 0.0, h.fit.theta) for h in found]

@@ -1,0 +1,21 @@
+"""Baselines as tests need them: a question, its calibrated FMU, and noise of a size."""
+
+from typing import Any
+
+import numpy as np
+
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.noise import Noise
+from estimator.record import Array
+
+NOTHING = Hypothesis((), Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(1), np.zeros((1, 0))), ())
+
+
+def baseline(
+    problem: Any, base: Hypothesis = NOTHING, noise: Array | float = 1.0, known: bool = True
+) -> Baseline:
+    """A baseline with noise of this size (n_y,), declared or not."""
+    std = np.atleast_1d(np.asarray(noise, dtype=float))
+    return Baseline(problem, base, Noise(std, std, np.ones(len(std), bool)))
