@@ -94,3 +94,11 @@ def test_the_decision_can_be_read_in_one_sitting():
 
 
 DECISION_LINES = 900  # 600 are the goal: what an ablation shows to change no count is to go
+
+
+def test_no_two_constants_of_closeloop_share_a_name():
+    homes: dict[str, list[str]] = defaultdict(list)
+    for file in sorted(CLOSELOOP.rglob("*.py")):
+        for name in constants(file):
+            homes[name].append(file.name)
+    assert {name: files for name, files in homes.items() if len(files) > 1} == {}

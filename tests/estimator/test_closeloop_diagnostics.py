@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from estimator.closeloop.decision.detect import Detection
-from estimator.closeloop.diagnostics.black_box import LARGEST, black_box
+from estimator.closeloop.diagnostics.black_box import LARGEST_POLE, black_box
 from estimator.closeloop.diagnostics.decoys import (
     decoy,
     decoy_gain,
@@ -282,7 +282,7 @@ def test_a_black_box_takes_a_linear_residual_down_to_the_noise(
     residual = np.column_stack([5 * linear, 3 * np.roll(linear, 1)]) + rng.standard_normal((3000, 2))
     found = black_box(recorded(residual, u, smooth(rng, 2, 3000)), [residual], np.ones(2))
     assert np.all(found.rms < 1.3)  # of noise 1, from 5 and 3: nine tenths of the gap
-    assert np.all(np.abs(found.poles) <= LARGEST)
+    assert np.all(np.abs(found.poles) <= LARGEST_POLE)
 
 
 @given(seed=SEEDS)

@@ -15,7 +15,7 @@ from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.slopes import (
     FADED,
-    FINE,
+    FINE_STEP,
     PARTS,
     STEP,
     Slopes,
@@ -103,11 +103,11 @@ def test_finer_differences_see_the_slopes_of_a_rugged_valley(phase, t0):
     asked = Rugged(phase)
     x, moment = Unknown("x", 0.5, -9.0, 9.0, 1.0), Unknown("step_force_wheel_t0", t0, 0.0, 1.0, 1.0)
     valley = fit(asked, (x,), np.ones(1), fixed={moment.name: 0.5})
-    found = fit(asked, (x,), np.ones(1), valley.theta, fixed={moment.name: 0.5}, step=FINE)
+    found = fit(asked, (x,), np.ones(1), valley.theta, fixed={moment.name: 0.5}, step=FINE_STEP)
     assert found.residual @ found.residual <= valley.residual @ valley.residual < 0.45**2 * 100 + 101
     slope = -1e-3 / 0.004 * np.sin(found.values[0] / 0.004 + phase)
     assert_allclose(found.jacobian[100:200, 0], slope, atol=1e-3)
-    timed = fit(asked, (x, moment), np.ones(1), step=FINE)
+    timed = fit(asked, (x, moment), np.ones(1), step=FINE_STEP)
     assert np.any(timed.jacobian[:, 1])  # a moment is not moved less than a sample
 
 

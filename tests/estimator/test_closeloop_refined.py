@@ -13,7 +13,7 @@ from estimator.closeloop.fitting import likelihood_profile as likelihood
 from estimator.closeloop.fitting import refined
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
-from estimator.closeloop.fitting.slopes import FINE, STEP
+from estimator.closeloop.fitting.slopes import FINE_STEP, STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
@@ -109,7 +109,7 @@ def test_what_fits_worse_is_not_taken_and_worth_is_kept():
     h = replace(h, worth={"stiffness_change@spring": 7.0})
     worse = replace(h, fit=replace(h.fit, residual=2 * h.fit.residual))
     assert refined.lower(h, [worse]) is h
-    [better] = fitter(asked).finished([Promise(h.candidates, 0.0, h.theta)], step=FINE)
+    [better] = fitter(asked).finished([Promise(h.candidates, 0.0, h.theta)], step=FINE_STEP)
     assert refined.lower(h, [worse, better]).worth == h.worth
 
 

@@ -31,7 +31,7 @@ from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search.lookalikes import lookalikes
 from estimator.closeloop.search.nomination import overlooked
-from estimator.closeloop.search.onset import BLOCKS, onset
+from estimator.closeloop.search.onset import ONSET_BLOCKS, onset
 from estimator.plant import between
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -381,5 +381,5 @@ def test_what_sets_in_is_noticed_and_what_was_before_is_found(share, seed):
     assert onset(baseline(Line(t, y), base, 0.1), DEFAULT.search.sets_in_times) is None
     found = onset(baseline(Line(t, y + 3.0 * (t > 10.0 * share)), base, 0.1), DEFAULT.search.sets_in_times)
     assert found is not None
-    assert abs(found[0] - share) <= 1.0 / BLOCKS
+    assert abs(found[0] - share) <= 1.0 / ONSET_BLOCKS
     assert found[1].theta["a"] == pytest.approx(2.0, abs=0.1)

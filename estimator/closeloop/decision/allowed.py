@@ -18,7 +18,7 @@ from estimator.closeloop.hypotheses.promise import built
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-STEPS, NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
+ALLOWED_STEPS, ALLOWED_NUDGE = 5, 0.1  # of the search, and of its differences in standard errors
 
 
 def allowed(baseline: Baseline, found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -63,15 +63,15 @@ def _as_errors_allow(baseline: Baseline, h: Hypothesis) -> Hypothesis:
 
     def slopes(z: Array) -> Array:
         at = misfit(z)
-        return np.column_stack([(misfit(z + d) - at) / NUDGE for d in NUDGE * np.eye(len(z))])
+        return np.column_stack([(misfit(z + d) - at) / ALLOWED_NUDGE for d in ALLOWED_NUDGE * np.eye(len(z))])
 
     low, high = (np.array([getattr(u, side) for u in unknowns]) for side in ("low", "high"))
     inside = (
-        np.clip((low - best) / error, -problem.policy.decision.errors_reach, -NUDGE),
-        np.clip((high - best) / error, NUDGE, problem.policy.decision.errors_reach),
+        np.clip((low - best) / error, -problem.policy.decision.errors_reach, -ALLOWED_NUDGE),
+        np.clip((high - best) / error, ALLOWED_NUDGE, problem.policy.decision.errors_reach),
     )
     try:
-        z = least_squares(misfit, np.zeros(len(best)), slopes, inside, max_nfev=STEPS).x
+        z = least_squares(misfit, np.zeros(len(best)), slopes, inside, max_nfev=ALLOWED_STEPS).x
         return replace(h, residuals=tuple(residuals(z)))
     except FmuError:
         return h

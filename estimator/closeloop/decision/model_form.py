@@ -21,7 +21,7 @@ from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array, BoolArray
 
-LEAST = 1e-300  # of a signal, a noise or a sum of squares that is zero
+TINY = 1e-300  # of a signal, a noise or a sum of squares that is zero
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class ModelForm(ABC):
         """What is beyond noise over the least that matters; least: of the noise."""
         b, share = self.baseline, self.baseline.policy.detection.signal_share
         lowest = np.minimum(share * signal_size(b.problem), least * b.noise.std)
-        return float(np.max(beyond / np.maximum(lowest, LEAST)))
+        return float(np.max(beyond / np.maximum(lowest, TINY)))
 
 
 class Closed(ModelForm):
@@ -186,7 +186,7 @@ class Open(ModelForm):
         """
         b, limits = self.baseline, self.baseline.policy.detection
         beyond, rms = self._beyond("unseen"), b.hypothesis.rms(b.problem, "unseen")
-        form = np.maximum(self.share * signal_size(b.problem), LEAST)
+        form = np.maximum(self.share * signal_size(b.problem), TINY)
         large = float(np.max(np.minimum(beyond / form, rms / (limits.open_form_noises * b.noise.std))))
         if sets_in or likeness >= limits.open_form_likeness:
             return max(large, self._material(beyond, limits.noise_share))
@@ -206,14 +206,14 @@ class Open(ModelForm):
         noise, down = b.noise.std, self._at_noise(h)
         before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
         left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
-        gone = left <= (1 - limits.decision.open_explained) * np.maximum(was, LEAST)
+        gone = left <= (1 - limits.decision.open_explained) * np.maximum(was, TINY)
         if np.any(_faulty(b.problem, h) & gone & (was >= limits.detection.noise_share**2)):
             return np.asarray(down | gone | (after <= limits.decision.clean * before))
         share = (self.share * signal_size(b.problem) / noise) ** 2
         large = (was >= share) & (before >= limits.detection.open_form_noises * noise)
         several = limits.decision.open_single**2 if large.any() else 1 - limits.decision.open_explained
         most = limits.decision.open_single if len(h.candidates) == 1 else several
-        of_all = b.beyond_noise_of_all(h) / max(b.beyond_noise_of_all(b.hypothesis), LEAST)
+        of_all = b.beyond_noise_of_all(h) / max(b.beyond_noise_of_all(b.hypothesis), TINY)
         held_out = np.sum(left) <= most * np.sum(was)
         if of_all > most or not (held_out or of_all <= most * limits.decision.open_single):
             return down

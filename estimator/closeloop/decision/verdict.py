@@ -9,7 +9,7 @@ import numpy as np
 
 from estimator.closeloop.decision.detect import Detection
 from estimator.closeloop.decision.equivalence import equivalent, splitting
-from estimator.closeloop.decision.model_form import LEAST, form_of
+from estimator.closeloop.decision.model_form import TINY, form_of
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -46,7 +46,7 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
             np.mean((x.of(baseline.problem, "choose") / baseline.noise.scale)[:, ~declared] ** 2)
             for x in (h, base)
         )
-        taken = 1 - float(after) / max(float(before), LEAST)
+        taken = 1 - float(after) / max(float(before), TINY)
         found.append(Check.least("share of the variance taken away", taken, limits.explained))
     return found
 

@@ -21,11 +21,11 @@ from estimator.record import (
 )
 
 ORDERS = (0, 1, 2, 4, 8)  # numbers of poles that are tried
-ROUNDS = 6  # of prefiltering
-SAMPLES = 4000  # at most so many are fitted, each the mean of several where a record has more
-LARGEST = 0.999  # magnitude of a pole
-RIDGE = 1e-9  # of the columns' mean square: neighbouring samples of a smooth signal are nearly alike
-ENOUGH = 10  # samples for each coefficient
+PREFILTERINGS = 6  # of prefiltering
+MOST_SAMPLES = 4000  # at most so many are fitted, each the mean of several where a record has more
+LARGEST_POLE = 0.999  # magnitude of a pole
+BOX_RIDGE = 1e-9  # of the columns' mean square: neighbouring samples of a smooth signal are nearly alike
+SAMPLES_PER_COEFFICIENT = 10  # samples for each coefficient
 STILL = 1e-9  # of a signal's size: it moves less, and drives nothing
 
 
@@ -69,7 +69,7 @@ def black_box(record: Record, residuals: Sequence[Array], size: Array) -> BlackB
 
     size: (n_y,) size of a residual that counts as one.
     """
-    every = max(1, -(-sum(len(run.t) for run in record.runs) // SAMPLES))
+    every = max(1, -(-sum(len(run.t) for run in record.runs) // MOST_SAMPLES))
     parts = _scaled([_part(run, r, size, every) for run, r in zip(record.runs, residuals, strict=True)])
     model = _chosen(parts)
     shown = [np.zeros_like(part.e) for part in parts] if model is None else model.shown
@@ -126,7 +126,7 @@ def _chosen(parts: Sequence[_Part]) -> _Model | None:
     n, n_y = fitted.shape
     best, least = None, float(n * np.log(np.mean(fitted**2, axis=0) + 1e-300).sum())
     for order in ORDERS:
-        if ENOUGH * (order + 1) * parts[0].z.shape[1] > n:
+        if SAMPLES_PER_COEFFICIENT * (order + 1) * parts[0].z.shape[1] > n:
             break
         for model in _rounds(parts, order):
             score = n * np.log(model.left / n + 1e-300).sum() + model.coefficients * np.log(n * n_y)
@@ -138,7 +138,7 @@ def _chosen(parts: Sequence[_Part]) -> _Model | None:
 def _rounds(parts: Sequence[_Part], order: int) -> Iterator[_Model]:
     """The model of an order, and its refinements by prefiltering."""
     a = np.array([1.0])
-    for _ in range(ROUNDS if order else 1):
+    for _ in range(PREFILTERINGS if order else 1):
         if order:
             a = _denominator(parts, a, order)
         yield _free_run(parts, a, order)
@@ -180,7 +180,7 @@ def _free_run(parts: Sequence[_Part], a: Array, order: int) -> _Model:
 def _solve(phi: Array, e: Array) -> Array:
     """Least squares phi x = e by the normal equations, with a little ridge."""
     gram = phi.T @ phi
-    gram[np.diag_indices_from(gram)] += RIDGE * np.mean(np.diag(gram)) + 1e-300
+    gram[np.diag_indices_from(gram)] += BOX_RIDGE * np.mean(np.diag(gram)) + 1e-300
     return np.asarray(cho_solve(cho_factor(gram), phi.T @ e))
 
 
@@ -188,5 +188,5 @@ def _stable(a: Array) -> Array:
     """A polynomial in 1/z with the poles outside of the unit circle mirrored into it."""
     poles = np.roots(a)
     size = np.abs(poles)
-    inside = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1.0), size), LARGEST)
+    inside = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1.0), size), LARGEST_POLE)
     return np.real(np.poly(poles / np.maximum(size, 1e-300) * inside))

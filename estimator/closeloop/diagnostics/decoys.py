@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.screening.regressors import Calibration, Changes, is_wave
+from estimator.closeloop.screening.regressors import RIDGE, Calibration, Changes, is_wave
 from estimator.record import Array
 
 FAMILIES = 12  # leading effects of which decoys are made
 BROAD = 8.0  # lines of a spectrum, from which a regressor with other phases is another regressor
-RIDGE = 1e-9  # of a regressor's square
 
 
 def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generator, copies: int = 15) -> float:

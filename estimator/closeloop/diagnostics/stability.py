@@ -10,13 +10,11 @@ import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
-from estimator.closeloop.screening.regressors import Changes
+from estimator.closeloop.screening.regressors import NOTHING, RIDGE, Changes
 from estimator.record import Array
 
 PAIRS = 25  # of complementary halves
 LEADING = 10  # effects that are nominated, of each the best shape
-RIDGE = 1e-9  # of a regressor's square
-NOTHING = 1e-12  # of it, left after projection: it says nothing new
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ def _gains(c: Candidate, g: Array, base: Fit, own: _Pieces, edges: list[slice], 
         gram = gram - np.swapaxes(across, 1, 2) @ taken
         along = along - np.einsum("hnk,hn->hk", taken, halves @ own.along)
     left, whole = np.einsum("hkk->hk", gram), halves @ np.einsum("bkk->bk", mine.gram)
-    size = np.where(left > NOTHING * whole, np.sqrt(np.maximum(left, 0.0)), np.inf)
+    size = np.where(left > NOTHING**2 * whole, np.sqrt(np.maximum(left, 0.0)), np.inf)
     scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(g.shape[1])
     z = along / size
     beta = np.linalg.solve(scaled, z[..., None])[..., 0]

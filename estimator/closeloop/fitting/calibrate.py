@@ -8,7 +8,7 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.noise import Noise, noise_floor, weights
 
 ROUGH = 1e-3  # gain of a step that is enough where much is left unexplained
-NEAR = 2.0  # mean square, in units of a residual that counts as one, from which down it is not
+ROUGHLY_MATCHED = 2.0  # mean square, in units of a residual that counts as one, from which down it is not
 SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is left alone
 
 
@@ -30,7 +30,7 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
     base, noise = declared, Noise.of(record, declared.residuals)
     for _ in range(1 if noise.known else 2):
         found = fit(problem, unknowns, noise.scale, base.fit.theta, gain=ROUGH)
-        if np.mean(found.residual**2) < NEAR:
+        if np.mean(found.residual**2) < ROUGHLY_MATCHED:
             found = fit(problem, unknowns, noise.scale, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
         noise = Noise.of(record, base.residuals)

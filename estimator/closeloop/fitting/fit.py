@@ -22,7 +22,7 @@ from fmus.host.fmu import FmuError
 GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
 
 
-NEAR = 5.0  # mean square, in units of noise, from which down derivatives are carried along
+NEAR_NOISE = 5.0  # mean square, in units of noise, from which down derivatives are carried along
 
 
 LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
@@ -121,7 +121,7 @@ def _descended(
     left = evaluations
     while True:
         exact, before = slopes.exact, float(np.sum(residual(x) ** 2))
-        near = secants and before < NEAR * len(residual(x))
+        near = secants and before < NEAR_NOISE * len(residual(x))
         found = least_squares(
             residual, x, slopes.at if near else slopes.by_differences, bounds,
             x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,

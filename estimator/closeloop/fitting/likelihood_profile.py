@@ -21,11 +21,11 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 
 WIDTH = 1.96  # standard errors: 95 %
-TRIES = 3  # places on each side
+PROFILE_PLACES = 3  # places on each side
 FURTHER = 2.0  # times as far at most, from one to the next
-EVALUATIONS = 6  # of the fit of all others at each
+PROFILE_EVALUATIONS = 6  # of the fit of all others at each
 DEEPER = 4.0  # by how much the sum of squares has to be lower somewhere, to go there
-ROUNDS = 2  # of going on from a lower place
+DEEPER_ROUNDS = 2  # of going on from a lower place
 
 
 def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
@@ -38,7 +38,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """
     problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     before: list[Hypothesis] = []
-    for _ in range(ROUNDS):
+    for _ in range(DEEPER_ROUNDS):
         h = refined(fitter, h)
         wider, deeper = _profiles(problem, h, size)
         if not deeper:
@@ -100,7 +100,7 @@ def _half(
         return 0.0, {}
     away = side * WIDTH * error
     usual = _usual(h, i)
-    for _ in range(TRIES):
+    for _ in range(PROFILE_PLACES):
         value = float(np.clip(best + away, u.low, u.high))
         if value != best + away:
             return abs(value - best), {}
@@ -152,4 +152,4 @@ def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> F
     start = dict(zip((u.name for u in h.fit.unknowns), h.fit.values + along, strict=True))
     own = h.own
     known = {n: column for n, column in h.fit.columns.items() if n not in own}
-    return fit(here, rest, size, start, {held: value}, EVALUATIONS, known)
+    return fit(here, rest, size, start, {held: value}, PROFILE_EVALUATIONS, known)

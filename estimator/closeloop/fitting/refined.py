@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from estimator.closeloop.fitting.fitter import Fitter, from_there
-from estimator.closeloop.fitting.slopes import FINE
+from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost, mean_square
 
 RUGGED = 1.05  # mean square of a residual, in units of noise, from which finer differences are tried
@@ -18,7 +18,7 @@ def refined(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis where finer differences lead it, if more than noise is left and that is lower."""
     if fitter.baseline.leaves_noise(h) or mean_square(h) < RUGGED:
         return h
-    return lower(h, fitter.alone.finished(from_there([h]), h.others, step=FINE))
+    return lower(h, fitter.alone.finished(from_there([h]), h.others, step=FINE_STEP))
 
 
 def lower(h: Hypothesis, again: Sequence[Hypothesis]) -> Hypothesis:

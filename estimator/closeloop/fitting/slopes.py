@@ -10,7 +10,7 @@ import numpy as np
 from estimator.record import Array
 
 STEP = 1e-2  # of an unknown's scale, for differences: further than what a solver leaves open
-FINE = 1e-6  # the same in a valley that is rugged
+FINE_STEP = 1e-6  # the same in a valley that is rugged
 SHORT = 1e-3  # scales: a step too short to tell derivatives from what the FMU's solver leaves open
 FADED = 1e-6  # of a column's sum of squares: what may come after its end
 PARTS = 24  # of the residual, in which ends are counted

@@ -7,7 +7,7 @@ import numpy as np
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 
-REACH, STEPS = 0.05, 25  # of the length that is fitted, to either side, and steps there
+REACH, REACH_STEPS = 0.05, 25  # of the length that is fitted, to either side, and steps there
 
 
 def begins(h: Hypothesis) -> list[str]:
@@ -17,7 +17,7 @@ def begins(h: Hypothesis) -> list[str]:
 
 def moments_near(now: float, length: float) -> list[float]:
     """Moments within reach of one, in order, none outside of the length that is fitted, s."""
-    grid = now + REACH * length * np.arange(-STEPS, STEPS + 1) / STEPS
+    grid = now + REACH * length * np.arange(-REACH_STEPS, REACH_STEPS + 1) / REACH_STEPS
     return [float(t) for t in np.unique(np.clip(grid, 0.0, length))]
 
 

@@ -19,13 +19,13 @@ from fmus.effects.parameter_effect import ParameterEffect
 from fmus.effects.site import Site
 from fmus.variables import Parameter, Variable
 
-FINE = 0.1  # of a shape parameter's value: a change of it that matters
+SHAPE_CHANGE = 0.1  # of a shape parameter's value: a change of it that matters
 
 
-LARGEST = 200.0  # realistic sizes of a parameter's change: ten times the parameter
+LARGEST_CHANGE = 200.0  # realistic sizes of a parameter's change: ten times the parameter
 
 
-NEAR = 0.2  # of its start: a calibrated parameter is within it
+NEAR_START = 0.2  # of its start: a calibrated parameter is within it
 
 
 MOMENT = 0.01  # of the record's length, the same for a time
@@ -106,9 +106,9 @@ def _of_a_parameter(
 
 def _limited(change: Unknown, of: Variable) -> Unknown:
     """A change that leaves a parameter within its limits, wherever near its start it may be."""
-    value, most = of.start or 0.0, LARGEST * change.scale
-    low = -np.inf if of.min is None else of.min - value - NEAR * abs(value)
-    high = np.inf if of.max is None else of.max - value + NEAR * abs(value)
+    value, most = of.start or 0.0, LARGEST_CHANGE * change.scale
+    low = -np.inf if of.min is None else of.min - value - NEAR_START * abs(value)
+    high = np.inf if of.max is None else of.max - value + NEAR_START * abs(value)
     return replace(change, low=max(low, -most), high=min(high, most))
 
 
@@ -126,7 +126,12 @@ def _candidate(
     free = {n: v for n, v in shape.items() if n not in fixed}
     others = tuple(
         _unknown(
-            effect, location, n, declared[n], v, MOMENT * length if n == "t0" else FINE * (abs(v) or 1.0)
+            effect,
+            location,
+            n,
+            declared[n],
+            v,
+            MOMENT * length if n == "t0" else SHAPE_CHANGE * (abs(v) or 1.0),
         )
         for n, v in free.items()
     )

@@ -14,7 +14,7 @@ from fmus.effects.free_form import FreeForm
 PIECES = 10  # of the identify part, each left out in turn
 
 
-RIDGE = 1e-3  # of the splines' mean square: controls that nothing visits stay at zero
+SPLINE_RIDGE = 1e-3  # of the splines' mean square: controls that nothing visits stay at zero
 
 
 FREE_FORMS: dict[str, type[FreeForm]] = {k: e for k, e in EFFECTS.items() if issubclass(e, FreeForm)}
@@ -59,7 +59,7 @@ def _dependences(problem: Problem, forces: Sequence[MissingForce]) -> Iterator[D
     for kind, at in offered(problem, forces):
         law, m = FREE_FORMS[kind], at_port[at]
         for shape in law.guesses(m.t - m.t[0], m.displacement, m.velocity, m.force):
-            weight = 1 / np.maximum(m.std, LEAST * np.median(m.std) + 1e-300)
+            weight = 1 / np.maximum(m.std, LEAST_STD * np.median(m.std) + 1e-300)
             splines = law.splines(shape, m.displacement, m.velocity) * weight[:, None]
             yield Dependence(kind, at, law.against, left_out(splines, m.force * weight), shape)
 
@@ -72,7 +72,7 @@ def left_out(columns: Array, y: Array) -> float:
     pieces = np.array_split(np.arange(len(y)), PIECES)
     grams = np.array([columns[p].T @ columns[p] for p in pieces])
     along = np.array([columns[p].T @ y[p] for p in pieces])
-    ridge = (RIDGE * np.mean(np.diag(grams.sum(axis=0))) + 1e-300) * np.eye(columns.shape[1])
+    ridge = (SPLINE_RIDGE * np.mean(np.diag(grams.sum(axis=0))) + 1e-300) * np.eye(columns.shape[1])
     rest = 0.0
     for i, p in enumerate(pieces):
         seen = np.linalg.solve(grams.sum(axis=0) - grams[i] + ridge, along.sum(axis=0) - along[i])
@@ -80,4 +80,4 @@ def left_out(columns: Array, y: Array) -> float:
     return 1 - rest / (float(y @ y) + 1e-300)
 
 
-LEAST = 1e-3  # of the median standard deviation of a missing force: it is nowhere known better
+LEAST_STD = 1e-3  # of the median standard deviation of a missing force: it is nowhere known better

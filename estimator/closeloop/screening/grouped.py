@@ -14,7 +14,7 @@ from estimator.record import Array
 
 GROUPS = (5, 3)  # numbers of samples that may be one, odd so that there is one in the middle
 LOST = 0.01  # of an output's variance within a group: the most that it may be
-ENOUGH = 6000  # groups on the identify part
+ENOUGH_GROUPS = 6000  # groups on the identify part
 
 
 def group_size(problem: Problem, simulated: Array) -> int:
@@ -33,7 +33,7 @@ def group_size(problem: Problem, simulated: Array) -> int:
         if np.any(inside % n):
             continue
         groups = y[: len(y) // n * n].reshape(-1, n, y.shape[1])
-        if len(groups) >= ENOUGH and np.all(groups.var(axis=1).mean(axis=0) <= LOST * y.var(axis=0)):
+        if len(groups) >= ENOUGH_GROUPS and np.all(groups.var(axis=1).mean(axis=0) <= LOST * y.var(axis=0)):
             return n
     return 1
 

@@ -17,7 +17,7 @@ from fmus.effects.site import CLOCK, WAY
 from fmus.export.around.outside import Around, runge_kutta
 from fmus.variables import Expr
 
-FINE = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
+LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
 ROUNDING, MOST = 1e-6, 100  # of a step; and the most steps between two samples
 
 
@@ -57,7 +57,7 @@ def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
     step, seen = _step(made)
     start = np.array([s.start for s in made.states])
     w = np.array([(m if i == 0 else z)[row] for i, row in seen])
-    n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / FINE - ROUNDING)))
+    n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / LONGEST_STEP - ROUNDING)))
     at = np.arange((len(course.t) - 1) * n + 1) / n
     t, w = (_between(at, rows) for rows in (course.t[None, :], w))
     run = step.mapaccum(len(at) - 1)(start, w[:, :-1], w[:, 1:], np.diff(t))

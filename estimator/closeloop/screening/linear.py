@@ -11,10 +11,10 @@ from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
 from estimator.record import Array
 
-POINTS = 200  # at most this many linearisations along the run
+LINEARISATIONS = 200  # at most this many linearisations along the run
 PROBES = 5  # samples at which a restart is compared with the free run
 HIDDEN = 1e-3  # of a state's largest step: a restart that differs more has lost a state
-NUDGE = 1e-4  # of a lever's size
+LEVER_NUDGE = 1e-4  # of a lever's size
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def linearise(
     """
     record, run = problem.record, problem.record.runs[0]
     plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
-    index = np.unique(np.linspace(0, len(keep) - 2, min(POINTS, len(keep) - 1)).astype(int))
+    index = np.unique(np.linspace(0, len(keep) - 2, min(LINEARISATIONS, len(keep) - 1)).astype(int))
     start = problem.start(theta)
     nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))
     parts: list[tuple[Array, Array, Array, Array]] = []
@@ -86,7 +86,7 @@ def linearise(
         c = np.column_stack([(y1 - y0) / d for (_, y1), d in zip(columns, size, strict=True)])
         b, e = np.empty((len(x0), len(levers))), np.empty((len(y0), len(levers)))
         for i, name in enumerate(levers):
-            h = NUDGE * _size(problem, name, given)
+            h = LEVER_NUDGE * _size(problem, name, given)
             x1, y1 = plant.response(x[here], {**given, name: _value(problem, name, given) + h}, dt)
             b[:, i], e[:, i] = (x1 - x0) / h, (y1 - y0) / h
         parts.append((a, b, c, e))
@@ -102,7 +102,7 @@ def _size(problem: Problem, name: str, given: Mapping[str, float]) -> float:
     """Size of a lever, away from its limit above."""
     v = problem.plant.fmu.description.variables[name]
     size = abs(_value(problem, name, given)) or v.nominal or 1.0
-    at_the_top = v.max is not None and _value(problem, name, given) + NUDGE * size > v.max
+    at_the_top = v.max is not None and _value(problem, name, given) + LEVER_NUDGE * size > v.max
     return -size if at_the_top else size
 
 
@@ -123,7 +123,7 @@ def influences(
     n_y, a, c = len(plant.outputs), local.A[near[:-1]], local.C[near]
     before = plant.simulate(run, start, plant.states)[keep]
     for name in (n for n in levers if n not in found):
-        h = NUDGE * _size(problem, name, start)
+        h = LEVER_NUDGE * _size(problem, name, start)
         after = plant.simulate(run, {**start, name: _value(problem, name, start) + h}, plant.states)[keep]
         dy, dx = np.split((after - before) / h, (n_y,), axis=1)
         steps = dx[1:] - np.einsum("kmn,kn->km", a, dx[:-1])

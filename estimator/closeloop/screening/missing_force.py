@@ -16,7 +16,7 @@ from estimator.closeloop.screening.smoothing import smooth
 from estimator.record import Array
 from fmus.host.description import PortNames
 
-SAMPLES = 4000  # at most this many are smoothed
+SMOOTHED_SAMPLES = 4000  # at most this many are smoothed
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     names = [name for p in problem.ports for name in (p.displacement, p.velocity)]
     [full, *_] = problem.simulate(theta, (*plant.states, *names))
     last = int(np.flatnonzero(run.fit)[-1]) + 1
-    keep = np.arange(0, last, max(1, -(-last // SAMPLES)))
+    keep = np.arange(0, last, max(1, -(-last // SMOOTHED_SAMPLES)))
     n_y, n = len(plant.outputs), len(plant.states)
     y, x, motion = np.split(full, (n_y, n_y + n), axis=1)
     if not shows_its_state(problem, theta, x[:last]):

@@ -14,10 +14,10 @@ from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.screening.screen import Screening, screen
 
-FIRST = 0.1  # of the length that is fitted: between the moments that were tried before
+FIRST_SPACING = 0.1  # of the length that is fitted: between the moments that were tried before
 
 
-ROUNDS, STEPS = 2, 6  # grids, and their points on either side
+GRIDS, GRID_STEPS = 2, 6  # grids, and their points on either side
 
 
 def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise], most: int) -> list[Promise]:
@@ -30,15 +30,15 @@ def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise]
         if moment(p.candidates[0]) is not None:
             leading.setdefault(p.label, p)
     best = dict(list(leading.items())[:most])
-    spacing = screening.length * FIRST
-    for _ in range(ROUNDS):
+    spacing = screening.length * FIRST_SPACING
+    for _ in range(GRIDS):
         tried = [c for p in best.values() for c in _near(p.candidates[0], spacing)]
         change = screening.changes(tried)
         found = screen(fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
         for p in reversed(found):
             if p.gain > best[p.label].gain:
                 best[p.label] = p
-        spacing /= STEPS
+        spacing /= GRID_STEPS
     rest = [p for p in promises if p is not leading.get(p.label) or p.label not in best]
     return sorted([*rest, *best.values()], key=lambda p: -p.gain)
 
@@ -46,5 +46,5 @@ def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise]
 def _near(c: Candidate, spacing: float) -> list[Candidate]:
     """The candidate setting in a little earlier and later, within a spacing on either side."""
     here = moment(c) or 0.0
-    times = here + spacing * np.arange(1 - STEPS, STEPS) / STEPS
+    times = here + spacing * np.arange(1 - GRID_STEPS, GRID_STEPS) / GRID_STEPS
     return [set_in(c, float(t)) for t in times if t > 0 and t != here]

@@ -12,7 +12,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 from fmus.host.description import PortNames
 
-POINTS = 24  # in time, over the identify part
+PUSHES = 24  # in time, over the identify part
 DAMPING = 1e-3  # of the largest response: keeps points that nothing shows at zero
 
 
@@ -24,12 +24,12 @@ def pushed(
     start = problem.start(theta)
     base = problem.plant.simulate(run, start)
     size = problem.plant.fmu.description.variables[port.force].nominal or 1.0
-    knots = np.linspace(run.t[0], run.t[-1], POINTS)
-    hats = np.array([np.interp(run.t, knots, row) for row in np.eye(POINTS)])  # (POINTS, n)
+    knots = np.linspace(run.t[0], run.t[-1], PUSHES)
+    hats = np.array([np.interp(run.t, knots, row) for row in np.eye(PUSHES)])  # (PUSHES, n)
     answers = [problem.plant.simulate(run, start, push={port.force: size * hat}) - base for hat in hats]
     g = np.stack([(a / noise).ravel() for a in answers], axis=1)
     scale = np.linalg.norm(g, axis=0).max() + 1e-300
-    normal = g.T @ g + (DAMPING * scale) ** 2 * np.eye(POINTS)
+    normal = g.T @ g + (DAMPING * scale) ** 2 * np.eye(PUSHES)
     sizes = np.linalg.solve(normal, g.T @ (residual / noise).ravel())
     deviation = np.sqrt(np.diag(np.linalg.inv(normal)))
     return size * (sizes @ hats), size * (deviation @ hats)

@@ -12,7 +12,8 @@ from estimator.record import Array
 
 Changes = Sequence[tuple[Candidate, Array]]  # of the weighted residual (m, k) by a candidate's amplitudes
 NOTHING = 1e-6  # of a regressor's length left after projection: it says nothing new
-TOGETHER = 64  # columns that are worked on at once: hundreds of long ones do not fit into memory twice
+RIDGE = 1e-9  # of a regressor's square, in normal equations
+COLUMNS_AT_ONCE = 64  # columns that are worked on at once: hundreds of long ones do not fit into memory twice
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def batches(change: Changes) -> Iterator[tuple[slice, Array]]:
     for _, g in change:
         held.append(g)
         width += g.shape[1]
-        if width >= TOGETHER:
+        if width >= COLUMNS_AT_ONCE:
             yield slice(first, first + width), np.hstack(held)
             first, held, width = first + width, [], 0
     if held:

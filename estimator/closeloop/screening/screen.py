@@ -33,16 +33,16 @@ from estimator.sensor_faults.sensor_faults import faulty
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 
-NOTHING = 1e-9  # of a regressor left after projection: it says nothing new
+USABLE = 1e-9  # of a regressor left after projection: it says nothing new
 
 
-ALIKE = 1e-2  # of a regressor's length: of two that differ by less each gets half
+NEARLY_PARALLEL = 1e-2  # of a regressor's length: of two that differ by less each gets half
 
 
 TRUSTED = 5.0  # scales from which a linear answer is not trusted further
 
 
-TOGETHER = 128  # changes whose responses are worked out at once
+CHANGES_AT_ONCE = 128  # changes whose responses are worked out at once
 
 
 RUNAWAY = 1e9  # times what counts as one: no answer of a linear picture that holds
@@ -130,8 +130,8 @@ class Screening:
         local, levers = self._linearised(names_of(moved), self._states)
         fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size[:, None]
         found: list[Array] = []
-        for i in range(0, len(moved), TOGETHER):
-            some = moved[i : i + TOGETHER]
+        for i in range(0, len(moved), CHANGES_AT_ONCE):
+            some = moved[i : i + CHANGES_AT_ONCE]
             with np.errstate(over="ignore", invalid="ignore"):
                 y = responses(local, levers, some, len(self._at))[fit]
                 columns = (y * scale).reshape(-1, y.shape[2]).T
@@ -199,7 +199,7 @@ def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:
     if not g.shape[1]:
         return np.zeros(0)
     size = np.linalg.norm(g, axis=0)
-    q, triangle = np.linalg.qr(np.vstack([g / size, ALIKE * np.eye(len(size))]))
+    q, triangle = np.linalg.qr(np.vstack([g / size, NEARLY_PARALLEL * np.eye(len(size))]))
     whole = np.concatenate([r, np.zeros(len(size))])
     found = lsq_linear(triangle, q.T @ whole, (low * size, high * size), method="bvls")
     return np.asarray(found.x / size)
@@ -212,7 +212,7 @@ def _promise(
     r = base.residual - basis @ (basis.T @ base.residual)
     amplitudes = [u for c in candidates for u in c.amplitudes]
     size, left = np.linalg.norm(raw, axis=0) + 1e-300, np.linalg.norm(g, axis=0)
-    usable = left > NOTHING * size
+    usable = left > USABLE * size
     low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
     beta = np.zeros(len(amplitudes))
     beta[usable] = _bounded(g[:, usable], -r, low[usable], high[usable])

@@ -42,12 +42,12 @@ PLACES = 2  # ports of the effects that came nearest
 BOUND = 3.0  # times the largest missing force: more than that no curve has
 
 
-GRID = 200  # points of a curve
+CURVE_POINTS = 200  # points of a curve
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A fitted force of free form on a port: what it is over, force, its standard error, (GRID,) each, SI."""
+    """A fitted force of free form on a port over a quantity x, with its standard error, (n,) each, SI."""
 
     kind: str
     location: str
@@ -126,7 +126,7 @@ def curve_of(h: Hypothesis) -> Curve:
     c = next(c for c in h.candidates if c.kind in FREE_FORMS)
     law, prefix = FREE_FORMS[c.kind], c.prefix
     shape = {n.removeprefix(prefix): v for n, v in c.fixed.items()}
-    x = law.span(shape, GRID)
+    x = law.span(shape, CURVE_POINTS)
     splines = law.splines(shape, *law.motion(x))
     names = [u.name for u in h.fit.unknowns]
     i = [names.index(u.name) for u in c.amplitudes]

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 from joblib import Parallel, delayed
 
-from estimator.closeloop.fitting.fit import NEAR, fit
+from estimator.closeloop.fitting.fit import NEAR_NOISE, fit
 from estimator.closeloop.fitting.fitter import Fitter, from_there, hypothesis, together
-from estimator.closeloop.fitting.slopes import FINE
+from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost, mean_square
 from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.promise import Promise
@@ -24,7 +24,7 @@ from estimator.record import Array
 Parts = tuple[tuple[float, int], ...]  # shares of the identify part, and evaluations of a fit to it
 FIRST: Parts = ((0.125, 8), (0.25, 6))
 THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
-SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
+GROWN_SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
 
 
 def from_the_beginning(
@@ -63,16 +63,16 @@ def from_the_beginning(
     rugged = [
         h
         for h in best[: limits.grown_refined]
-        if mean_square(h) > NEAR and cost(h) < limits.grown_rival * cost(best[0])
+        if mean_square(h) > NEAR_NOISE and cost(h) < limits.grown_rival * cost(best[0])
     ]
-    return best_by_label([*best, *fitter.finished(from_there(rugged), step=FINE)])
+    return best_by_label([*best, *fitter.finished(from_there(rugged), step=FINE_STEP)])
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
     """Of the promises of one label those that are fitted; what sets in later does so from nothing."""
     best = promises[0]
     if moment(best.candidates[0]) is None:
-        return promises[:SHAPES]
+        return promises[:GROWN_SHAPES]
     off = {u.name: 0.0 for u in best.candidates[0].amplitudes}
     return [replace(best, start={**best.start, **off})]
 

@@ -22,13 +22,13 @@ from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
 
 EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
-BLOCKS = 50  # of the identify part whose residuals are compared
-ALIKE = 1.5  # times the smallest residual before a moment: as good, and from more of the record
+ONSET_BLOCKS = 50  # of the identify part whose residuals are compared
+AS_GOOD = 1.5  # times the smallest residual before a moment: as good, and from more of the record
 AFTER = 0.05  # of the identify part: what is looked at after the moment
 LONGER = 2.0  # times that in the short fits
-TRIES = 7  # evaluations of a short fit
+SHORT_FIT = 7  # evaluations of a short fit
 GENTLE = 0.3  # of the amplitudes that the linear picture asks for: the other start of these fits
-GRID = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
+ABOUT = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
 
 
 def onset(baseline: Baseline, times: float) -> tuple[float, Fit] | None:
@@ -42,19 +42,19 @@ def onset(baseline: Baseline, times: float) -> tuple[float, Fit] | None:
     for early in EARLY if unknowns else ():
         before = fit(problem.beginning(early), unknowns, size)
         squares = _blocks(problem, before, size)
-        if (k := grown(squares, int(early * BLOCKS), times, chance)) is not None:
-            found.append((float(np.sqrt(squares[:k]).mean()), k / BLOCKS, before))
+        if (k := grown(squares, int(early * ONSET_BLOCKS), times, chance)) is not None:
+            found.append((float(np.sqrt(squares[:k]).mean()), k / ONSET_BLOCKS, before))
     if not found:
         return None
     least = min(level for level, _, _ in found)
-    _, share, before = next(f for f in found if f[0] <= ALIKE * least)
+    _, share, before = next(f for f in found if f[0] <= AS_GOOD * least)
     return share, fit(problem.beginning(share), unknowns, size, before.theta)
 
 
 def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
-    """Mean square of the weighted residual of each block of the identify part, (BLOCKS,)."""
+    """Mean square of the weighted residual of each block of the identify part, (ONSET_BLOCKS,)."""
     residual = weighted(problem, before.theta, size).reshape(-1, len(size))
-    return np.array([float(np.mean(b**2)) for b in np.array_split(residual, BLOCKS)])
+    return np.array([float(np.mean(b**2)) for b in np.array_split(residual, ONSET_BLOCKS)])
 
 
 def grown(squares: Array, first: int, times: float, level: float) -> int | None:
@@ -84,7 +84,7 @@ def since(fitter: Fitter, at: tuple[float, Fit], candidates: Sequence[Candidate]
     held = replace(problem, declared={**problem.declared, **before.theta})
     part = held.beginning(min(1.0, share + LONGER * AFTER))
     gentle = [replace(p, start=_scaled(p, GENTLE)) for p in leading]
-    tried = fitter.asked(part).fitted([*leading, *gentle], TRIES, ())
+    tried = fitter.asked(part).fitted([*leading, *gentle], SHORT_FIT, ())
     better = [Promise(h.candidates, 0.0, {**before.theta, **h.fit.theta}) for h in tried]
     return [*better, *rest]
 
@@ -103,7 +103,7 @@ def _by_response(
     here = problem.beginning(min(1.0, share + AFTER))
     there = fit(here, before.unknowns, size, before.theta, evaluations=1)
     labels = {c.label: c for c in reversed(candidates) if moment(c) is not None}
-    tried = [set_in(c, run.fit_time(share + g / BLOCKS)) for c in labels.values() for g in GRID]
+    tried = [set_in(c, run.fit_time(share + g / ONSET_BLOCKS)) for c in labels.values() for g in ABOUT]
     screening = Screening(here, there, size)
     change = screening.changes(tried)
     found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])

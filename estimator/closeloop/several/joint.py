@@ -15,8 +15,8 @@ from estimator.closeloop.several.estimates import Estimates, widths
 from estimator.closeloop.several.part import Part
 from estimator.record import Array
 
-EVALUATIONS = 25
-NEAR = 1e-9  # of a scale: so far values stay away from their bounds
+JOINT_EVALUATIONS = 25
+OFF_BOUND = 1e-9  # of a scale: so far values stay away from their bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +87,11 @@ def fit_together(parts: Sequence[Part], held: Mapping[str, float] | None = None)
     """
     stack = _Stack(parts, held or {})
     low, high, scale = (np.array([getattr(u, k) for u in stack.unknowns]) for k in ("low", "high", "scale"))
-    x = stack.start(low + NEAR * scale, high - NEAR * scale)
+    x = stack.start(low + OFF_BOUND * scale, high - OFF_BOUND * scale)
     if stack.unknowns:
         x = least_squares(
             stack.residual, x, stack.jacobian, (low, high), x_scale=scale, xtol=1e-5, ftol=GAIN,
-            max_nfev=EVALUATIONS,
+            max_nfev=JOINT_EVALUATIONS,
         ).x  # fmt: skip
     residual, slopes = stack.residual(x), stack.jacobian(x)
     width = widths(stack.unknowns, [u for p in parts for u in (*p.chart.machine, *p.chart.run)])

@@ -30,7 +30,7 @@ from estimator.closeloop.several.part import Part
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-SHAPES = 2  # of an effect, the most promising ones of the other record, from which it is fitted there
+TRANSFERRED_SHAPES = 2  # of an effect, those most promising in the other record, that it is fitted from
 
 Status = Literal["confirmed", "agrees", "differs", "surpassed", "absent", "silent", "open", "impossible"]
 CARRIES: tuple[Status, ...] = ("confirmed", "agrees")
@@ -149,7 +149,7 @@ def _promises(a: Traced, member: Hypothesis, b: Traced, here: tuple[Candidate, .
     if len(here) == 1:
         machine = values_of(member)
         suggested = [p for p in b.found.promises if p.label == here[0].label]
-        for p in suggested[:SHAPES]:
+        for p in suggested[:TRANSFERRED_SHAPES]:
             made = chart(p.candidates)
             known = {u.name: machine[u.name] for u in made.machine if u.name in machine}
             start = made.native({**made.turned(p.start), **known})
