@@ -17,6 +17,7 @@ from benchmarks.challenge.bench import (
 from benchmarks.challenge.draw import Plan
 from benchmarks.challenge.menu import OUTPUTS
 from benchmarks.challenge.truth import Item, Truth
+from estimator.sensor_faults import FAULTS
 from tests.truth.more import More, made
 from tests.truth.rig import measured
 from tests.truth.rig_effects import SensorFault
@@ -98,8 +99,8 @@ def settled(kind: str, location: str, sizes: dict[str, Any], here: Bench) -> dic
         worse = CONDITIONS[WORSE[int(found.pop("condition")) - 1]]
         now = {n: here.true.get(n, getattr(Wheelset(), n)) for n in FRICTION}
         found |= {f"delta_{n}": v - now[n] for n, v in zip(FRICTION, worse, strict=True)}
-    if kind in ("sensor_bias", "sensor_drift"):
-        part = here.noise[location] / (float(here.t[-1]) if kind == "sensor_drift" else 1.0)
+    if kind in FAULTS and "{}" in FAULTS[kind].unit:  # in multiples of the noise, by the end of the record
+        part = here.noise[location] / (float(here.t[-1]) if FAULTS[kind].unit == "{}/s" else 1.0)
         found = {name: value * part for name, value in found.items()}
     return found
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from estimator.sensor_faults import FAULTS
+
 Pair = tuple[str, str]  # kind, location
 Scalars = Mapping[str, float | list[float] | str]
 
@@ -31,7 +33,7 @@ class Item:
     @property
     def is_fault(self) -> bool:
         """A fault of a sensor."""
-        return self.kind.startswith("sensor_")
+        return self.kind in FAULTS
 
 
 @dataclass(frozen=True)

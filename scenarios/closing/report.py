@@ -11,7 +11,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.search.free_form import curve_of
-from estimator.sensor_faults.sensor_faults import KINDS
+from estimator.sensor_faults import FAULTS
 from fmus.host.archive import describe
 from scenarios.closing.figures.channels import record_plots, residual_plots, spectrum_plots
 from scenarios.closing.figures.errors import error_plot
@@ -121,7 +121,7 @@ def _rejection(case: Case) -> Values:
         "black_box": case.diagnostics.black_box if case.diagnostics else None,
         "power": power_rows(case),
         "tried": [(at, ", ".join(map(effect_words, kinds))) for at, kinds in tried(case.problem).items()],
-        "faults": ", ".join(map(effect_words, KINDS)),
+        "faults": ", ".join(map(effect_words, FAULTS)),
         "known_noise": not any(c["noise"].endswith("(estimated)") for c in sections.channels(case)),
     }
 

@@ -20,6 +20,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.regressors import is_wave
 from estimator.closeloop.search.free_form import curve_of
 from estimator.record import Array
+from estimator.sensor_faults import FAULTS
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.host.archive import describe
 
@@ -215,7 +216,7 @@ def effects_of(h: Hypothesis) -> list[Effect]:
 def _parameters(h: Hypothesis, c: Candidate) -> dict[str, Figure]:
     prefix = c.prefix
     if c.is_fault:
-        return {c.kind.removeprefix("sensor_"): _figure(h, c.amplitudes[0].name)}
+        return {FAULTS[c.kind].parameter: _figure(h, c.amplitudes[0].name)}
     found = {u.name.removeprefix(prefix): _figure(h, u.name) for u in c.unknowns}
     if is_wave(c):  # the size of sine and cosine together is what an engineer asks for
         names = [u.name for u in h.fit.unknowns]

@@ -18,7 +18,7 @@ from estimator.closeloop.screening.pushes import pushed
 from estimator.closeloop.screening.screen import screen
 from estimator.noise import correlation_time, noise_floor
 from estimator.record import Record, Run
-from estimator.sensor_faults import sensor_faults as sensors
+from estimator.sensor_faults import FAULTS, faulty
 from fmus.drive.model import Drive
 from fmus.effects.spectrum import orders
 from fmus.export.around.outside import around
@@ -189,10 +189,10 @@ def test_a_healthy_sensor_changes_nothing_and_faults_do_what_they_say(
 ) -> None:
     t = np.linspace(0, 10, 1001)
     y = np.column_stack([3 * t, np.ones_like(t)])
-    none = {sensors.parameter(k, "a"): 0.0 for k in sensors.KINDS}
-    assert np.array_equal(sensors.faulty(y, t, ("a", "b"), none), y)
-    values = dict(zip(sensors.KINDS, (bias, gain, delay, drift), strict=True))
-    shown = sensors.faulty(y, t, ("a", "b"), {sensors.parameter(k, "a"): v for k, v in values.items()})
+    names = [f"sensor_{name}_a" for name in ("bias", "gain", "delay", "drift")]
+    assert [fault.name_at("a") for fault in FAULTS.values()] == names
+    assert np.array_equal(faulty(y, t, ("a", "b"), dict.fromkeys(names, 0.0)), y)
+    shown = faulty(y, t, ("a", "b"), dict(zip(names, (bias, gain, delay, drift), strict=True)))
     late = 3 * np.maximum(t - delay, 0)
     assert_allclose(shown[:, 0], (1 + gain) * late + bias + drift * t, atol=1e-12)
     assert np.array_equal(shown[:, 1], y[:, 1])

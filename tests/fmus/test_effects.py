@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS, offers, parse_effect
 from fmus.effects.force_law import ForceLaw
 from fmus.effects.input_effect import InputEffect
@@ -305,7 +306,9 @@ def test_the_documentation_names_every_kind_with_its_parameters_and_source():
     text = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
     named = {*CONTRACT.split(), *FALLBACK}
-    assert set(rows) == {*named, "sensor_bias", "sensor_gain", "sensor_delay", "sensor_drift"}
+    assert set(rows) == {*named, *FAULTS}
+    for kind, fault in FAULTS.items():
+        assert f"`{fault.__doc__.strip().rstrip('.')}`" in rows[kind]
     for kind, effect in EFFECTS.items():
         law = effect.__doc__.strip().splitlines()[0].rstrip(".").replace("|", "\\|")
         assert f"`{law}`" in rows[kind]

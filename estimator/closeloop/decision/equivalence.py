@@ -8,6 +8,7 @@ from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.relations import becomes, includes, one_way
+from estimator.sensor_faults import FAULTS
 
 
 def equivalent(baseline: Baseline, best: Hypothesis, others: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -48,8 +49,7 @@ def splitting(members: Sequence[Hypothesis]) -> str:
         advice.append(f"a run in which the velocity at {where} changes its sign")
     if kinds & {"viscous_damping", "quadratic_damping"} and len(kinds) > 1:
         advice.append(f"runs at two or more clearly different speeds of {where}")
-    if any(k.startswith("sensor_") for k in kinds):
-        advice.append("a second sensor for the same quantity, or a calibration of this one at rest")
+    advice += dict.fromkeys(fault.splitting for kind, fault in FAULTS.items() if kind in kinds)
     if len(places) > 1:
         advice.append(
             f"a run that excites {where} by different amounts, for example at another load or torque"

@@ -24,6 +24,7 @@ from estimator.closeloop.screening.regressors import (
     lengths,
 )
 from estimator.record import Array
+from estimator.sensor_faults import FAULTS
 from fmus.effects.parameter_effect import SMALL
 
 POWER = 0.8
@@ -119,7 +120,7 @@ def _most(c: Candidate, u: Unknown, room: Mapping[str, float]) -> float:
 
 
 def _name(c: Candidate, u: Unknown) -> str:
-    return c.kind.removeprefix("sensor_") if c.is_fault else u.name.removeprefix(c.prefix)
+    return FAULTS[c.kind].parameter if c.is_fault else u.name.removeprefix(c.prefix)
 
 
 def _shape(c: Candidate) -> dict[str, float]:

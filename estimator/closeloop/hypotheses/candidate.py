@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from estimator.closeloop.question.problem import Unknown
-from estimator.sensor_faults import sensor_faults as sensors
+from estimator.sensor_faults import FAULTS
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Candidate:
     @property
     def is_fault(self) -> bool:
         """A fault of a sensor, not physics."""
-        return self.kind in sensors.KINDS
+        return self.kind in FAULTS
 
     @property
     def label(self) -> str:

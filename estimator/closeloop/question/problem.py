@@ -13,7 +13,7 @@ import numpy as np
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
-from estimator.sensor_faults.sensor_faults import faulty
+from estimator.sensor_faults import faulty
 from fmus.export.around.outside import Outside
 from fmus.host.description import PortNames
 

@@ -9,7 +9,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array, Record
-from estimator.sensor_faults import sensor_faults as sensors
+from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 from fmus.effects.component_effect import ComponentEffect
 from fmus.effects.effect import Effect
@@ -55,19 +55,17 @@ def physical_candidates(
 
 
 def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
-    """Bias, gain, delay and drift of each measured output."""
+    """Every fault of the sensor of each measured output."""
     found = []
     y = np.vstack([run.y for run in record.runs])
     length = max(float(run.t[-1] - run.t[0]) for run in record.runs)
     step = float(np.median(np.diff(record.runs[0].t)))
     for j, output in enumerate(record.outputs):
         spread = float(np.std(y[:, j])) + float(noise[j])
-        size = {"sensor_bias": 0.05 * spread, "sensor_gain": 0.05, "sensor_delay": 3 * step}
-        size["sensor_drift"] = 0.05 * spread / length
-        for kind in sensors.KINDS:
-            low = 0.0 if kind == "sensor_delay" else -np.inf
-            unknown = Unknown(sensors.parameter(kind, output), 0.0, low, np.inf, size[kind])
-            found.append(Candidate(kind, output, (unknown,)))
+        for fault in FAULTS.values():
+            size = fault.size(spread, length, step)
+            unknown = Unknown(fault.name_at(output), 0.0, fault.low, fault.high, size)
+            found.append(Candidate(fault.kind, output, (unknown,)))
     return found
 
 

@@ -29,7 +29,7 @@ from estimator.closeloop.screening.linear import (
 )
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array
-from estimator.sensor_faults.sensor_faults import faulty
+from estimator.sensor_faults import faulty
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 

@@ -10,14 +10,14 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
+from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 from fmus.host.archive import describe
 from fmus.host.description import FmuVariable
 from scenarios.drawing.typography import formula
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
-_COUNTED = {"force", "stop", "step", "offset", "drift", "lag", "delay", "mode", "change", "bias", "gain"}
-_FAULT_UNITS = {"sensor_gain": "1", "sensor_delay": "s", "sensor_drift": "{}/s", "sensor_bias": "{}"}
+_COUNTED = {"force", "stop", "step", "offset", "drift", "lag", "delay", "mode", "change", "gain"}
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,12 @@ class Glossary:
 
     def unit_of_fault(self, kind: str, output: str) -> str:
         """Unit of the size of a sensor's fault."""
-        return _FAULT_UNITS[kind].format(self.unit(output))
+        return FAULTS[kind].unit.format(self.unit(output))
 
     def meaning_of_parameter(self, c: Candidate, parameter: str) -> str:
         """What a parameter of a candidate is."""
         if c.is_fault:
-            return (
-                "shown minus true, over true" if c.kind == "sensor_gain" else f"{effect_words(c.kind)} of it"
-            )
+            return FAULTS[c.kind].meaning
         if parameter == "amplitude":
             return "of sine and cosine together"
         return self.meaning(f"{c.kind}_{c.location}_{parameter}")
@@ -67,20 +65,21 @@ def glossary(problem: Problem, hypotheses: Iterable[Hypothesis]) -> Glossary:
 
 def parameter_name(c: Candidate, parameter: str) -> str:
     """What a parameter of a candidate is called: the gain of a sensor is told as what it is off."""
-    return "gain − 1" if c.kind == "sensor_gain" else parameter
+    return FAULTS[c.kind].symbol if c.is_fault else parameter
 
 
 def effect_words(kind: str) -> str:
     """A kind of effect in words: Coulomb friction, periodic force."""
-    words = kind.removeprefix("sensor_").split("_") if kind.startswith("sensor_") else kind.split("_")
-    return " ".join(_PROPER.get(w, w) for w in words)
+    if kind in FAULTS:
+        return FAULTS[kind].words
+    return " ".join(_PROPER.get(w, w) for w in kind.split("_"))
 
 
 def with_article(kind: str) -> str:
     """A kind of effect as it stands in a sentence: a periodic force, Coulomb friction."""
+    if kind in FAULTS:
+        return FAULTS[kind].phrase
     words = effect_words(kind)
-    if kind == "sensor_gain":
-        return "a wrong gain"
     if words.split()[-1] not in _COUNTED:
         return words
     return f"{'an' if words[0] in 'aeiou' else 'a'} {words}"

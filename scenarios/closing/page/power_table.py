@@ -3,7 +3,7 @@
 from itertools import groupby
 
 from estimator.closeloop.diagnostics.power import Visible
-from estimator.sensor_faults.sensor_faults import KINDS
+from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 from scenarios.closing.page.case import Case
 from scenarios.closing.page.glossary import effect_words
@@ -25,7 +25,7 @@ def power_rows(case: Case) -> list[tuple[str, list[Row]]]:
     units = parameter_units(case, statement)
     return [
         (
-            capital(effect_words(kind)) + (" of a sensor" if kind in KINDS else ""),
+            capital(effect_words(kind)) + (" of a sensor" if kind in FAULTS else ""),
             [_row(v, units) for v in lines],
         )
         for kind, lines in groupby(statement, lambda v: v.kind)
