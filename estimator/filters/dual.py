@@ -6,6 +6,7 @@ is learnt only from what it does within one step, so that states which it moves 
 """
 
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -13,19 +14,23 @@ from estimator.filters.estimator import (
     NONE,
     Covariance,
     Estimate,
-    Filter,
     System,
 )
+from estimator.filters.named import Estimator, Request
+from estimator.filters.system import Joint
 from estimator.filters.ukf import USUAL, Spread, Ukf
 from estimator.record import Array
+from fmus.errors import BadInput
 
 
-class Dual:
+class Dual(Estimator):
     """Two unscented filters on one system, whose x holds n_x states and then the parameters.
 
     Contract and arguments as of `Filter`, Q and start of the whole x. The covariance between the two
     parts stays zero.
     """
+
+    name = "dual"
 
     def __init__(
         self,
@@ -44,6 +49,15 @@ class Dual:
         self._learning = _Learning(system, theta, start.x)
         self.states = Ukf(self._moving, part(start, x), self._share(x), R, dt, spread=spread)
         self.parameters = Ukf(self._learning, part(start, theta), self._share(theta), R, dt, spread=spread)
+
+    @classmethod
+    def of(cls, joint: Joint, start: Estimate, asked: Request) -> Self:
+        """See Estimator.of."""
+        if asked.gate or asked.adapt:
+            raise BadInput(
+                f"[estimate.options] gate and adapt are not for filter = '{cls.name}'; leave them out"
+            )
+        return cls(joint, len(joint.states), start, joint.noise, asked.R, asked.dt, asked.spread)
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
         """As of Filter."""
@@ -129,6 +143,3 @@ def _blocks(A: Array, B: Array) -> Array:
     both = np.zeros((n + len(B),) * 2)
     both[:n, :n], both[n:, n:] = A, B
     return both
-
-
-Filters = Filter | Dual

@@ -1,10 +1,11 @@
 """Extended Kalman filter: the system's own derivatives where it has them, else differences."""
 
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
 from estimator.filters.algebra import joseph, symmetric
+from estimator.filters.derivatives import differentiated
 from estimator.filters.estimator import (
     Adaptation,
     Covariance,
@@ -14,6 +15,8 @@ from estimator.filters.estimator import (
     System,
 )
 from estimator.filters.linear import central, slopes
+from estimator.filters.named import Estimator, Request
+from estimator.filters.system import Joint
 from estimator.record import Array, BoolArray
 
 LEAST = 1e-3  # of a value
@@ -30,8 +33,10 @@ class Differentiable(Protocol):
         """d h / dx, (m, n)."""
 
 
-class Ekf(Filter):
+class Ekf(Filter, Estimator):
     """Moves the mean through the system and the covariance through its derivatives at the mean."""
+
+    name = "ekf"
 
     def __init__(
         self,
@@ -46,6 +51,12 @@ class Ekf(Filter):
         super().__init__(system, start, Q, R, dt, gate, adapt)
         self._own = system if isinstance(system, Differentiable) else None
         self._H = np.empty((len(self.R), len(start.x)))
+
+    @classmethod
+    def of(cls, joint: Joint, start: Estimate, asked: Request) -> Self:
+        """See Estimator.of."""
+        own = differentiated(joint, asked.u, start.t, asked.dt)
+        return cls(own or joint, start, joint.noise, asked.R, asked.dt, asked.gate, asked.adapt)
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
         now = self.now

@@ -6,6 +6,7 @@ point and subtracts covariances, which may leave one that is none; where it does
 """
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints
@@ -24,6 +25,8 @@ from estimator.filters.estimator import (
     Gate,
     System,
 )
+from estimator.filters.named import Estimator, Request
+from estimator.filters.system import Joint
 from estimator.record import Array, BoolArray
 
 
@@ -46,8 +49,10 @@ class Spread:
 USUAL = Spread()
 
 
-class Ukf(Filter):
+class Ukf(Filter, Estimator):
     """Joint unscented filter of whatever the system's x holds: states, parameters, unknown inputs."""
+
+    name = "ukf"
 
     def __init__(
         self,
@@ -66,6 +71,11 @@ class Ukf(Filter):
         self._Wm, self._Wc, self._scale = weights.Wm, weights.Wc, spread.scale(n)
         self._before, self._X = (np.empty((2 * n + 1, n)) for _ in range(2))
         self._Y, self._y = np.empty((2 * n + 1, m)), np.empty(m)
+
+    @classmethod
+    def of(cls, joint: Joint, start: Estimate, asked: Request) -> Self:
+        """See Estimator.of."""
+        return cls(joint, start, joint.noise, asked.R, asked.dt, asked.gate, asked.adapt, asked.spread)
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
         now, n = self.now, len(self.names)

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.filters.derivatives import differentiated
-from estimator.filters.dual import Dual
-from estimator.filters.ekf import Ekf
+from estimator.filters import filters
 from estimator.filters.estimator import (
     Adaptation,
     Diverged,
@@ -21,12 +19,12 @@ from estimator.filters.identifiability import (
     before,
     information,
 )
+from estimator.filters.named import Request
 from estimator.filters.process_noise import LEARNT_FROM, likeliest
 from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
-from estimator.filters.ukf import Spread, Ukf
+from estimator.filters.ukf import Spread
 from estimator.record import Array
-from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.setup import Setup, finely
@@ -78,21 +76,14 @@ def find(s: Setup, archive: Archive, tell: Tell) -> Findings:
 
 def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
     """The filter that the options ask for."""
-    o, R = s.options, np.diag(s.noise**2)
-    dt = float(np.median(np.diff(s.samples.t)))
-    spread = Spread(o.alpha, o.beta, o.kappa)
-    if o.filter == "dual":
-        if o.gate or o.adapt:
-            raise BadInput("[estimate.options] gate and adapt are not for filter = 'dual'; leave them out")
-        return Dual(joint, len(joint.states), start, joint.noise, R, dt, spread)
+    o, dt = s.options, float(np.median(np.diff(s.samples.t)))
     gate = None if o.gate is None else Gate(o.gate)
     adapt = (
         Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None
     )
-    if o.filter == "ekf":
-        own = differentiated(joint, s.samples.u[0], float(s.samples.t[0]), dt)
-        return Ekf(own or joint, start, joint.noise, R, dt, gate, adapt)
-    return Ukf(joint, start, joint.noise, R, dt, gate, adapt, spread)
+    spread = Spread(o.alpha, o.beta, o.kappa)
+    asked = Request(np.diag(s.noise**2), dt, s.samples.u[0], gate, adapt, spread)
+    return filters()[o.filter].of(joint, start, asked)
 
 
 def _noise_share(s: Setup, archive: Archive) -> float:

@@ -19,11 +19,20 @@ def _interval(value: object) -> tuple[float, float]:
     return float(value[0]), float(value[1])
 
 
+def _filter(value: object) -> str:
+    from estimator.filters import filters  # they take a second to load, and few files name one
+
+    if not (isinstance(value, str) and value in filters()):
+        raise ValueError(f"must be one of {', '.join(filters())}, not {str(value)[:60]!r}")
+    return value
+
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
 Interval = Annotated[tuple[float, float], PlainValidator(_interval)]
+Filter = Annotated[str, PlainValidator(_filter)]
 
 
 class Table(BaseModel):
@@ -173,7 +182,7 @@ class Options(Table):
     declares.
     """
 
-    filter: Literal["ukf", "ekf", "dual"] = "ukf"
+    filter: Filter = "ukf"
     smooth: bool = False
     process_std: dict[str, NotNegative] = {}
     walk: dict[str, Positive] = {}

@@ -8,7 +8,9 @@ import pytest
 from scipy.stats import binomtest
 from typer.testing import CliRunner
 
+from estimator.filters import filters
 from scenarios.cli.app import app
+from scenarios.experiment.declaration import Options
 from tests.helpers.paths import ROOT
 
 DOCUMENTS = [
@@ -67,3 +69,14 @@ def test_the_readmes_package_for_other_tools_is_written(tmp_path: Path, monkeypa
     done = CliRunner().invoke(app, [command, str(ROOT / scenario), *options, "--kind", "python"])
     assert done.exit_code == 0, done.output
     assert [f.suffix for f in tmp_path.iterdir()] == [".ssp"]
+
+
+@pytest.mark.parametrize(
+    ("page", "line"),
+    [("estimate.md", r"^\| `filter` \|(.*)$"), ("experiment.md", r"^filter = (.*)$")],
+)
+def test_the_key_filter_is_documented_with_every_filter_and_the_default_first(page: str, line: str) -> None:
+    [said] = re.findall(line, (ROOT / "docs" / page).read_text(encoding="utf-8"), re.M)
+    first, *others = re.findall(r'"(\w+)"', said)
+    assert first == Options().filter
+    assert {first, *others} == set(filters())

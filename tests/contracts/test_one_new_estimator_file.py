@@ -54,6 +54,30 @@ SCREENED = """
     print(*(c.label for c in faults), best.label, best.start["sensor_square_q_dot"])
 """
 
+DEAF = '''
+"""An unscented filter that hears nothing."""
+
+from estimator.filters.ukf import Ukf
+
+
+class Deaf(Ukf):
+    """It predicts and corrects nothing."""
+
+    name = "deaf"
+
+    def _correct(self, x, P, used, innovation, S, R):
+        return x, P
+'''
+OPTIONS = """
+[estimate]
+rate = 20.0
+parameters.M = {{start = 85.0, std = 5.0, bounds = [70.0, 120.0]}}
+[estimate.options]
+filter = "{name}"
+process_std = {{q = 1e-4, q_dot = 1e-3}}
+input_parts = 1
+"""
+
 
 @pytest.fixture
 def mine(tmp_path):
@@ -106,3 +130,37 @@ def test_a_sensor_fault_that_cannot_be_used_is_refused_in_one_line(mine, text, w
     said = mine.refused("close-loop", "nothing.toml", "--out", "out")
     assert words in said
     assert re.search("sensor_faults.square", said)
+
+
+def asks_for(folder, name):
+    """An experiment that estimates a mass of 95 kg, believed to be 85 kg, with the filter of that name."""
+    file = write(folder, f"by_{name}", record(to_and_fro(), lambda t, q, v: 0.0, 3)) / "experiment.toml"
+    kept = file.read_text().replace("M = 95.0\n", "").replace("[calibrate]\nM = [80.0, 110.0]\n", "")
+    file.write_text(kept + OPTIONS.format(name=name))
+    return str(file)
+
+
+def test_a_filter_is_one_file(mine):
+    mine.write("estimator/filters/deaf.py", DEAF)
+    files = [asks_for(mine.work, name) for name in ("deaf", "ukf")]
+    estimates = """
+        import sys
+        from scenarios import estimate
+        for file in sys.argv[1:]:
+            result = estimate(file)
+            print(result.filter, result.estimated["M"]["value"])
+    """
+    found = dict(line.split() for line in mine.says(estimates, *files).splitlines())
+    assert float(found["deaf"]) == pytest.approx(85.0, rel=1e-12)
+    assert float(found["ukf"]) == pytest.approx(95.0, abs=0.5)  # kg, five standard errors
+
+
+def test_a_filter_of_ones_own_is_offered_where_another_name_is_wrong(mine):
+    mine.write("estimator/filters/deaf.py", DEAF)
+    said = mine.refused("estimate", asks_for(mine.work, "def"), "--out", "out")
+    assert "key 'estimate.options.filter' must be one of dual, ekf, ukf, deaf, not 'def'" in said
+
+
+def test_a_filter_without_a_name_of_its_own_is_refused_in_one_line(mine):
+    mine.write("estimator/filters/deaf.py", DEAF.replace("    name =", "    nam ="))
+    assert "'ukf' is also in" in mine.refused("estimate", asks_for(mine.work, "ukf"), "--out", "out")

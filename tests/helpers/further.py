@@ -44,9 +44,9 @@ class Further:
         assert len(done.stderr.splitlines()) == 1, done.stderr
         return done.stderr
 
-    def says(self, script: str) -> str:
+    def says(self, script: str, *arguments: str) -> str:
         """What a Python script prints, which must succeed."""
-        done = self.python("-c", dedent(script))
+        done = self.python("-c", dedent(script), *arguments)
         assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 

@@ -170,7 +170,7 @@ alarms.mu = {above = 0.5, probability = 0.9}
 
 BAD_OPTIONS = [
     ("fliter = 'ekf'", "key 'estimate.options.fliter' is not known; did you mean 'filter'?"),
-    ("filter = 'kf'", "key 'estimate.options.filter' must be one of ukf, ekf, dual, not 'kf'"),
+    ("filter = 'kf'", "key 'estimate.options.filter' must be one of dual, ekf, ukf, not 'kf'"),
     ("alarms.mu = {abov = 1.0}", "key 'estimate.options.alarms.mu.abov' is not known; did you mean 'above'?"),
     ("alarms.mu = {}", "[estimate.options.alarms.mu] needs 'below' or 'above'"),
     ("alarms.mu0 = {below = 0.1}", "[estimate.options] alarms 'mu0' is not estimated; did you mean 'mu'?"),
