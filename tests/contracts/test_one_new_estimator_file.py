@@ -47,9 +47,9 @@ SCREENED = """
     [run] = made.runs
     run.y[:, 1] += 0.5 * run.y[:, 1] ** 2
     asked = problem(ModelBuilder("drive", Path("drive")), made)
-    _, base, size = calibrate(asked)
+    _, base, noise = calibrate(asked)
     faults = fault_candidates(made, NOISE)
-    screening = Screening(asked, base.fit, size)
+    screening = Screening(asked, base.fit, noise.scale)
     best = screen(screening.fit, [((c,), g) for c, g in zip(faults, screening.changes(faults))])[0]
     print(*(c.label for c in faults), best.label, best.start["sensor_square_q_dot"])
 """
