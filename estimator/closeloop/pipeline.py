@@ -44,13 +44,13 @@ def trace(
     fitter: makes what fits hypotheses beside a baseline in so many processes.
     """
     progress = Progress(tell)
-    found = _Chain(problem, progress, jobs, seed, stages, fitter).run()
+    found = Chain(problem, progress, jobs, seed, stages, fitter).run()
     progress.end()
     return replace(found, seconds=progress.seconds)
 
 
 @dataclass(frozen=True)
-class _Chain:
+class Chain:
     """One run of the chain; see `trace`."""
 
     problem: Problem

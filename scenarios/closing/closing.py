@@ -14,6 +14,7 @@ from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.pipeline import trace
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
@@ -90,7 +91,8 @@ def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> St
     if folder is None:
         return Stages()
     files = [e.file, *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
-    stages = Stages(folder / STAGES, " ".join([version("railfmi"), str(seed), *map(checksum, files)]))
+    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files)]
+    stages = Stages(folder / STAGES, " ".join(key))
     if not resume:
         stages.forget()
     return stages

@@ -1,0 +1,75 @@
+"""Results stay as they are kept, and a verdict follows from nothing but its checks and the policy."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from estimator.closeloop.evidence import Check, verdict_of
+from estimator.closeloop.policy import DEFAULT
+from scenarios import close_loop
+from scenarios.closing.result import Result
+from tests.golden.kept import CHALLENGE, FOLDER, challenge_record, figures, read
+
+KEPT = sorted(file.stem for file in FOLDER.glob("*.json"))
+DECISION = DEFAULT.decision
+LIMITS = {  # of the checks whose limit is one of the policy
+    "the residual is more than noise": DEFAULT.detection.level,
+    "the outputs move out of their noise": DECISION.excited,
+    "the size is clear of zero": DECISION.significant,
+    "better than without it on the part to choose": DECISION.telling,
+    "share of the variance taken away": DECISION.explained,
+    "better than without it on the test part": DECISION.telling,
+}
+
+AT_MOST = {  # all others have to reach their limit
+    "the residual is more than noise",  # a probability
+    "every sensor moves",
+    "outputs left above their noise",
+    "nothing richer gains on the part to identify",
+    "the force follows the law",
+    "alternatives that this record does not tell apart",
+    "effects that are needed",
+    "faults of sensors among them",
+}
+
+
+def alike(found: Any, kept: Any, at: str = "") -> None:
+    """The same but for what other compilers and libraries round differently."""
+    if isinstance(kept, dict):
+        assert found.keys() == kept.keys(), at
+        for key in kept:
+            alike(found[key], kept[key], f"{at}.{key}")
+    elif isinstance(kept, list):
+        assert len(found) == len(kept), at
+        for i, (a, b) in enumerate(zip(found, kept, strict=True)):
+            alike(a, b, f"{at}[{i}]")
+    elif isinstance(kept, float):
+        assert found == pytest.approx(kept, rel=1e-4, abs=1e-9), at
+    else:
+        assert found == kept, at
+
+
+def test_the_demo_is_as_it_is_kept(demo: tuple[Result, Path]) -> None:
+    alike(figures(demo[0]), read("demo"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", CHALLENGE)
+def test_records_of_the_challenge_are_as_they_are_kept(index: int, tmp_path: Path) -> None:
+    alike(figures(close_loop(challenge_record(index, tmp_path), jobs=1)), read(f"challenge-{index}"))
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_the_verdict_replays_from_the_decision_and_the_policy(name: str) -> None:
+    kept = read(name)
+    assert kept["policy"] == DEFAULT.version
+    checks = []
+    for c in kept["decision"]:
+        value = float("inf") if c["value"] is None else c["value"]
+        limit = LIMITS.get(c["check"], c["limit"])
+        assert c["limit"] == limit
+        passed = value <= limit if c["check"] in AT_MOST else value >= limit
+        checks.append(Check(c["check"], value, limit, passed))
+    assert [c.passed for c in checks] == [c["passed"] for c in kept["decision"]]
+    assert verdict_of(checks) == kept["verdict"]

@@ -1,0 +1,43 @@
+"""Results that are kept in the tree: what a change of the code must not change without a word."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from benchmarks.challenge.draw import plans
+from benchmarks.challenge.make import make
+from scenarios.closing.result import Result
+
+FOLDER = Path(__file__).parent
+SEED, COUNT = 20, 24  # of the challenge that the records are from
+CHALLENGE = (7, 12, 15, 20)  # a sensor's fault, a class of two, an effect, and nothing
+
+
+def challenge_record(index: int, work: Path) -> Path:
+    """The folder of a record of the challenge."""
+    plan = plans(SEED, COUNT)[index]
+    make(plan, SEED, work / "records", work / "truth")
+    return work / "records" / plan.name
+
+
+def figures(result: Result) -> dict[str, Any]:
+    """What is kept of a result: the answer with what it was decided by, and what was calibrated."""
+    effects = [{"kind": e.kind, "location": e.location, **e.parameters} for e in result.effects]
+    checks = [{key: c[key] for key in ("check", "value", "limit", "passed")} for c in result.decision]
+    kept = {
+        "verdict": result.verdict, "policy": result.policy, "decision": checks, "effects": effects,
+        "calibrated": result.calibrated, "error": result.error,
+    }  # fmt: skip
+    told: dict[str, Any] = json.loads(json.dumps(kept))
+    return told
+
+
+def write(name: str, result: Result) -> None:
+    """Keep a result."""
+    (FOLDER / f"{name}.json").write_text(json.dumps(figures(result), indent=1) + "\n", encoding="utf-8")
+
+
+def read(name: str) -> dict[str, Any]:
+    """The result that was kept."""
+    kept: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+    return kept
