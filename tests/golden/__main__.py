@@ -1,4 +1,4 @@
-"""Write the golden results anew: `python -m tests.golden`; what differs then belongs into the commit's body."""
+"""Write the golden results anew: `python -m tests.golden`; a commit says why they differ."""
 
 import tempfile
 from pathlib import Path
