@@ -15,6 +15,7 @@ import casadi as cs
 
 from fmus.component import Component
 from fmus.contact.forces.coefficients import looked_up
+from fmus.contact.forces.conditions import CONDITIONS, PARAMETERS
 from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws import LAWS, law_codes, selected_law
 from fmus.contact.forces.laws.polach import Polach
@@ -41,7 +42,8 @@ from fmus.wheelset.stepping import rk4_within_stability
 from fmus.wheelset.track import Track
 
 TABLE = "thesis Table 3.4"
-DRY = "thesis Table 4.1, dry"
+DRY = CONDITIONS["dry"]
+SURFACE = "thesis Table 4.1, dry"
 CHOICE = "this model"
 FORM = "this model: what methods for the patch differ in"
 V_MIN = 0.1  # m/s, below which creepages are those at this speed
@@ -115,12 +117,13 @@ class Wheelset(Model):
     b_y = Parameter("N.s/m", 1e3, min=0.0, doc="lateral damping of the suspension", source=TABLE)
     b_x = Parameter("N.s/m", 1e3, min=0.0, doc="longitudinal damping of the suspension", source=TABLE)
     mu0 = Parameter(
-        "1", 0.5, min=1e-4, max=2.0, doc="friction coefficient at no slip", source=DRY, alarm_below=CRITICAL
-    )
-    A = Parameter("1", 0.4, min=0.0, max=1.0, doc="limit over maximum friction", source=DRY)
-    B = Parameter("s/m", 0.6, min=0.0, doc="decrease of friction with slip velocity", source=DRY)
-    k_A = Parameter("1", 1.0, min=0.0, doc="Polach factor in the area of adhesion", source=DRY)
-    k_S = Parameter("1", 0.4, min=0.0, doc="Polach factor in the area of slip", source=DRY)
+        "1", DRY["mu0"], min=1e-4, max=2.0, doc="friction coefficient at no slip", source=SURFACE,
+        alarm_below=CRITICAL,
+    )  # fmt: skip
+    A = Parameter("1", DRY["A"], min=0.0, max=1.0, doc="limit over maximum friction", source=SURFACE)
+    B = Parameter("s/m", DRY["B"], min=0.0, doc="decrease of friction with slip velocity", source=SURFACE)
+    k_A = Parameter("1", DRY["k_A"], min=0.0, doc="Polach factor in the area of adhesion", source=SURFACE)
+    k_S = Parameter("1", DRY["k_S"], min=0.0, doc="Polach factor in the area of slip", source=SURFACE)
     k_a = Parameter(
         "1", 1.0, min=0.1, max=10.0, doc="semi-axes a of the contacts over the table's", source=FORM
     )
@@ -235,7 +238,7 @@ class Wheelset(Model):
 
     def groups(m) -> dict[str, tuple[str, ...]]:
         """What a change of the rail's surface changes together."""
-        return {"friction_condition": ("mu0", "A", "B", "k_A", "k_S")}
+        return {"friction_condition": PARAMETERS}
 
     @cached_property
     def _shifts(m) -> dict[str, Expr]:

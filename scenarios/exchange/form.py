@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from fmus.contact.forces.conditions import CONDITIONS
 from fmus.errors import BadInput
 from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
@@ -12,7 +13,6 @@ from fmus.model import Model
 from scenarios.experiment.validation import of_file
 from scenarios.simulating.building import Builder, model_of
 from scenarios.simulating.declaration import Declaration, Member
-from scenarios.simulating.friction import CONDITIONS
 
 Kind = Literal["native", "python"]
 

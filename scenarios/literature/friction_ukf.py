@@ -10,6 +10,7 @@ from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Spread, Ukf
 from estimator.filters.unknown_input import Shaped
 from estimator.record import Array
+from fmus.contact.forces.conditions import CONDITIONS
 from fmus.contact.forces.friction import CRITICAL
 from scenarios.literature.case import Case, Record
 from scenarios.literature.following import (
@@ -23,7 +24,6 @@ from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.row import Measured, Row, Tell
 from scenarios.literature.wheelset import (
     ALIGNMENT,
-    CONDITIONS,
     DT,
     MEASURED,
     NOISE,

@@ -8,6 +8,7 @@ import numpy as np
 from estimator.filters.bounds import bounded
 from estimator.filters.system import UnknownParameter
 from estimator.record import Array
+from fmus.contact.forces.conditions import CONDITIONS
 from scenarios.literature.case import Case
 from scenarios.literature.following import Followed, rmse
 from scenarios.literature.outcome import Finding, Outcome
@@ -15,7 +16,6 @@ from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.row import Measured, Row, Tell
 from scenarios.literature.wheelset import (
     ALIGNMENT,
-    CONDITIONS,
     DT,
     NOISE,
     Task,

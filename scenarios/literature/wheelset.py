@@ -17,12 +17,6 @@ DT = 1e-3  # s
 ALIGNMENT = ("y_irr", "y_irr_dot")
 NOISE = {"y": 1e-4, "psi": 1e-5, "y_dot": 1e-3, "psi_dot": 1e-3}
 MEASURED = tuple(NOISE)
-CONDITIONS: Mapping[str, Mapping[str, float]] = {  # thesis Table 4.1
-    "dry": {"mu0": 0.5, "A": 0.4, "B": 0.6, "k_A": 1.0, "k_S": 0.4},
-    "wet": {"mu0": 0.2, "A": 0.4, "B": 0.2, "k_A": 1.0, "k_S": 0.4},
-    "low": {"mu0": 0.08, "A": 0.4, "B": 0.2, "k_A": 0.6, "k_S": 0.2},
-    "very_low": {"mu0": 0.04, "A": 0.4, "B": 0.1, "k_A": 0.3, "k_S": 0.1},
-}
 
 # what is believed of the start, and what the equations may be off by in a second^1/2; a run begins at rest
 STATES = (

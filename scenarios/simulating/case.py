@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from estimator.record import Array
+from fmus.contact.forces.conditions import CONDITIONS
 from fmus.contact.geometry.table import contact_table
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
@@ -18,7 +19,6 @@ from fmus.host.master.recording import TIME, Recording
 from scenarios.simulating.building import Builder, beside
 from scenarios.simulating.declaration import Declaration, Geometry, Moment
 from scenarios.simulating.expression import Expression
-from scenarios.simulating.friction import CONDITIONS
 from scenarios.simulating.given import sources
 from scenarios.simulating.value import Value
 from scenarios.track.sensors import Sensor, measure, read_sensors

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from fmus.contact import contact_table, creep_forces, klingel_wavelength
+from fmus.contact.forces.conditions import CONDITIONS, PARAMETERS
 from fmus.contact.forces.laws import LAWS
 from fmus.contact.geometry.table import SEARCHES
 from fmus.export.runtime.stepping import Stepper
@@ -22,8 +23,8 @@ from fmus.variables import (
 )
 from fmus.wheelset.model import Wheelset
 from tests.helpers.everything import values
+from tests.truth import wheelset_effects
 from tests.truth.wheelset import NOISE, true_run
-from tests.truth.wheelset_effects import CONDITIONS, FRICTION
 
 MODEL = Wheelset()
 MADE = equations(MODEL)
@@ -257,12 +258,17 @@ def test_under_a_vehicles_load_it_becomes_unstable_at_a_higher_speed():
     assert late[10.0] < 2.9e-3 < 4.5e-3 < late[20.0]
 
 
+def test_friction_conditions_are_those_that_the_independent_truth_copied_from_the_source_for_itself():
+    assert wheelset_effects.FRICTION == PARAMETERS
+    assert {n: tuple(row.values()) for n, row in CONDITIONS.items()} == wheelset_effects.CONDITIONS
+    assert all(tuple(row) == PARAMETERS for row in CONDITIONS.values())
+
+
 def test_friction_conditions_answer_a_step_of_alignment_each_in_its_way():
     """Thesis Fig. 4.25: 5 mm at 1 s; less friction turns the wheelset less."""
 
     def answer(condition):
-        friction = dict(zip(FRICTION, CONDITIONS[condition], strict=True))
-        return run(2.5, inputs=lambda t: {"y_irr": 5e-3 if t >= 1.0 else 0.0}, **friction)
+        return run(2.5, inputs=lambda t: {"y_irr": 5e-3 if t >= 1.0 else 0.0}, **CONDITIONS[condition])
 
     found = {condition: answer(condition) for condition in CONDITIONS}
     yaw = [np.abs(x[:, 1]).max() for x in found.values()]

@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 
+from fmus.contact.forces.conditions import CONDITIONS
 from fmus.errors import BadInput
 from fmus.host.fmu import FmuError
 from fmus.host.master.recording import read_recording
@@ -14,7 +15,6 @@ from fmus.model import equations
 from fmus.models import model_class
 from fmus.variables import Input, Parameter, State
 from scenarios.simulating import run, run_all
-from scenarios.simulating.friction import CONDITIONS
 from tests.helpers.paths import ROOT, SHIPPED
 from tests.helpers.scenario_files import (
     GOOD,

@@ -1,13 +1,15 @@
-"""Conditions of the rail's surface by name."""
+"""Conditions of the rail's surface by name: the friction law and Polach's factors on each of them.
+
+Source: Table 4.1 of the thesis; B in s/m, the others without unit.
+"""
 
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, get_args
 
 Condition = Literal["dry", "wet", "low", "very_low"]
-PARAMETERS = ("mu0", "A", "B", "k_A", "k_S")
+PARAMETERS = ("mu0", "A", "B", "k_A", "k_S")  # see friction_coefficient and laws.polach.creep_force
 
-# thesis Table 4.1; B in s/m, the others without unit
 CONDITIONS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
         name: MappingProxyType(dict(zip(PARAMETERS, row, strict=True)))
