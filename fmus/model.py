@@ -18,6 +18,7 @@ import casadi as cs
 from fmus.effects.effect import Effect
 from fmus.effects.site import Site
 from fmus.integrate import Method, rk4
+from fmus.option import BuildOption, Choice, chosen
 from fmus.port import UNITS
 from fmus.variables import (
     Expr,
@@ -51,9 +52,16 @@ class Model(Site, ABC):
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_alike: ClassVar[tuple[str, ...]] = ()
     form_error: ClassVar[float] = 0.0
+    build_options: ClassVar[tuple[BuildOption, ...]] = ()
 
-    def __init__(self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False) -> None:
-        """effects: laws and their locations; probes: open every location by a force input and its motion."""
+    def __init__(
+        self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False, **options: Choice
+    ) -> None:
+        """effects: laws and their locations; probes: open every location by a force input and its motion.
+
+        options: values of `build_options`; those that are not given have their defaults.
+        """
+        self.options = chosen(self.name.lower(), type(self).build_options, options)
         variables = declared(type(self))
         super().__init__(
             variables, {n: cs.SX.sym(n) for n, v in variables.items() if not isinstance(v, Output)}
@@ -69,6 +77,10 @@ class Model(Site, ABC):
     def about(self) -> str:
         """What it is, in one line."""
         return (type(self).__doc__ or self.name).strip().splitlines()[0]
+
+    def notes(self) -> list[str]:
+        """What a user should know of how the options were read, such as of files; one line each."""
+        return []
 
     @abstractmethod
     def derivatives(self) -> dict[str, Expr]:

@@ -1,10 +1,14 @@
 """Models by name. Each folder with a model.py that defines a Model is one; there is no other list."""
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import fmus
+from fmus.effects import parse_effect
 from fmus.errors import BadInput, did_you_mean
 from fmus.model import Model
+from fmus.option import Choice
 from fmus.registry import by_name, classes_in, further_folders
 
 
@@ -28,3 +32,12 @@ def model_class(name: str) -> type[Model]:
     if name.lower() not in MODELS:
         raise BadInput(f"model '{name}' is not known; {did_you_mean(name.lower(), MODELS)}")
     return MODELS[name.lower()]
+
+
+def model_with(name: str, effects: Iterable[str] = (), options: Mapping[str, Choice] | None = None) -> Model:
+    """The model of that name with effects KIND@LOCATION and with values of its build options by name.
+
+    BadInput where the model, an effect, a location, an option or a value is not one.
+    """
+    given: Any = options or {}  # the names are checked by the model
+    return model_class(name)([parse_effect(text) for text in effects], **given)

@@ -6,7 +6,7 @@ Nothing in it depends on when or where the FMU was built, so that the same build
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -43,7 +43,7 @@ def record(model: Model, kind: str, fmi: int, origin: Origin | None = None) -> d
     """The record of a model's build: version, profiles, parameters, effects, and what estimates rest on."""
     return {
         **common(model.name, kind, fmi),
-        "profiles": _profiles(model),
+        "profiles": _options(model),
         "parameters": {p.name: _value(p) for p in model.of(Parameter)},
         "effects": [_effect(model, effect, location) for effect, location in model.effects],
         "origin": None if origin is None else asdict(origin),
@@ -122,15 +122,13 @@ def checksum(file: Path) -> str:
     return sha256(file.read_bytes()).hexdigest()
 
 
-def _profiles(model: Model) -> dict[str, Any]:
-    """The profile pair of a model that has one; a point file by its name and checksum, not its place."""
-    track: Any = getattr(model, "track", None)
-    if not is_dataclass(track) or isinstance(track, type):
-        return {}
-    found = asdict(track)
-    for name, value in tuple(found.items()):
-        if isinstance(value, str) and Path(value).is_file():
-            found |= {name: Path(value).name, f"{name}_sha256": checksum(Path(value))}
+def _options(model: Model) -> dict[str, Any]:
+    """What was chosen for the build; a point file by its name and checksum, not its place."""
+    found: dict[str, Any] = dict(model.options)
+    for option in model.build_options:
+        file = Path(str(found[option.name]))
+        if option.type is Path and file.is_file():
+            found |= {option.name: file.name, f"{option.name}_sha256": checksum(file)}
     return found
 
 

@@ -6,7 +6,7 @@ Equations, symbols and range of validity: README.md beside this file.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache, cached_property
 from types import MappingProxyType
 from typing import NamedTuple
@@ -22,6 +22,7 @@ from fmus.contact.forces.laws.polach import Polach
 from fmus.contact.geometry.search import FLANGE_ANGLE
 from fmus.effects.effect import Effect
 from fmus.model import Model
+from fmus.option import Choice
 from fmus.port import Port
 from fmus.variables import (
     Expr,
@@ -39,7 +40,7 @@ from fmus.wheelset.curves import (
     contact_curves,
 )
 from fmus.wheelset.stepping import rk4_within_stability
-from fmus.wheelset.track import Track
+from fmus.wheelset.track import OPTIONS, Track
 
 TABLE = "thesis Table 3.4"
 DRY = CONDITIONS["dry"]
@@ -86,6 +87,7 @@ class Wheelset(Model):
     form_alike = ("G", "nu")
     form_error = 0.02
     method = rk4_within_stability
+    build_options = OPTIONS
 
     y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)
     psi = State("rad", doc="yaw of the wheelset", nominal=1e-3)
@@ -179,10 +181,13 @@ class Wheelset(Model):
         effects: Iterable[tuple[type[Effect], str]] = (),
         probes: bool = False,
         track: Track = Track(),  # noqa: B008  frozen
+        **options: Choice,
     ) -> None:
-        """effects, probes: see Model; track: the profiles and how they stand."""
+        """effects, probes: see Model; track: the profiles and how they stand, or by options."""
+        if options:
+            track = Track.parse(**{**asdict(track), **options})
         self.track = track
-        super().__init__(effects, probes)
+        super().__init__(effects, probes, **asdict(track))
         for name, start in (("r0", track.r0), ("s", track.half_distance)):
             self.variables[name] = replace(self.variables[name], start=start)
         search = self.variables["contact_search"]
@@ -192,6 +197,10 @@ class Wheelset(Model):
     def about(self) -> str:
         """What is built in, in one line."""
         return f"Plan-view wheelset with a laterally suspended mass on straight track; {self.track}."
+
+    def notes(self) -> list[str]:
+        """See Model.notes."""
+        return self.track.notes
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""

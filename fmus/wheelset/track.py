@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+from fmus.contact.geometry.exact import exact_names
 from fmus.contact.geometry.measured import load_profile
 from fmus.contact.geometry.pair import TAPE, Pair
 from fmus.contact.geometry.search import check_touches
-from fmus.errors import BadInput
-
-SIZES = ("cant", "gauge", "back_to_back", "r0")
-WAYS = {"cant": "a slope such as 1/20", "gauge": "m, such as 1.435"}
+from fmus.option import BuildOption, Choice, chosen
 
 
 @dataclass(frozen=True)
@@ -31,13 +29,14 @@ class Track:
     r0: float = 0.46
 
     @staticmethod
-    def parse(wheel: str = "S1002", rail: str = "60E1", **sizes: str | float) -> Track:
+    def parse(**given: Choice) -> Track:
         """A track from words of a command line, checked: profiles that can be read and that touch.
 
-        sizes: cant, gauge, back_to_back, r0, as numbers or as fractions such as "1/20". BadInput tells what
+        given: values of OPTIONS by name, sizes as numbers or as fractions such as "1/20". BadInput tells what
         is wrong with a number, a name, a file or the pair.
         """
-        track = Track(wheel, rail, **{name: _number(name, given) for name, given in sizes.items()})
+        values: Any = chosen("wheelset", OPTIONS, given)  # read as the types of the fields
+        track = Track(**values)
         check_touches(track.pair)
         return track
 
@@ -46,6 +45,12 @@ class Track:
         """The profiles, read, and how they stand; BadInput tells what is wrong with them."""
         wheel, rail = load_profile(self.wheel, "wheel"), load_profile(self.rail, "rail")
         return Pair(wheel, rail, self.cant, self.gauge, self.r0, self.back_to_back)
+
+    @property
+    def notes(self) -> list[str]:
+        """How the point files were read: what was turned round, how they were smoothed."""
+        pair, exact = self.pair, exact_names()
+        return [f"{p.kind} {p.name}: {p.found}" for p in (pair.wheel, pair.rail) if p.name not in exact]
 
     @property
     def half_distance(self) -> float:
@@ -60,11 +65,11 @@ class Track:
         )
 
 
-def _number(name: str, given: str | float) -> float:
-    if name not in SIZES:
-        raise BadInput(f"{name} is no size of a track; give one of {', '.join(SIZES)}")
-    try:
-        return float(Fraction(given.strip()) if isinstance(given, str) else given)
-    except (ValueError, ZeroDivisionError):
-        way = WAYS.get(name, "m, such as 1.36")
-        raise BadInput(f"{name} = {given!r} is no number; give {way}") from None
+OPTIONS = (
+    BuildOption("wheel", Path, "", "profile of the wheels, by name or point file", Track.wheel),
+    BuildOption("rail", Path, "", "profile of the rails, by name or point file", Track.rail),
+    BuildOption("cant", float, "1", "inward inclination of the rails as a slope, such as 1/40", Track.cant),
+    BuildOption("gauge", float, "m", "gauge of the track, 14 mm below the crown", Track.gauge),
+    BuildOption("back_to_back", float, "m", "distance of the flange backs", Track.back_to_back),
+    BuildOption("r0", float, "m", "wheel radius at the tape circle", Track.r0),
+)

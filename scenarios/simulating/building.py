@@ -1,13 +1,10 @@
 """The FMUs of a scenario: files as they are, models and PythonFMU sources built on the fly, each once."""
 
-import inspect
 import json
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from fmus.effects import parse_effect
-from fmus.errors import BadInput, did_you_mean
+from fmus.errors import BadInput
 from fmus.export.builders.script import build_script
 from fmus.model import Model
 from scenarios.experiment.validation import of_file
@@ -25,7 +22,7 @@ class Builder:
         if member.fmu is not None:
             return scenario.parent / member.fmu
         origin = member.model or str((scenario.parent / (member.source or "")).resolve())
-        recipe = json.dumps([origin, member.effects, member.contact, member.kind], sort_keys=True)
+        recipe = json.dumps([origin, member.effects, member.options, member.kind], sort_keys=True)
         if recipe not in self._made:
             with of_file(scenario):
                 self._made[recipe] = self._build(member, key, scenario.parent)
@@ -52,37 +49,21 @@ def _built(model: Model, kind: str, out: Path) -> Path:
 
 
 def model_of(member: Member, folder: Path) -> Model:
-    """The model of a member with its effects and profiles; point files are found in `folder`.
+    """The model of a member with its effects and build options; files that these name are found in `folder`.
 
-    BadInput, which names the key, where one of them is wrong.
+    BadInput where one of them is wrong.
     """
-    from fmus.models import model_class  # here because it loads CasADi, which a foreign FMU does without
+    # here because it loads CasADi, which a foreign FMU does without
+    from fmus.models import model_class, model_with
 
-    chosen = model_class(member.model or "")
-    effects = [parse_effect(text) for text in member.effects]
-    if not member.contact:
-        return chosen(effects)
-    found = inspect.signature(chosen).parameters.get("track")
-    if found is None:
-        raise BadInput(f"has key 'contact', but model '{member.model}' has no profiles; leave it out")
-    kind = type(found.default)
-    track = kind(**_profiles(member.contact, {f.name for f in fields(kind)}, folder))
-    return chosen(effects, track=track)  # type: ignore[call-arg]  # found above
+    name = member.model or ""
+    files = [option.name for option in model_class(name).build_options if option.type is Path]
+    given = {n: beside(value, folder) if n in files else value for n, value in member.options.items()}
+    return model_with(name, member.effects, given)
 
 
-def _profiles(given: dict[str, Any], known: set[str], folder: Path) -> dict[str, Any]:
-    """Fields of a Track; point files are found beside the scenario."""
-    for name, value in given.items():
-        if name not in known:
-            raise BadInput(f"key 'contact.{name}' is not known; {did_you_mean(name, known)}")
-        wanted = "a name or a point file" if name in ("wheel", "rail") else "a number"
-        if isinstance(value, str) != (name in ("wheel", "rail")):
-            raise BadInput(f"key 'contact.{name}' must be {wanted}, not {value!r}")
-    return {n: beside(v, folder) for n, v in given.items()}
-
-
-def beside(profile: Any, folder: Path) -> Any:
-    """The point file of that name in a folder, where there is one."""
-    if isinstance(profile, str) and (folder / profile).is_file():
-        return str(folder / profile)
-    return profile
+def beside(given: Any, folder: Path) -> Any:
+    """The file of that name in a folder, where there is one."""
+    if isinstance(given, str) and (folder / given).is_file():
+        return str(folder / given)
+    return given

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from fmus.contact.forces.conditions import Condition
 from scenarios.experiment.declaration import (
@@ -21,7 +21,7 @@ Whole = Annotated[int, Field(strict=True, ge=0)]
 class Member(Table):
     """An FMU: our model built on the fly, a PythonFMU source built on the fly, or a file.
 
-    contact: profiles of a wheelset, by the fields of fmus.wheelset.curves.Track; friction: a row of the
+    options: values of the model's build options, also read from the key 'contact'; friction: a row of the
     thesis's Table 4.1, on which `parameters` have the last word; step: s, where not the common one.
     """
 
@@ -29,7 +29,9 @@ class Member(Table):
     source: str | None = None
     fmu: str | None = None
     effects: tuple[str, ...] = ()
-    contact: dict[str, str | Number] = Field(default_factory=dict)
+    options: dict[str, str | Number] = Field(
+        default_factory=dict, validation_alias=AliasChoices("options", "contact")
+    )
     kind: Literal["python", "native"] = "python"
     friction: Condition | None = None
     parameters: dict[str, Number] = Field(default_factory=dict)
@@ -40,8 +42,8 @@ class Member(Table):
     def _one_origin(self) -> Self:
         if [self.model, self.source, self.fmu].count(None) != 2:
             raise ValueError("needs exactly one of the keys 'model', 'source' and 'fmu'")
-        if self.model is None and (self.effects or self.contact or self.kind != "python"):
-            raise ValueError("has 'effects', 'contact' or 'kind', which go with 'model' only")
+        if self.model is None and (self.effects or self.options or self.kind != "python"):
+            raise ValueError("has 'effects', 'options' or 'kind', which go with 'model' only")
         return self
 
 

@@ -40,6 +40,14 @@ class Pendulum(Model):
         """The pivot."""
         return {"pivot": Port(m.phi, m.phi_dot, {"M_ext": 1.0}, "rotation")}
 '''
+OFFER = """    build_options = (BuildOption("length", float, "m", "length of the rod", 2.0),)
+
+    phi = State"""
+SIZED = (  # the same, of a length that is chosen when it is built
+    PENDULUM.replace("    phi = State", OFFER)
+    .replace("from fmus.port", "from fmus.option import BuildOption\nfrom fmus.port")
+    .replace("-m.k * cs.sin", '-m.k * m.options["length"] * cs.sin')
+)
 LAW = '''
 """Half of Kalker's linear forces."""
 
@@ -83,6 +91,48 @@ def test_a_model_is_one_file_with_or_without_a_package_around_it(mine, package):
 def test_a_model_gets_the_contract_tests_for_free(mine):
     mine.write("fmus/pendulum/model.py", PENDULUM)
     assert mine.passes("tests/contracts/test_models.py", "-k", "pendulum") >= 3
+
+
+def test_what_a_model_offers_to_choose_is_an_option_of_the_build(mine):
+    mine.write("fmus/pendulum/model.py", SIZED)
+    mine.railfmi("build", "pendulum", "--length", "3/2", "--out", "out")
+    with Fmu(mine.work / "out" / "Pendulum.fmu") as pendulum:
+        pendulum.restart(phi=0.3)
+        assert pendulum["phi_ddot"] == pytest.approx(-9.81 * 1.5 * np.sin(0.3), rel=1e-12)
+
+
+def test_what_a_model_offers_to_choose_is_in_the_help_and_in_python(mine):
+    mine.write("fmus/pendulum/model.py", SIZED)
+    said = """
+        from typer.testing import CliRunner
+        from fmus.models import model_with
+        from scenarios.cli.app import app
+        for given in ({}, {"length": "3/2"}, {"length": 4}):
+            print(model_with("pendulum", options=given).options["length"])
+        print(CliRunner().invoke(app, ["build", "--help"]).output)
+    """
+    words = mine.says(said).split()
+    assert words[:3] == ["2.0", "1.5", "4.0"]
+    assert "of pendulum: length of the rod in m, by default 2" in " ".join(words)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("pendulum", "--cant", "1/20"), "pendulum has no build option 'cant'; it offers length"),
+        (("drive", "--length", "1.5"), "drive has no build option 'length'; it offers none; leave it out"),
+        (("pendulum", "--length", "long"), "length = 'long' is no number; give m, such as 2"),
+    ],
+)
+def test_an_option_that_a_model_does_not_have_is_refused_with_what_it_offers(mine, given, words):
+    mine.write("fmus/pendulum/model.py", SIZED)
+    assert words in mine.refused("build", *given, "--out", "out")
+    assert not (mine.work / "out").exists()
+
+
+def test_a_build_option_that_every_build_has_is_refused(mine):
+    mine.write("fmus/pendulum/model.py", SIZED.replace('"length"', '"kind"'))
+    assert "model 'pendulum': build option 'kind' is an option of every build" in mine.refused("build")
 
 
 @pytest.mark.parametrize(

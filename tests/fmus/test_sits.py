@@ -10,7 +10,6 @@ from fmus.errors import BadInput
 from fmus.models import MODELS
 from fmus.wheelset.model import Wheelset
 from fmus.wheelset.track import Track
-from scenarios.cli.build import profiles_read
 from tests.helpers.profile_files import points_of, write_points
 
 
@@ -45,7 +44,7 @@ def test_a_narrower_wheelset_fits_a_narrower_gauge():
 
 def test_how_point_files_were_read_is_said(tmp_path):
     file = write_points(tmp_path / "worn.txt", points_of("S1002", 300, np.random.default_rng(2), noise=5e-6))
-    (line,) = profiles_read(Wheelset(track=Track(wheel=str(file))))  # an exact rail needs no reading
+    (line,) = Wheelset(track=Track(wheel=str(file))).notes()  # an exact rail needs no reading
     assert line.startswith("wheel worn: ")
     assert "points used; smoothed to" in line
-    assert profiles_read(Wheelset()) == profiles_read(MODELS["drive"]()) == []
+    assert Wheelset().notes() == MODELS["drive"]().notes() == []

@@ -33,7 +33,7 @@ def test_sizes_are_read_from_words():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"cant": "1/0"}, "cant = '1/0' is no number; give a slope such as 1/20"),
+        ({"cant": "1/0"}, "cant = '1/0' is no number; give a number, such as 0.025"),
         ({"cant": "1:20"}, "cant = '1:20' is no number"),
         ({"gauge": "wide"}, "gauge = 'wide' is no number; give m, such as 1.435"),
         ({"gauge": "nan"}, "gauge = 'nan' is no number"),
@@ -42,7 +42,7 @@ def test_sizes_are_read_from_words():
         ({"gauge": "1.37"}, "the flanges touch when it is centred; correct gauge"),
         ({"wheel": "S1003"}, "wheel = 'S1003' is neither a file nor an exact profile; did you mean 'S1002'"),
         ({"wheel": "60E1"}, "is a rail; give the profile of a wheel"),
-        ({"width": "3"}, "width is no size of a track; give one of cant, gauge"),
+        ({"width": "3"}, "wheelset has no build option .width.; it offers wheel, rail, cant, gauge"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_sentence(given, words):

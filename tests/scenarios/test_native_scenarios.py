@@ -33,7 +33,7 @@ class Forced(Builder):
     def path(self, member, key, scenario):
         if member.model is None:
             return super().path(member, key, scenario)
-        recipe = json.dumps([member.model, member.effects, member.contact, str(scenario.parent)])
+        recipe = json.dumps([member.model, member.effects, member.options, str(scenario.parent)])
         if recipe not in self._known:
             out = self._own / f"forced{len(self._known)}"
             self._known[recipe] = self._build_model(model_of(member, scenario.parent), out)
