@@ -45,8 +45,25 @@ class State(Variable):
 
 
 @dataclass(frozen=True)
+class OnTrack:
+    """What of a track an input is, and where the track is felt.
+
+    quantity: a deviation of the rails such as "alignment", or "speed", that of travel; rate: its derivative
+    over time; behind: parameters of the model, m, by whose sum it is felt behind the place of the ride;
+    spacing: what the distance of two places is called whose mean is felt, m; 0 unless a ride gives it.
+    """
+
+    quantity: str
+    rate: bool = False
+    behind: tuple[str, ...] = ()
+    spacing: str = ""
+
+
+@dataclass(frozen=True)
 class Input(Variable):
-    """An input, held over a communication step."""
+    """An input, held over a communication step; on_track: where a ride over a track drives it."""
+
+    on_track: OnTrack | None = None
 
     causality: ClassVar[str] = "input"
 

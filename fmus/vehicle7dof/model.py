@@ -14,6 +14,7 @@ from fmus.port import Port, alike
 from fmus.variables import (
     Expr,
     Input,
+    OnTrack,
     Output,
     Parameter,
     State,
@@ -22,6 +23,8 @@ from fmus.variables import (
 
 TABLE = "thesis Table 3.5"
 CORNERS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+RAILS = {"l": "z_left", "r": "z_right"}  # that the side of a corner runs on
+BOGIES = {"f": (), "r": ("a1", "a2")}  # what its bogie is behind the front one by
 ELEMENTS = {
     "k1": "secondary spring",
     "b1": "secondary damper",
@@ -64,7 +67,10 @@ class Vehicle7dof(Model):
     vars().update(
         {
             f"u_{c}{end}": Input(
-                unit, doc=f"{what} under the {at} bogie side, mean of axles", nominal=nominal
+                unit,
+                doc=f"{what} under the {at} bogie side, mean of axles",
+                nominal=nominal,
+                on_track=OnTrack(RAILS[c[1]], bool(end), BOGIES[c[0]], spacing="axle_spacing"),
             )
             for end, unit, what, nominal in (
                 ("", "m", "rail height", 5e-3),

@@ -27,6 +27,7 @@ from fmus.port import Port
 from fmus.variables import (
     Expr,
     Input,
+    OnTrack,
     Output,
     Parameter,
     State,
@@ -96,10 +97,16 @@ class Wheelset(Model):
     y_m = State("m", doc="lateral displacement of the suspended mass", nominal=1e-3)
     y_m_dot = State("m/s", doc="lateral velocity of the suspended mass", nominal=0.02)
 
-    y_irr = Input("m", doc="lateral alignment of the track, mean of both rails", nominal=1e-3)
-    y_irr_dot = Input("m/s", doc="rate of the alignment along the run", nominal=0.02)
-    gauge_irr = Input("m", doc="gauge widening", nominal=1e-3)
-    V = Input("m/s", 40.0, min=0.0, doc="speed of travel", nominal=1.0)
+    y_irr = Input(
+        "m", doc="lateral alignment of the track, mean of both rails", nominal=1e-3,
+        on_track=OnTrack("alignment"),
+    )  # fmt: skip
+    y_irr_dot = Input(
+        "m/s", doc="rate of the alignment along the run", nominal=0.02,
+        on_track=OnTrack("alignment", rate=True),
+    )  # fmt: skip
+    gauge_irr = Input("m", doc="gauge widening", nominal=1e-3, on_track=OnTrack("gauge"))
+    V = Input("m/s", 40.0, min=0.0, doc="speed of travel", nominal=1.0, on_track=OnTrack("speed"))
     F_y_ext = Input("N", doc="port: lateral force on the wheelset", nominal=1e3)
     M_z_ext = Input("N.m", doc="port: yaw moment on the wheelset", nominal=1e3)
     F_ym_ext = Input("N", doc="port: lateral force on the suspended mass", nominal=1e3)

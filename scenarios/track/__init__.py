@@ -1,7 +1,7 @@
 """Track irregularities: where they come from, and what a vehicle feels of them."""
 
 from scenarios.track.figures import profile_figure, spectrum_figure
-from scenarios.track.inputs import INPUTS, inputs
+from scenarios.track.inputs import inputs, riders
 from scenarios.track.journey import Journey, journey
 from scenarios.track.rails import QUANTITIES, Rails
 from scenarios.track.reading import read_source, read_track
@@ -9,7 +9,6 @@ from scenarios.track.spectra import SPECTRA, Spectrum, spectra
 from scenarios.track.track import Track
 
 __all__ = [
-    "INPUTS",
     "QUANTITIES",
     "SPECTRA",
     "Journey",
@@ -21,6 +20,7 @@ __all__ = [
     "profile_figure",
     "read_source",
     "read_track",
+    "riders",
     "spectra",
     "spectrum_figure",
 ]

@@ -2,18 +2,19 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fmus.errors import BadInput, did_you_mean
+from fmus.variables import Input, OnTrack, Parameter
 from scenarios.track.journey import Journey, Speed, journey
-from scenarios.track.rails import Array, Quantity
+from scenarios.track.rails import QUANTITIES, Array
 from scenarios.track.track import Track
 
 Signal: TypeAlias = Callable[[ArrayLike], Array]
+SPEED = "speed"  # of travel, beside the quantities of the rails
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Felt:
 
     track: Track
     run: Journey
-    quantity: Quantity
+    quantity: str
     ahead: Sequence[float] = field(default=(0.0,))
 
     def value(self, time: ArrayLike) -> Array:
@@ -38,52 +39,65 @@ class Felt:
         return np.asarray(np.mean(slopes, axis=0) * self.run.speed(time), dtype=np.float64)
 
 
-def wheelset_inputs(track: Track, run: Journey, *, offset: float = 0.0) -> dict[str, Signal]:
-    """Inputs of the wheelset, `offset` m ahead of the run's distance."""
-    alignment = Felt(track, run, "alignment", (offset,))
-    gauge = Felt(track, run, "gauge", (offset,))
-    return {"y_irr": alignment.value, "y_irr_dot": alignment.rate, "gauge_irr": gauge.value, "V": run.speed}
+def riders() -> dict[str, dict[str, OnTrack]]:
+    """What of a track each input is that feels one, by model and input."""
+    from fmus.model import declared  # both here because they load CasADi, which a foreign FMU does without
+    from fmus.models import MODELS
 
-
-def vehicle_inputs(
-    track: Track,
-    run: Journey,
-    *,
-    a1: float = 9.5,
-    a2: float = 9.5,
-    axle_spacing: float = 0.0,
-    offset: float = 0.0,
-) -> dict[str, Signal]:
-    """Inputs of the vehicle on two bogies: rail height under each bogie side, and its rate.
-
-    a1, a2: bogie centres from the coach centre, m; axle_spacing: between the two axles of a bogie, m, whose
-    mean a bogie side feels. The front bogie's centre is `offset` m ahead of the run's distance, the rear one
-    follows a1 + a2 behind it.
-    """
-    found: dict[str, Signal] = {}
-    sides: tuple[tuple[str, Quantity], ...] = (("l", "z_left"), ("r", "z_right"))
-    for end, centre in (("f", offset), ("r", offset - a1 - a2)):
-        axles = (centre + axle_spacing / 2, centre - axle_spacing / 2) if axle_spacing else (centre,)
-        for side, quantity in sides:
-            height = Felt(track, run, quantity, axles)
-            found |= {f"u_{end}{side}": height.value, f"u_{end}{side}_dot": height.rate}
-    return found
-
-
-INPUTS: Mapping[str, Callable[..., dict[str, Signal]]] = MappingProxyType(
-    {"wheelset": wheelset_inputs, "vehicle7dof": vehicle_inputs}
-)
+    felt = {
+        name: {v.name: v.on_track for v in declared(model).values() if isinstance(v, Input) and v.on_track}
+        for name, model in MODELS.items()
+    }
+    return {name: found for name, found in felt.items() if found}
 
 
 def inputs(track: Track, V: Speed, model: str, **geometry: float) -> dict[str, Signal]:
     """The inputs of a model on a track by name, each a function of time [s].
 
-    V: m/s, or (times, speeds), or a Journey; geometry: what the function of that model in INPUTS takes.
+    V: m/s, or (times, speeds), or a Journey; geometry [m]: `offset`, by which the place of the ride is ahead
+    of the run's distance, and what the inputs of the model name, a parameter's start value by default.
     Raises BadInput for a model that feels no track and for geometry it does not have.
     """
-    if model not in INPUTS:
-        raise BadInput(f"model '{model}' takes no inputs from a track; {did_you_mean(model, INPUTS)}")
-    known = set(INPUTS[model].__kwdefaults__ or {})
-    for name in geometry.keys() - known:
-        raise BadInput(f"model '{model}' on a track has no '{name}'; {did_you_mean(name, known)}")
-    return INPUTS[model](track, journey(V), **geometry)
+    known = riders()
+    felt = known.get(model.lower())
+    if felt is None:
+        raise BadInput(f"model '{model}' takes no inputs from a track; {did_you_mean(model, known)}")
+    lengths = {"offset": 0.0, **_lengths(model, felt)}
+    for name in geometry.keys() - lengths.keys():
+        raise BadInput(f"model '{model}' on a track has no '{name}'; {did_you_mean(name, lengths)}")
+    run = journey(V)
+    return {name: _signal(where, track, run, {**lengths, **geometry}) for name, where in felt.items()}
+
+
+def _lengths(model: str, felt: Mapping[str, OnTrack]) -> dict[str, float]:
+    """Lengths that the inputs on a track name, with their defaults, m; BadInput where these name no thing."""
+    from fmus.model import declared
+    from fmus.models import model_class
+
+    starts = {v.name: v.start for v in declared(model_class(model)).values() if isinstance(v, Parameter)}
+    found: dict[str, float] = {}
+    for name, where in felt.items():
+        if where.quantity not in (*QUANTITIES, SPEED) or (where.rate and where.quantity == SPEED):
+            near = did_you_mean(where.quantity, (*QUANTITIES, SPEED))
+            what = f"{'the rate of ' if where.rate else ''}'{where.quantity}'"
+            raise BadInput(f"model '{model}': input '{name}' is {what}, which no track has; {near}")
+        for length in where.behind:
+            if length not in starts:
+                near = did_you_mean(length, starts)
+                raise BadInput(
+                    f"model '{model}': input '{name}' is behind by '{length}', no parameter; {near}"
+                )
+            found[length] = starts[length]
+        found |= {where.spacing: 0.0} if where.spacing else {}
+    return found
+
+
+def _signal(where: OnTrack, track: Track, run: Journey, lengths: Mapping[str, float]) -> Signal:
+    if where.quantity == SPEED:
+        return run.speed
+    place = lengths["offset"]
+    for name in where.behind:
+        place -= lengths[name]
+    half = lengths.get(where.spacing, 0.0) / 2
+    felt = Felt(track, run, where.quantity, (place + half, place - half) if half else (place,))
+    return felt.rate if where.rate else felt.value

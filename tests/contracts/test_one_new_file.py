@@ -1,6 +1,7 @@
 """The README's promises: each of these is one new file, in the package or in a folder of RAILFMI_PATH."""
 
 import os
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -114,6 +115,58 @@ def test_what_a_model_offers_to_choose_is_in_the_help_and_in_python(mine):
     words = mine.says(said).split()
     assert words[:3] == ["2.0", "1.5", "4.0"]
     assert "of pendulum: length of the rod in m, by default 2" in " ".join(words)
+
+
+ON_TRACK = (  # the same, of a pivot that follows the track 2 m behind the ride
+    PENDULUM.replace("Input, Parameter", "Input, OnTrack, Parameter")
+    .replace(
+        "    J =",
+        """    z = Input("m", doc="height of the pivot", on_track=OnTrack("level", behind=("x",)))
+    V = Input("m/s", doc="speed", on_track=OnTrack("speed"))
+    x = Parameter("m", 2.0, doc="distance behind", source="this example")
+    J =""",
+    )
+    .replace("cs.sin(m.phi) + m.M_ext)", "cs.sin(m.phi) + m.M_ext + m.z + 0 * m.V)")
+)
+RIDE = """
+    id = "pendulum"
+    question = "Does a pendulum of one's own feel the track?"
+    duration = 1.0
+    step = 0.01
+    fmus.pendulum = {model = "pendulum", initial = {phi = 0.0}}
+    track = {kind = "defect", shape = "step", position = 6.0, height = 1.0}
+    ride = {V = 10.0, on.pendulum = {}}
+    record = {names = ["pendulum.phi", "pendulum.phi_ddot"]}
+
+    [[expect]]
+    that = "max(abs(between(pendulum.phi, 0.0, 0.79))) < 1e-12"
+    because = "at 10 m/s the step at 6 m is met 2 m later, after 0.8 s"
+
+    [[expect]]
+    that = "0.9 < max(between(pendulum.phi_ddot, 0.8, 0.85)) < 1.1"
+    because = "its torque is 1 N.m over 1 kg.m2"
+"""
+
+
+def test_a_model_is_driven_over_a_track_by_what_its_inputs_say(mine):
+    mine.write("fmus/pendulum/model.py", ON_TRACK)
+    file = mine.work / "ride.toml"
+    file.write_text(dedent(RIDE), encoding="utf-8")
+    mine.railfmi("run", str(file), "--out", "out")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"level"', '"leval"', "input 'z' is 'leval', which no track has; did you mean 'level'?"),
+        ('("x",)', '("w",)', "input 'z' is behind by 'w', no parameter; known are J, k, x"),
+    ],
+)
+def test_an_input_that_no_track_gives_is_refused(mine, old, new, words):
+    mine.write("fmus/pendulum/model.py", ON_TRACK.replace(old, new))
+    file = mine.work / "ride.toml"
+    file.write_text(dedent(RIDE), encoding="utf-8")
+    assert words in mine.refused("run", str(file), "--out", "out")
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from fmus.errors import BadInput
 from fmus.models import MODELS
 from fmus.variables import Input
 from scenarios.track import (
-    INPUTS,
     SPECTRA,
     Spectrum,
     Track,
@@ -26,6 +25,7 @@ from scenarios.track import (
     profile_figure,
     read_source,
     read_track,
+    riders,
 )
 from scenarios.track.defects import DEFECTS
 from scenarios.track.figures import spectrum_figure
@@ -182,12 +182,18 @@ def test_the_wheelset_feels_alignment_gauge_and_speed():
     assert_allclose(found["V"](t), np.interp(t, *VARYING))
 
 
-@pytest.mark.parametrize("model", sorted(INPUTS))
-def test_inputs_are_those_of_the_model(model):
-    if model not in MODELS:
-        pytest.skip(f"there is no model '{model}' here")
-    known = {v.name for v in MODELS[model]().of(Input)}
-    assert inputs(waves(), 20.0, model).keys() <= known
+@pytest.mark.parametrize("model", MODELS)
+def test_an_input_on_a_track_has_the_unit_of_what_it_is(model):
+    felt = riders().get(model, {})
+    assert {v.name for v in MODELS[model]().of(Input) if v.name in felt} == felt.keys()
+    for name, where in felt.items():
+        unit = "m/s" if where.rate or where.quantity == "speed" else "m"
+        assert vars(MODELS[model])[name].unit == unit
+    if felt:
+        assert inputs(waves(), 20.0, model).keys() == felt.keys()
+    else:
+        with pytest.raises(BadInput, match=f"model '{model}' takes no inputs from a track"):
+            inputs(waves(), 20.0, model)
 
 
 def test_models_that_know_no_track():
