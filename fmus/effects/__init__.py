@@ -17,7 +17,7 @@ def parse_effect(text: str) -> tuple[type[Effect], str]:
     """Read "kind@location"; BadInput where the kind is not known or the location is missing."""
     kind, at, location = text.partition("@")
     if not at or not location:
-        raise BadInput(f"effect '{text}': write KIND@LOCATION, for example viscous_damping@roller")
+        raise BadInput(f"effect '{text}': write KIND@LOCATION, with a kind such as viscous_damping")
     if kind not in EFFECTS:
         raise BadInput(f"effect '{text}': kind '{kind}' is not known; {did_you_mean(kind, EFFECTS)}")
     return EFFECTS[kind], location

@@ -85,7 +85,7 @@ class Recorded(Table):
 
 
 class Geometry(Table):
-    """A contact table over the wheelset's shift, in place of FMUs; see fmus.contact.contact_table."""
+    """A contact table over the lateral shift, in place of FMUs; see fmus.contact.contact_table."""
 
     wheel: str = "S1002"
     rail: str = "60E1"

@@ -1,4 +1,4 @@
-"""Expressions over signals as text, as 'max(abs(wet.wheelset.y)) < 2e-3'; no other code runs."""
+"""Expressions over signals as text, as 'max(abs(variant.fmu.output)) < 2e-3'; no other code runs."""
 
 import ast
 import operator
@@ -108,7 +108,9 @@ def _parsed(text: str, where: str) -> ast.expr:
     try:
         return ast.parse(" ".join(text.split()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise BadInput(f"{where}: '{text[:80]}' is no formula, such as 'max(abs(rig.F_x)) < 3e3'") from None
+        raise BadInput(
+            f"{where}: '{text[:80]}' is no formula, such as 'max(abs(fmu.output)) < 3e3'"
+        ) from None
 
 
 def _sides(node: ast.expr, where: str) -> Iterator[ast.expr]:
@@ -156,7 +158,7 @@ def _dotted(node: ast.expr, where: str) -> str:
             return name
         case ast.Attribute(value=inner, attr=name):
             return f"{_dotted(inner, where)}.{name}"
-    raise BadInput(f"{where}: '{ast.unparse(node)}' is no name of a signal, as 'rig.omega_w'")
+    raise BadInput(f"{where}: '{ast.unparse(node)}' is no name of a signal, as 'fmu.output'")
 
 
 def _check_call(name: str, count: int, where: str) -> None:
