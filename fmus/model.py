@@ -17,7 +17,7 @@ import casadi as cs
 
 from fmus.effects.effect import Effect
 from fmus.effects.site import Site
-from fmus.integrate import Method, rk4
+from fmus.integrators import integrator
 from fmus.option import BuildOption, Choice, chosen
 from fmus.port import UNITS
 from fmus.variables import (
@@ -45,7 +45,7 @@ class Model(Site, ABC):
 
     step_size: ClassVar[float]  # s, the longest internal step
     tolerance: ClassVar[float] = 1e-6  # of a state's nominal, error of an internal step where it is known
-    method: ClassVar[Method] = rk4
+    method: ClassVar[str] = "rk4"  # name of the integrator, see fmus/integrators
     # what the model's form is uncertain in: parameters that stand for it, with the bounds within which
     # other methods of its kind lie, further ones of the same law, of which another value is another form
     # too, and the share of an output that is still open after fitting the first
@@ -142,7 +142,10 @@ class Equations:
 
 
 def equations(model: Model) -> Equations:
-    """Compile a model; ValueError where an expression is missing, left over or depends on nothing known."""
+    """Compile a model; ValueError where an expression is missing, left over or depends on nothing known.
+
+    BadInput where the model's method is no integrator.
+    """
     x, u, p = (
         cs.vertcat(*(model.free_symbols[v.name] for v in model.of(k))) for k in (State, Input, Parameter)
     )
@@ -156,7 +159,8 @@ def equations(model: Model) -> Equations:
     f = _compiled("f", calls, [x, u, p], cs.vertcat(*dot.values()), "dx")
     h = _compiled("h", calls, [x, u, p], cs.vertcat(*y.values()), "y")
     tolerated = [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
-    return Equations(f, h, type(model).method(f, tolerated))
+    method = integrator(type(model).method, f"model '{model.name}'")
+    return Equations(f, h, method.step(f, tolerated))
 
 
 def _with_own_functions(calls: Sequence[Call]) -> list[Call]:

@@ -15,6 +15,7 @@ from estimator.access.copies import Refused
 from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
+from fmus.integrators.rk4 import slopes, weighted
 
 
 class Exchange:
@@ -89,16 +90,13 @@ class Exchange:
         x = self._prepared(row, t)
         h = dt / self.parts
         for part in range(self.parts if dt else 0):
-            x = x + h * self._stages(x, t + part * h, h)
+            x = x + h * self._mean_slope(x, t + part * h, h)
         self._fmu.derivatives(x, t + dt)  # brings the outputs up to date
         return self._fmu.read()
 
-    def _stages(self, x: Array, t: float, h: float) -> Array:
-        f = self._fmu.derivatives
-        k1 = f(x, t)
-        k2 = f(x + h / 2 * k1, t + h / 2)
-        k3 = f(x + h / 2 * k2, t + h / 2)
-        return (k1 + 2 * k2 + 2 * k3 + f(x + h * k3, t + h)) / 6
+    def _mean_slope(self, x: Array, t: float, h: float) -> Array:
+        k = slopes(lambda at, states: self._fmu.derivatives(states, at), x, h, (t, t + h / 2, t + h))
+        return np.asarray(weighted(k) / 6)
 
     def _slopes(self, row: Array, t: float, dt: float) -> tuple[Array, Array]:
         x, h = self._prepared(row, t), dt / self.parts

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.effects.effect import Effect
+from fmus.integrators.rk4 import runge_kutta
 from fmus.port import UNITS, Port
 from fmus.variables import Expr
 
@@ -148,12 +149,8 @@ class _Compiled:
         rates = made.rates(w[1], w[2])
         f = cs.Function("f", [w, x], [cs.vertcat(*(rates[name] for name in self.states))])
         a, b = cs.SX.sym("a", n), cs.SX.sym("b", n)
-        dt, middle = b[0] - a[0], (a + b) / 2
-        k1 = f(a, x)
-        k2 = f(middle, x + dt / 2 * k1)
-        k3 = f(middle, x + dt / 2 * k2)
-        k4 = f(b, x + dt * k3)
-        step = cs.Function("step", [x, a, b], [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+        after = runge_kutta(f, x, b[0] - a[0], (a, (a + b) / 2, b))
+        step = cs.Function("step", [x, a, b], [after])
         self.steps = lru_cache(KEPT)(step.mapaccum)
 
 

@@ -8,7 +8,6 @@ import casadi as cs
 from fmus.contact.forces.coefficients import coefficients
 from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws.polach import creep_force, stress_gradient
-from fmus.integrate import rodas3
 from fmus.model import Model
 from fmus.port import Port
 from fmus.variables import (
@@ -31,7 +30,7 @@ class Testrig(Model):
     __test__ = False  # not a test class, whatever its name begins with
     name = "Testrig"
     step_size = 5e-3
-    method = rodas3
+    method = "rodas3"
 
     omega_w = State("rad/s", doc="wheel speed", nominal=10.0)
     omega_r = State("rad/s", doc="roller speed", nominal=10.0)

@@ -40,7 +40,6 @@ from fmus.wheelset.curves import (
     G,
     contact_curves,
 )
-from fmus.wheelset.stepping import rk4_within_stability
 from fmus.wheelset.track import OPTIONS, Track
 
 TABLE = "thesis Table 3.4"
@@ -87,7 +86,7 @@ class Wheelset(Model):
     form = MappingProxyType({"k_a": (0.5, 1.6), "k_b": (0.6, 2.6), "k_c": (0.0, 1.5), "k_spin": (0.2, 1.2)})
     form_alike = ("G", "nu")
     form_error = 0.02
-    method = rk4_within_stability
+    method = "rk4_within_stability"
     build_options = OPTIONS
 
     y = State("m", doc="lateral displacement of the wheelset", nominal=1e-3)

@@ -67,6 +67,23 @@ class Half(CreepLaw):
         """See CreepLaw.forces."""
         return tuple(0.5 * force for force in linear_forces(c))
 '''
+HEUN = '''
+"""Heun's method."""
+
+from fmus.integrators.integrator import Integrator
+
+
+class Heun(Integrator):
+    """The mean of the rates at the start and at the end that these lead to."""
+
+    name = "heun"
+    order = 2
+
+    def advance(self, f, x, dt, tolerated):
+        """See Integrator.advance."""
+        rate = f(x)
+        return x + dt / 2 * (rate + f(x + dt * rate)), 0.0
+'''
 
 
 @pytest.fixture
@@ -232,6 +249,30 @@ def test_a_creep_law_is_one_file(mine):
 def test_a_creep_law_whose_code_leaves_a_gap_is_refused(mine):
     mine.write("fmus/contact/forces/laws/half.py", LAW.format(code=7))
     assert "has code 7, where the next free one is 5" in mine.refused("build", "wheelset")
+
+
+def test_an_integrator_is_one_file(mine):
+    mine.write("fmus/integrators/heun.py", HEUN)
+    mine.write(
+        "fmus/pendulum/model.py", PENDULUM.replace("    step_size", '    method = "heun"\n    step_size')
+    )
+    mine.railfmi("build", "pendulum", "--out", "out")
+    with Fmu(mine.work / "out" / "Pendulum.fmu") as pendulum:
+        pendulum.restart(phi=0.1, phi_dot=0.0)
+        pendulum.step(1e-3)
+        by_hand = -9.81 * 1e-3 / 2 * 2 * np.sin(0.1)
+        assert pendulum["phi_dot"] == pytest.approx(by_hand, rel=1e-12)
+        assert pendulum["phi"] == pytest.approx(0.1 - 9.81 * 1e-6 / 2 * np.sin(0.1), rel=1e-14)
+    assert mine.passes("tests/fmus/test_integrators.py", "-k", "heun") == 3
+
+
+def test_a_model_whose_integrator_is_not_known_is_refused(mine):
+    mine.write("fmus/integrators/heun.py", HEUN)
+    mine.write(
+        "fmus/pendulum/model.py", PENDULUM.replace("    step_size", '    method = "hein"\n    step_size')
+    )
+    said = mine.refused("build", "pendulum", "--out", "out")
+    assert "model 'Pendulum': method 'hein' is not known; did you mean 'heun'?" in said
 
 
 def test_an_exact_profile_is_one_file(mine):

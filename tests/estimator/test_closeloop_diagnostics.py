@@ -40,6 +40,7 @@ from estimator.record import Array, Record, Run
 from fmus.effects import EFFECTS, offers
 from fmus.effects.free_form import CONTROLS, FreeForm
 from fmus.export.builders.hypotheses import ModelBuilder
+from fmus.integrators.rk4 import runge_kutta
 from fmus.models import MODELS
 from scenarios.closing.report import write_report
 from scenarios.closing.result import result_of
@@ -400,17 +401,14 @@ def drive_record(resistance: Callable[[Array], Array], rng: np.random.Generator)
     F = 60 * np.sin(2 * np.pi * t / 4) + 40 * np.sin(2 * np.pi * t / 1.3 + 1)
     held = np.interp(t, t[::fine], F[::fine])
 
-    def rates(x: Array, f: float) -> Array:
+    def rates(f: float, x: Array) -> Array:
         return np.array([x[1], (f - 200.0 * x[1] + resistance(x[1])) / 95.0])
 
     x, motion, h = np.zeros(2), [], DT / fine
     for k in range(len(t) - 1):
         motion.append(x)
         f0, f1 = held[k], held[k + 1]
-        k1 = rates(x, f0)
-        k2 = rates(x + h / 2 * k1, (f0 + f1) / 2)
-        k3 = rates(x + h / 2 * k2, (f0 + f1) / 2)
-        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3, f1))
+        x = runge_kutta(rates, x, h, (f0, (f0 + f1) / 2, f1))
     y = np.array(motion)[::fine] + NOISE * rng.standard_normal((SAMPLES, 2))
     run = Run(t[::fine], F[::fine, None], y, t[::fine] < 12, t[::fine] >= 12, t[::fine] >= 12)
     return Record((run,), ("F",), ("q", "q_dot"), NOISE)

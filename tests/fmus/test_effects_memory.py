@@ -10,7 +10,6 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from fmus.effects import EFFECTS
 from fmus.effects.input_effect import InputEffect
-from fmus.integrate import rk4
 from fmus.model import equations
 from fmus.models import MODELS
 from fmus.variables import Parameter, State
@@ -161,7 +160,7 @@ def test_a_flexible_mode_never_gives_more_than_it_took(a, b, w, z, f, D):
     assert work.max() <= 1e-3 * (np.ptp(work) + 1e-9)
 
 
-@pytest.mark.parametrize("name", [m for m in EVERY_MODEL if MODELS[m].method is rk4])
+@pytest.mark.parametrize("name", [m for m in EVERY_MODEL if MODELS[m].method == "rk4"])
 def test_no_memory_is_too_fast_for_the_steps_of_a_model(name):
     """The eigenvalues of each memory at the limits of its parameters, within Runge-Kutta's region."""
     for kind in WITH_MEMORY & {k for m, k, _ in EVERY_PLACE if m == name} - {"hysteresis"}:

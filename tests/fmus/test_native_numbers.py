@@ -15,7 +15,6 @@ from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
-from fmus.integrate import rodas3
 from fmus.model import Model, equations
 from fmus.models import MODELS
 from fmus.variables import (
@@ -77,7 +76,7 @@ class Tabled(Model):
 
     name = "Tabled"
     step_size = 0.01
-    method = rodas3
+    method = "rodas3"
     x = State("m", 0.3, doc="place", nominal=1.0)
     v = State("m/s", doc="speed", nominal=1.0)
     u = Input("N", doc="force", nominal=1.0)

@@ -14,7 +14,8 @@ import numpy as np
 
 from estimator.record import Array
 from fmus.effects.site import CLOCK, WAY
-from fmus.export.around.outside import Around, runge_kutta
+from fmus.export.around.outside import Around, straight
+from fmus.integrators.rk4 import runge_kutta
 from fmus.variables import Expr
 
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
@@ -84,7 +85,7 @@ def _step(made: Around) -> tuple[cs.Function, list[tuple[int, int]]]:
         given = iter(cs.vertsplit(w))
         return rates(*(state[row] if i == 1 else next(given) for i, row in rows))
 
-    return cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, w0, w1, dt)]), seen
+    return cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, dt, straight(w0, w1))]), seen
 
 
 def names_of(levers: Sequence[Mapping[str, Array]]) -> list[str]:

@@ -16,12 +16,13 @@ from fmus.export.around.outside import (
     Outside,
     around,
     moved_on,
-    runge_kutta,
+    straight,
 )
 from fmus.export.builders.native.table import free_name
 from fmus.export.container.coupled import COUPLING_STEP
 from fmus.export.ssp.source import AHEAD
 from fmus.host.description import FmuDescription, FmuVariable, PortNames
+from fmus.integrators.rk4 import runge_kutta
 from fmus.model import Model
 from fmus.variables import (
     Expr,
@@ -87,7 +88,7 @@ class EffectsAlone(Model):
         z = cs.vertcat(*(read[n] for n in made.given), *(self.symbols[p.name] for p in made.parameters))
         now = cs.vertcat(*(read[n] for n in motion))
         middle = moved_on(now, ahead)
-        later = runge_kutta(lambda m, state: made.rates(m, state, z), x, now, middle, ahead)
+        later = runge_kutta(lambda m, state: made.rates(m, state, z), x, ahead, straight(now, middle))
         told = _by_name(made.told, made.values(middle, later, z))
         slopes = _by_name([s.name for s in made.states], made.rates(middle, x, z))
         constant = {n: self._constant(n, told.pop(n)) for n in made.told if n in description.parameters}

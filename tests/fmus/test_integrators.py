@@ -10,17 +10,23 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from fmus.errors import BadInput
 from fmus.export.runtime.stepping import Stepper
-from fmus.integrate import rk4, rodas3
+from fmus.integrators import INTEGRATORS
+from fmus.integrators.rk4 import Rk4
+from fmus.integrators.rodas3 import Rodas3
+from fmus.model import equations
+from fmus.models import MODELS
+from tests.helpers.everything import near_start, values
 
-METHODS = [(rk4, 4), (rodas3, 3)]
+every_integrator = pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
 
 
-def compiled(rates, n, method=rodas3, tolerated=1e-6):
+def compiled(rates, n, method=Rodas3, tolerated=1e-6):
     """The step of a method for x' = rates(x, u, p) with one input and one parameter."""
     x, u, p = cs.SX.sym("x", n), cs.SX.sym("u"), cs.SX.sym("p")
     f = cs.Function("f", [x, u, p], [cs.vertcat(*rates(x, u, p))], ["x", "u", "p"], ["dx"])
-    return method(f, [tolerated] * n)
+    return method().step(f, [tolerated] * n)
 
 
 def pendulum(x, u, p):
@@ -33,8 +39,8 @@ def march(step, x, u, p, duration, steps):
     return np.array(x).ravel()
 
 
-@pytest.mark.parametrize(("method", "order"), METHODS)
-def test_order_of_convergence(method, order):
+@every_integrator
+def test_order_of_convergence(method):
     def rates(_, x):
         return [x[1], -np.sin(x[0]) - 0.3 * x[1] ** 3 + 0.2]
 
@@ -42,11 +48,11 @@ def test_order_of_convergence(method, order):
     step = compiled(pendulum, 2, method)
     errors = [np.abs(march(step, [1.0, 0.5], 0.2, 0.3, 2.0, n) - exact).max() for n in (40, 80, 160)]
     # 0.15: the next term of the error at these steps
-    assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.15)
+    assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), method.order, atol=0.15)
 
 
 def test_error_estimate_of_rodas3_has_order_three_and_is_no_less_than_the_error():
-    step, fine = compiled(pendulum, 2, rodas3, 1e-6), compiled(pendulum, 2, rk4)
+    step, fine = compiled(pendulum, 2, Rodas3, 1e-6), compiled(pendulum, 2, Rk4)
     estimates = []
     for h in (0.1, 0.05, 0.025):
         x1, error = step([1.0, 0.5], 0.2, 0.3, h)
@@ -57,7 +63,7 @@ def test_error_estimate_of_rodas3_has_order_three_and_is_no_less_than_the_error(
 
 
 def test_rk4_claims_no_error():
-    assert float(compiled(pendulum, 2, rk4)([1.0, 0.5], 0.2, 0.3, 0.5)[1]) == 0.0
+    assert float(compiled(pendulum, 2, Rk4)([1.0, 0.5], 0.2, 0.3, 0.5)[1]) == 0.0
 
 
 @given(st.floats(-1e8, 0.0), st.floats(-1e8, 1e8))
@@ -126,7 +132,7 @@ def test_no_step_is_longer_than_asked_and_equal_ones_are_equal():
             return Kept(), watched
 
     x, u, p = (memoryview(array("d", v)) for v in ([1.0, 0.5], [0.2], [0.3]))
-    stepper = Stepper(Spy(compiled(pendulum, 2, rk4)), x, u, p, 0.01)
+    stepper = Stepper(Spy(compiled(pendulum, 2, Rk4)), x, u, p, 0.01)
     assert stepper.advance(0.03)
     assert_allclose(seen, [0.01] * 3, rtol=1e-12)
     seen.clear()
@@ -135,9 +141,29 @@ def test_no_step_is_longer_than_asked_and_equal_ones_are_equal():
     assert_allclose(seen, 0.025 / 3, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("method", "_order"), METHODS)
-def test_a_step_that_never_succeeds_leaves_the_state(method, _order):
+@every_integrator
+def test_a_step_that_never_succeeds_leaves_the_state(method):
     x, u, p = (memoryview(array("d", v)) for v in ([1.0, 1.0], [0.0], [1.0]))
     stepper = Stepper(compiled(lambda x, u, p: (cs.sqrt(-1 - x[0] ** 2), x[1]), 2, method), x, u, p, 0.1)
     assert not stepper.advance(0.1)
     assert x.tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [("rk5", "did you mean 'rk4'"), ("euler", "known are .*rk4, .*rodas3"), (Rk4, "is not known")],
+)
+def test_a_model_with_an_unknown_method_is_refused(method, words, monkeypatch):
+    monkeypatch.setattr(MODELS["drive"], "method", method)
+    with pytest.raises(BadInput, match=f"^model 'Drive': method .*{words}"):
+        equations(MODELS["drive"]())
+
+
+@pytest.mark.parametrize("name", INTEGRATORS)
+def test_any_model_can_name_any_integrator(name, monkeypatch):
+    base = MODELS["drive"]()
+    x, u, p = near_start(base, np.random.default_rng(9))
+    monkeypatch.setattr(MODELS["drive"], "method", name)
+    made, dt = equations(base), 1e-5
+    # 1e-3: the drive's rates change within some tenths of a second
+    assert_allclose((values(made.step, x, u, p, dt) - x) / dt, values(made.f, x, u, p), rtol=1e-3)
