@@ -84,6 +84,30 @@ class Heun(Integrator):
         rate = f(x)
         return x + dt / 2 * (rate + f(x + dt * rate)), 0.0
 '''
+FIFTH = '''
+"""Stiffness that rises with the fourth power: a rubber stop that is far in.
+
+In data: a residual that is there at the ends of a motion alone.
+"""
+
+from fmus.effects.force_law import ForceLaw
+from fmus.variables import Parameter
+
+
+class FifthStiffness(ForceLaw):
+    """F = -k_5 q^5."""
+
+    kind = "fifth_stiffness"
+    over = "displacement"
+    source = "this example"
+    places = ("rests",)
+    amplitudes = ("k_5",)
+    k_5 = Parameter("{F}/{q}5", doc="stiffness of fifth order")
+
+    def force(self, q, v):
+        """See ForceLaw.force."""
+        return -self.k_5 * q**5
+'''
 
 
 @pytest.fixture
@@ -264,6 +288,26 @@ def test_an_integrator_is_one_file(mine):
         assert pendulum["phi_dot"] == pytest.approx(by_hand, rel=1e-12)
         assert pendulum["phi"] == pytest.approx(0.1 - 9.81 * 1e-6 / 2 * np.sin(0.1), rel=1e-14)
     assert mine.passes("tests/fmus/test_integrators.py", "-k", "heun") == 3
+
+
+def test_an_effect_is_one_file(mine):
+    mine.write("fmus/effects/fifth_stiffness.py", FIFTH)
+    mine.railfmi("build", "vehicle7dof", "--effect", "fifth_stiffness@body", "--out", "out")
+    assert "passed" in mine.railfmi("check", "out/Vehicle7dof.fmu")
+    with Fmu(mine.work / "out" / "Vehicle7dof.fmu") as vehicle:
+        found = []
+        for k_5 in (0.0, 1e9):
+            vehicle.restart(z1=0.1, fifth_stiffness_body_k_5=k_5)
+            found.append(vehicle["z1_ddot"] * vehicle["m1"])
+    assert found[1] - found[0] == pytest.approx(-1e9 * 0.1**5, rel=1e-9)
+
+
+def test_an_effect_gets_the_contract_tests_for_free(mine):
+    mine.write("fmus/effects/fifth_stiffness.py", FIFTH)
+    tests = ["effects", "effects_laws", "effects_guesses", "effects_builds"]
+    paths = [f"tests/fmus/test_{name}.py" for name in tests]
+    # each of these goes through all effects or through this one
+    assert mine.passes(*paths, "-k", "fifth_stiffness or contracts or documentation or offer") >= 20
 
 
 def test_a_model_whose_integrator_is_not_known_is_refused(mine):

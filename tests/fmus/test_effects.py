@@ -1,6 +1,8 @@
 """Effects in models: off at zero, at their places what the laws say, refused where senseless."""
 
+import inspect
 import sys
+from pathlib import Path
 
 import casadi as cs
 import numpy as np
@@ -20,6 +22,9 @@ from tests.helpers.everything import (
     EVERY_EFFECT,
     EVERY_MODEL,
     EVERY_PLACE,
+    FALLBACK,
+    FORCE_LAWS,
+    WITH_MEMORY,
     fitting,
     near_start,
     start,
@@ -36,11 +41,9 @@ CONTRACT = """
     actuator_gain actuator_lag actuator_saturation input_delay
     flexible_mode
 """
-# curves without a cause, never offered
-FALLBACK = {"free_form_velocity", "free_form_displacement", "free_form_angle"}
 ALL = {**MODELS, "bench": Bench}
-FORCE_LAWS = [kind for kind in EVERY_EFFECT if issubclass(EFFECTS[kind], ForceLaw)]
-WITH_MEMORY = {kind for kind in EVERY_EFFECT if EFFECTS[kind].states("translation")}
+OWN = {kind for kind in EVERY_EFFECT if ROOT in Path(inspect.getfile(EFFECTS[kind])).parents}
+CHANGING = [kind for kind in EVERY_EFFECT if EFFECTS[kind].acts_on in ("parameter", "component")]
 MORE = {"clock": 1.0, "way": 30.0}  # a time at which steps that began at 1 s are half done
 
 
@@ -73,6 +76,27 @@ def of_location(known, kind, location):
     """Parameters and states of an effect at a location, without its prefix."""
     prefix = f"{kind}_{location}_"
     return {n.removeprefix(prefix): v for n, v in known.items() if n.startswith(prefix)}
+
+
+def force(kind, q, v, p):
+    """Force by the second writing of a law, or by the law itself where there is none: its place is tested."""
+    if kind in FORCES:
+        return FORCES[kind](MORE["clock"], MORE["way"], q, v, p)
+    return float(EFFECTS[kind]({**MORE, **p}).force(q, v))
+
+
+def rates_of(kind, q, v, p):
+    """Rates of a law's states by name, written a second time where they are."""
+    if kind in RATES:
+        return {state: rate(q, v, p) for state, rate in RATES[kind].items()}
+    return {state: float(rate) for state, rate in EFFECTS[kind]({**MORE, **p}).rates(q, v).items()}
+
+
+def changed(kind, value, p):
+    """What becomes of a parameter, written a second time where it is."""
+    if kind in PARAMETERS:
+        return PARAMETERS[kind](MORE["clock"], value, p)
+    return float(EFFECTS[kind]({**MORE, **p}).changed(value))
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -126,21 +150,20 @@ def test_a_force_law_acts_at_each_part_of_its_place_by_the_motion_there(name, ki
                 there = cs.vertcat(part.displacement, part.velocity, *part.forces.values())
                 q, v, *gains = values(_compiled("there", base.calls, columns, there, "y"), *own)
                 number = f"_{i}" if len(port.acting) > 1 else ""
-                mine = chosen | {s: chosen[f"{s}{number}"] for s in RATES.get(kind, ())}
-                force = FORCES[kind](MORE["clock"], MORE["way"], q, v, mine)
+                memory = [s.name for s in EFFECTS[kind].states(part.motion)]
+                mine = chosen | {s: chosen[f"{s}{number}"] for s in memory}
+                pushing = force(kind, q, v, mine)
                 for target, gain in zip(part.forces, gains, strict=True):
-                    pushed[inputs.index(target)] += gain * force
-                for state, rate in RATES.get(kind, {}).items():  # atol: of some 100
-                    assert_allclose(
-                        rates[f"{kind}_{at}_{state}{number}"], rate(q, v, mine), rtol=1e-9, atol=1e-8
-                    )
+                    pushed[inputs.index(target)] += gain * pushing
+                for state, rate in rates_of(kind, q, v, mine).items():  # atol: of some 100
+                    assert_allclose(rates[f"{kind}_{at}_{state}{number}"], rate, rtol=1e-9, atol=1e-8)
         expected = values(bare.f, own[0], pushed, own[2])
         found = np.array([*rates.values()])[:n]
         # 1e-9: the same sums in another order
         assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("kind", PARAMETERS)
+@pytest.mark.parametrize("kind", CHANGING)
 @pytest.mark.parametrize("location", ["m", "k", "V", "mounting", "mount", "spring"])
 def test_parameters_become_what_the_effect_says(kind, location):
     base = Bench()
@@ -151,12 +174,12 @@ def test_parameters_become_what_the_effect_says(kind, location):
     names = EFFECTS[kind].locations(base)[location]
     model = Bench([(EFFECTS[kind], location)])
     known, (x, u, p) = point(model, base, np.random.default_rng(3))
-    chosen, changed = of_location(known, kind, location), start(base, Parameter)
+    chosen, values_then = of_location(known, kind, location), start(base, Parameter)
     for name in names:
         i = [v.name for v in base.of(Parameter)].index(name)
         mine = {n.removesuffix(f"_{name}"): v for n, v in chosen.items()}
-        changed[i] = PARAMETERS[kind](MORE["clock"], changed[i], mine)
-    expected = values(equations(base).f, x[:3], u, changed)
+        values_then[i] = changed(kind, values_then[i], mine)
+    expected = values(equations(base).f, x[:3], u, values_then)
     assert_allclose(values(equations(model).f, x, u, p)[:3], expected, rtol=1e-12)
 
 
@@ -184,7 +207,12 @@ def test_laws_at_ports_see_parameters_and_inputs_as_other_effects_left_them():
 
 
 def test_kinds_are_the_contracts():
-    assert set(EVERY_EFFECT) == {*CONTRACT.split(), *FALLBACK}
+    kinds = {*CONTRACT.split()}
+    assert kinds <= OWN
+    assert len(FALLBACK) == len(FALLBACK & OWN) == 3
+    assert {k for k in kinds if k in FORCE_LAWS} <= set(FORCES)
+    assert {k for k in kinds if k in CHANGING} <= set(PARAMETERS)
+    assert {k for k in kinds & WITH_MEMORY if k in FORCE_LAWS} <= set(RATES)
 
 
 def test_what_is_told_twice_is_offered_once():
@@ -304,11 +332,10 @@ def test_all_that_fits_is_offered():
 def test_the_documentation_names_every_kind_with_its_parameters_and_source():
     text = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
-    named = {*CONTRACT.split(), *FALLBACK}
-    assert set(rows) == {*named, *FAULTS}
+    assert set(rows) == {*OWN, *FAULTS}
     for kind, fault in FAULTS.items():
         assert f"`{fault.__doc__.strip().rstrip('.')}`" in rows[kind]
-    for kind, effect in EFFECTS.items():
+    for kind, effect in ((kind, EFFECTS[kind]) for kind in OWN):
         law = effect.__doc__.strip().splitlines()[0].rstrip(".").replace("|", "\\|")
         assert f"`{law}`" in rows[kind]
         assert all(f"`{p.name}`" in rows[kind] for p in effect.parameters("translation"))

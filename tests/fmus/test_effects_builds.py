@@ -1,8 +1,13 @@
 """Effects in FMUs: each kind built, restarted from its middle, and around a foreign FMU as in our own."""
 
+from functools import cache
+
+import casadi as cs
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import lsim
 
 from fmus.drive.model import Drive
 from fmus.effects import EFFECTS, offers, parse_effect
@@ -16,43 +21,60 @@ from fmus.host.archive import describe
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 from fmus.host.grading.check import grade
-from tests.fmus.test_effects import FALLBACK
-from tests.helpers.everything import EVERY_EFFECT
+from tests.helpers.everything import EVERY_EFFECT, FALLBACK, FORCE_LAWS
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
 T = np.linspace(0, 3, 301)
 INPUTS = {"F": 150 * np.sin(np.pi * T[:-1]) + 60 * np.sin(11 * T[:-1])}
 OUTPUTS = ["q", "q_dot"]
-CASES = {  # a size of each that matters here
-    "constant_force@carriage": {"F_0": 20.0},
-    "step_force@carriage": {"F_0": 30.0, "t0": 1.0},
-    "coulomb_friction@carriage": {"F_c": 20.0, "v_s": 0.01},
-    "stribeck_friction@carriage": {"F_c": 10.0, "F_b": 20.0, "v_b": 0.05, "v_s": 0.01},
-    "viscous_damping@carriage": {"c": 50.0},
-    "quadratic_damping@carriage": {"c": 80.0},
-    "cubic_stiffness@carriage": {"k_3": 1e4},
-    "bump_stop@carriage": {"k": 5e3, "gap": 0.02},
-    "free_play@carriage": {"k": 500.0, "gap": 0.02},
-    "hysteresis@carriage": {"F_h": 30.0, "q_y": 0.01},
-    "periodic_force@carriage": {"F_sin": 20.0, "order": 60.0},
-    "harmonic_excitation@carriage": {"F_sin": 20.0, "f": 3.0},
-    "flexible_mode@carriage": {"m": 20.0, "f": 6.0, "D": 0.05},
-    "parameter_offset@M": {"delta": 10.0},
-    "parameter_step@M": {"delta": 10.0, "t0": 1.5},
-    "parameter_drift@F_v": {"rate": 10.0},
-    "actuator_gain@F": {"gain": -0.1},
-    "actuator_saturation@F": {"share": 1.0, "limit": 100.0},
-    "actuator_lag@F": {"share": 1.0, "T": 0.1},
-    "input_delay@F": {"share": 1.0, "T": 0.1},
+AT = {"port": "carriage", "parameter": "M", "input": "F"}
+CASES = [
+    f"{kind}@{'F_v' if kind == 'parameter_drift' else AT[EFFECTS[kind].acts_on]}"
+    for kind in EVERY_EFFECT
+    if EFFECTS[kind].acts_on in AT and kind not in FALLBACK
+]
+SHARP = {  # shapes that ask more of the coupling than those that `typical` takes
+    "hysteresis": {"F_h": 30.0, "q_y": 0.01},
+    "flexible_mode": {"m": 20.0, "f": 6.0, "D": 0.05},
 }
-COMPONENTS = {"stiffness_change", "damping_change"}  # need a model that says what makes a component
-BY_VELOCITY = ("_damping", "_friction", "flexible_mode")  # a held force lags behind it by half a step
+# those that need a model which says what makes a component
+COMPONENTS = {kind for kind in EVERY_EFFECT if EFFECTS[kind].acts_on == "component"}
+
+
+def by_velocity(kind):
+    """Whether a force goes by the velocity: held over a step, it lags behind that by half a step."""
+    effect, q, v = EFFECTS[kind], cs.SX.sym("q"), cs.SX.sym("v")
+    if kind not in FORCE_LAWS:
+        return False
+    values = {p.name: cs.SX.sym(p.name) for p in effect.parameters("translation")}
+    return bool(cs.depends_on(cs.SX(effect(values).force(q, v)), v))
+
+
+def middle(guesses):
+    return guesses[len(guesses) // 2]
+
+
+@cache
+def typical(kind):
+    """Values of an effect's parameters that show in the drive: a shape that it guesses, 30 N of a force."""
+    effect, M, F_v = EFFECTS[kind], 95.0, 200.0
+    F = 150 * np.sin(np.pi * T) + 60 * np.sin(11 * T)
+    if effect.acts_on == "port":
+        v = lsim(([1.0], [M, F_v]), F, T)[1]
+        motion = T, cumulative_trapezoid(v, T, initial=0.0), v
+        shape = middle(effect.guesses(*motion, v))
+        size = 30.0 / np.abs(effect.along(shape | dict.fromkeys(effect.amplitudes, 1.0), *motion)).max()
+        return shape | dict.fromkeys(effect.amplitudes, size)
+    shape = middle(effect.guesses(T, F) if effect.acts_on == "input" else effect.guesses(T))
+    size = effect.size(T[-1]) if effect.acts_on == "input" else effect.size(M, T[-1])
+    return shape | dict.fromkeys(effect.amplitudes, size) | dict(effect.complete)
 
 
 def started(text):
     """Parameters of a case by their names in an FMU."""
     effect, location = parse_effect(text)
-    return {effect.name_at(location, name): value for name, value in CASES[text].items()}
+    values = SHARP.get(effect.kind) or typical(effect.kind)
+    return {effect.name_at(location, name): value for name, value in values.items()}
 
 
 @pytest.fixture(scope="module")
@@ -99,17 +121,13 @@ def run(path, start):
         return fmu.simulate(T, INPUTS, OUTPUTS, start)
 
 
-def test_every_kind_is_among_the_cases():
-    assert {text.partition("@")[0] for text in CASES} | COMPONENTS | FALLBACK == set(EVERY_EFFECT)
-
-
 @pytest.mark.parametrize("text", CASES)
 def test_around_a_foreign_fmu_an_effect_does_what_it_does_in_our_own(text, drive, own, around):
     bare, inside, outside = run(drive, {}), run(own(text), started(text)), run(around(text), started(text))
     size = np.abs(inside - bare).max(axis=0)
     assert np.all(size > 1e-4)  # m, m/s: the case shows
     # of coupling steps of 1 ms: second order, but where a force held over a step goes by the velocity
-    tolerance = 3e-3 if text.partition("@")[0].endswith(BY_VELOCITY) else 5e-5
+    tolerance = 3e-3 if by_velocity(text.partition("@")[0]) else 5e-5
     assert np.all(np.abs(outside - inside).max(axis=0) < tolerance * size)
     assert_allclose(run(around(text), {}), bare, atol=1e-12)  # off: the same steps, in shorter ones
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import HANDFUL, ForceLaw
 from fmus.effects.spectrum import frequencies, orders, splits
-from tests.helpers.everything import EVERY_EFFECT
+from tests.helpers.everything import EVERY_EFFECT, FORCE_LAWS
 
 T = np.linspace(0, 30, 3001)
 SEEDS = st.integers(0, 99)
@@ -161,7 +161,7 @@ def test_guesses_name_parameters_and_stay_within_their_limits(kind):
             assert known[name].max is None or value <= known[name].max
 
 
-@pytest.mark.parametrize("kind", [k for k in EVERY_EFFECT if issubclass(EFFECTS[k], ForceLaw)])
+@pytest.mark.parametrize("kind", FORCE_LAWS)
 def test_where_nothing_moves_nothing_is_made_up(kind):
     still = np.zeros_like(T)
     for guess in EFFECTS[kind].guesses(T, still, still, still):

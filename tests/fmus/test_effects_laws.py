@@ -15,9 +15,8 @@ from fmus.effects.force_law import ForceLaw
 from fmus.effects.timing import RISE, begun
 from fmus.port import UNITS
 from fmus.units import base_exponents
-from tests.helpers.everything import EVERY_EFFECT
+from tests.helpers.everything import EVERY_EFFECT, FORCE_LAWS
 
-FORCE_LAWS = [kind for kind in EVERY_EFFECT if issubclass(EFFECTS[kind], ForceLaw)]
 RESISTING = [k for k in FORCE_LAWS if k.endswith(("_damping", "_friction"))]
 SCALE = {"kg": 3.0, "m": 0.5, "s": 7.0}  # other units of mass, length and time
 T = np.linspace(0, 2, 801)

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from fmus.effects import EFFECTS, offers
 from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
+from fmus.effects.free_form import FreeForm
 from fmus.model import Model
 from fmus.models import MODELS
 from fmus.variables import Input, Parameter, State
@@ -20,6 +22,10 @@ EVERY_EFFECT = sorted(EFFECTS)
 EVERY_PLACE: list[Place] = [
     (name, kind, location) for name in EVERY_MODEL for kind, location in offers(MODELS[name]())
 ]
+FORCE_LAWS = [kind for kind in EVERY_EFFECT if issubclass(EFFECTS[kind], ForceLaw)]
+WITH_MEMORY = {kind for kind in EVERY_EFFECT if EFFECTS[kind].states("translation")}
+# curves without a cause, never offered
+FALLBACK = {kind for kind in EVERY_EFFECT if issubclass(EFFECTS[kind], FreeForm)}
 
 
 def fitting(model: str) -> list[tuple[type[Effect], str]]:
