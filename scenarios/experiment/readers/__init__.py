@@ -9,11 +9,24 @@ from fmus.registry import classes_in
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.sheet import Sheet
 
-READERS: dict[str, Reader] = {
-    suffix: reader()
-    for reader in classes_in(sys.modules[__name__], Reader)  # type: ignore[type-abstract]  # found are concrete
-    for suffix in reader.suffixes
-}
+
+def _by_suffix(readers: list[type[Reader]]) -> dict[str, Reader]:
+    """Readers by suffix; BadInput where one names no kind or suffixes, or two share a suffix."""
+    found: dict[str, Reader] = {}
+    for reader in readers:
+        where = f"reader {reader.__name__} of {reader.__module__}"
+        for name in ("kind", "suffixes"):
+            if not getattr(reader, name, None):
+                raise BadInput(f"{where}: has no '{name}'; say it in the class")
+        for suffix in reader.suffixes:
+            if suffix in found:
+                raise BadInput(f"{where}: '{suffix}' is also of {found[suffix].kind}; choose another suffix")
+            found[suffix] = reader()
+    return found
+
+
+# what is found is concrete
+READERS = _by_suffix(classes_in(sys.modules[__name__], Reader))  # type: ignore[type-abstract]
 
 
 def read_sheet(file: Path, time: str | None = None, columns: Collection[str] | None = None) -> Sheet:
