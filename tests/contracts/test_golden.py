@@ -1,15 +1,13 @@
 """Results stay as they are kept, and a verdict follows from nothing but its checks and the policy."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from estimator.closeloop.evidence import Check, verdict_of
 from estimator.closeloop.policy import DEFAULT
 from scenarios import close_loop
-from scenarios.closing.result import Result
-from tests.golden.kept import CHALLENGE, FOLDER, challenge_record, figures, read
+from tests.golden.kept import CHALLENGE, FOLDER, alike, challenge_record, figures, read
 
 KEPT = sorted(file.stem for file in FOLDER.glob("*.json"))
 DECISION = DEFAULT.decision
@@ -32,26 +30,6 @@ AT_MOST = {  # all others have to reach their limit
     "effects that are needed",
     "faults of sensors among them",
 }
-
-
-def alike(found: Any, kept: Any, at: str = "") -> None:
-    """The same but for what other compilers and libraries round differently."""
-    if isinstance(kept, dict):
-        assert found.keys() == kept.keys(), at
-        for key in kept:
-            alike(found[key], kept[key], f"{at}.{key}")
-    elif isinstance(kept, list):
-        assert len(found) == len(kept), at
-        for i, (a, b) in enumerate(zip(found, kept, strict=True)):
-            alike(a, b, f"{at}[{i}]")
-    elif isinstance(kept, float):
-        assert found == pytest.approx(kept, rel=1e-4, abs=1e-9), at
-    else:
-        assert found == kept, at
-
-
-def test_the_demo_is_as_it_is_kept(demo: tuple[Result, Path]) -> None:
-    alike(figures(demo[0]), read("demo"))
 
 
 @pytest.mark.slow

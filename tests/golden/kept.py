@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from benchmarks.challenge.draw import plans
 from benchmarks.challenge.make import make
 from scenarios.closing.result import Result
@@ -41,3 +43,19 @@ def read(name: str) -> dict[str, Any]:
     """The result that was kept."""
     kept: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return kept
+
+
+def alike(found: Any, kept: Any, at: str = "") -> None:
+    """Assert that what was found is what was kept, but for what other compilers and libraries round."""
+    if isinstance(kept, dict):
+        assert found.keys() == kept.keys(), at
+        for key in kept:
+            alike(found[key], kept[key], f"{at}.{key}")
+    elif isinstance(kept, list):
+        assert len(found) == len(kept), at
+        for i, (a, b) in enumerate(zip(found, kept, strict=True)):
+            alike(a, b, f"{at}[{i}]")
+    elif isinstance(kept, float):
+        assert found == pytest.approx(kept, rel=1e-4, abs=1e-9), at
+    else:
+        assert found == kept, at

@@ -15,6 +15,7 @@ from fmus.export.builders.pythonfmu import build_python
 from fmus.host.fmu import Fmu
 from scenarios import close_loop
 from scenarios.closing.result import Result
+from tests.golden.kept import alike, figures, read
 from tests.helpers.paths import ROOT
 from tests.truth.rig import single, write_record
 
@@ -36,6 +37,10 @@ def test_the_demo_finds_the_drag_of_its_truth_model(demo: tuple[Result, Path]) -
     assert abs(value - 0.3) < 4 * error + 0.001  # the truth model's contact differs in form by so much
     assert abs(result.calibrated["mu0"][0] - 0.37) < 0.003
     assert min(result.gap_closed.values()) > 0.9
+
+
+def test_the_demo_is_as_it_is_kept(demo: tuple[Result, Path]) -> None:
+    alike(figures(demo[0]), read("demo"))
 
 
 def test_the_result_is_the_contracts_json(demo: tuple[Result, Path]) -> None:
