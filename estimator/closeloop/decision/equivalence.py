@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import permutations
 
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.relations import becomes, includes, one_way
+from estimator.closeloop.hypotheses.relations import becomes, includes, one_way, reversal
 from estimator.sensor_faults import FAULTS
+from fmus.effects import EFFECTS
 
 
 def equivalent(baseline: Baseline, best: Hypothesis, others: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -40,14 +42,14 @@ def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -
 
 
 def splitting(members: Sequence[Hypothesis]) -> str:
-    """The experiment that would tell the members of a class apart."""
+    """The experiment that would tell the members of a class apart, from what their laws say of themselves."""
     kinds = {c.kind for m in members for c in m.candidates}
-    places = {c.location for m in members for c in m.candidates}
-    where = " and ".join(sorted(places))
+    where = " and ".join(places := sorted({c.location for m in members for c in m.candidates}))
     advice = []
-    if {"constant_force", "coulomb_friction"} <= kinds:
+    if any(reversal(a, b) for a, b in permutations(kinds, 2)):
         advice.append(f"a run in which the velocity at {where} changes its sign")
-    if kinds & {"viscous_damping", "quadratic_damping"} and len(kinds) > 1:
+    curves = {kind for kind in kinds & set(EFFECTS) if EFFECTS[kind].over == "velocity"}
+    if any(b != a and not reversal(a, b) for a in curves for b in kinds):
         advice.append(f"runs at two or more clearly different speeds of {where}")
     advice += dict.fromkeys(fault.splitting for kind, fault in FAULTS.items() if kind in kinds)
     if len(places) > 1:

@@ -87,3 +87,9 @@ def _member_by_member(candidates: Sequence[Candidate], others: Sequence[Candidat
     same = [a.label == b.label for a, b in pairs]
     simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
     return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))
+
+
+def reversal(kind: str, other: str) -> bool:
+    """Whether two kinds are the same in a motion that keeps its sign, and differ where it turns round."""
+    pairs = ((kind, other), (other, kind))
+    return any(b in EFFECTS[a].one_way for a, b in pairs if a in EFFECTS)
