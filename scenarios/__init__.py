@@ -1,4 +1,4 @@
-"""Questions asked of the FMUs: experiments, estimates, closing the loop, scenarios, reports, command line."""
+"""Work with the FMUs: experiments, estimates, closing the loop, scenarios, reports, command line."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Loaded when asked for, so that the command line can still say what is wrong with a user's file."""
+    """Loaded on first use, so that the command line can report an error in a user's file in one line."""
     if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

@@ -1,4 +1,4 @@
-"""A command that an FMU ends together with the process does not pass for one that has finished."""
+"""Report an error if an FMU ends the process, so that the command does not seem to have finished."""
 
 import atexit
 import ctypes
@@ -11,24 +11,24 @@ from typing import Any
 
 from fmus.host.instance import MESSAGES
 
-ENDED = 2  # exit code where an FMU ended the process
+ENDED = 2  # exit code if an FMU ended the process
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
 
 
 @contextmanager
 def finished_or_said() -> Iterator[None]:
-    """While it lasts, the end of this process by an FMU gives one line and exit code 2, whatever its status.
+    """Within this context, an FMU that ends the process causes one error line and exit code 2.
 
-    That is by `exit` of the C library, by that of Python, or by Python's `os._exit`. Signals and the `_exit`
-    of the C library cannot be caught within the process.
+    This covers `exit` of the C library, `sys.exit` and `os._exit` of Python, whatever status the FMU gives.
+    Signals and `_exit` of the C library cannot be caught within the process.
     """
     process, really = os.getpid(), os._exit
 
     def ended(*_: Any) -> None:
-        if os.getpid() != process:  # a copy of this process ends as it likes
+        if os.getpid() != process:  # a forked copy of this process may end freely
             return
         for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError):  # closed, or nobody reads it
+            with suppress(OSError, ValueError):  # the stream is closed, or its reader has gone
                 stream.flush()
         shown = f"{SHOW_CURSOR}\n" if sys.stderr.isatty() else ""
         os.write(2, f"{shown}railfmi: {_sentence()}\n".encode())
@@ -40,7 +40,7 @@ def finished_or_said() -> Iterator[None]:
 
     atexit.register(ended)
     withdraw = _at_exit_of_c(ended)
-    os._exit = at_once  # an FMU in Python shares this interpreter, so that it is caught here
+    os._exit = at_once  # an FMU in Python calls it in this interpreter
     try:
         yield
     finally:
@@ -50,20 +50,21 @@ def finished_or_said() -> Iterator[None]:
 
 
 def _sentence() -> str:
-    """What has happened, with the FMUs that were open."""
+    """The error message, with the names of the FMUs that were open."""
     names = ", ".join(dict.fromkeys(name.rpartition("_")[0] for name in MESSAGES))
     opened = f"the open FMUs are {names}" if "," in names else f"the open FMU is {names}"
     who = f"an FMU ({opened})" if names else "an FMU, or a library that it loads,"
     return (
         f"{who} ended the process before the command had finished; its results are missing or incomplete; "
-        "'railfmi check' on the FMU tells in which call"
+        "run 'railfmi check' on the FMU to see in which call this happens"
     )
 
 
 def _at_exit_of_c(ended: Callable[..., None]) -> Callable[[], None]:
-    """Have the C library call a function at `exit`, which Python's atexit does not see when C code calls it.
+    """Register a function with the C library's `exit`; Python's atexit is not run when C code calls `exit`.
 
-    The function that is returned withdraws it; the C library must not call Python after Python has ended.
+    The returned function removes the registration. It must be called before Python ends, because the C
+    library must not call Python after that.
     """
     if not (libc_ver()[0] == "glibc" or sys.platform == "darwin"):  # others cannot withdraw it
         return lambda: None

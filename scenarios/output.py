@@ -1,4 +1,4 @@
-"""The folder that a command writes its results into."""
+"""The folder into which a command writes its results."""
 
 import os
 from pathlib import Path
@@ -7,7 +7,7 @@ from fmus.errors import BadInput
 
 
 def writable(folder: Path) -> Path:
-    """The folder, made where it was not there; BadInput where it cannot be written to."""
+    """Make the folder if it does not exist; raises BadInput if it cannot be made or written to."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The command line: one module a command."""
+"""The command line: one module for each command."""
 
 import sys
 
@@ -6,7 +6,7 @@ from fmus.errors import BadInput
 
 
 def main() -> None:
-    """Entry of the console command; a file of RAILFMI_PATH that cannot be used ends with one line too."""
+    """Entry of the console command; an unusable file of RAILFMI_PATH also ends in one error line."""
     try:
         from scenarios.cli.app import main as run
     except BadInput as error:

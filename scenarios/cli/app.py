@@ -1,4 +1,4 @@
-"""The command `railfmi`: exit 0 done, 1 a check failed, 2 wrong input with one clear line."""
+"""The command `railfmi`; exit codes: 0 done, 1 a check failed, 2 wrong input, with one error line."""
 
 import os
 import sys
@@ -33,7 +33,7 @@ def main() -> None:
 
 
 def run_safely(command: Callable[[], object]) -> int:
-    """Run a command line and turn what is wrong with its input into one line and exit code 2."""
+    """Run a command line; errors in the input become one line and exit code 2."""
     try:
         code = command()
         return code if isinstance(code, int) else 0
@@ -55,7 +55,7 @@ def run_safely(command: Callable[[], object]) -> int:
         shown = getattr(error, "format_message", None)  # click's own errors of usage
         if shown is None:
             raise
-        if shown():  # empty where the help was shown instead
+        if shown():  # empty if the help was shown
             said.print(f"railfmi: {' '.join(shown().split())}", markup=False, soft_wrap=True)
         return 2
 

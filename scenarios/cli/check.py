@@ -11,7 +11,7 @@ from scenarios.cli.console import app
 
 @app.command()
 def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
-    """Grade an FMU for use here: validation, restart, repeatability, instances, state, tunables."""
+    """Check if railfmi can use an FMU: validation, restart, repeatability, instances, state, tunables."""
     from fmus.host.grading.check import grade
 
     result = grade(fmu)

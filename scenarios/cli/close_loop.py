@@ -1,4 +1,4 @@
-"""`railfmi close-loop`: trace what a model lacks, in one experiment or several."""
+"""`railfmi close-loop`: find the effect that a model lacks, from one experiment or several."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,22 +11,24 @@ from scenarios.cli.console import Out, app, said
 @app.command("close-loop")
 def close_loop(
     experiments: Annotated[
-        list[Path], typer.Argument(help="experiment.toml, or its folder; several get one table")
+        list[Path], typer.Argument(help="experiment.toml, or its folder; several are compared")
     ],
     out: Out = Path("out"),
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="processes; one a core by default")] = None,
-    seed: Annotated[int, typer.Option(help="of the simulated records without an effect")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="number of processes; by default one per core")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="seed of the random numbers")] = 0,
     resume: Annotated[
-        bool, typer.Option("--resume", help="go on from the checkpoints of an interrupted run")
+        bool, typer.Option("--resume", help="continue from the checkpoints of an interrupted run")
     ] = False,
 ) -> None:
     """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
 
-    Several experiments are written to a folder each, with one table; where they use the same FMU, what one
-    shows is tested on the others and fitted to all. Ctrl-C keeps what is finished.
+    Several experiments get a folder each and a common table. If they use the same FMU, each effect found is
+    tested on the other records and fitted to all of them. Ctrl-C keeps the experiments that are finished.
     """
     from scenarios.closing.lines import lines_of, table_of
 
@@ -37,7 +39,7 @@ def close_loop(
             with said.status("reading the experiment") as status:
                 result = run(experiments[0], out, data, status.update, jobs, seed, resume)
         except KeyboardInterrupt:
-            said.print("railfmi: interrupted; the same command with --resume goes on from here")
+            said.print("railfmi: interrupted; run the same command with --resume to continue from here")
             raise typer.Exit(130) from None
         for line in lines_of(result):
             typer.echo(line)

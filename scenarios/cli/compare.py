@@ -1,4 +1,4 @@
-"""`railfmi compare`: two FMUs side by side."""
+"""`railfmi compare`: the outputs of two FMUs for the same inputs and parameters."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,14 +12,16 @@ from scenarios.cli.console import Out, app, said
 def compare(
     a: Annotated[Path, typer.Argument(help="FMU file")],
     b: Annotated[Path, typer.Argument(help="the other FMU file")],
-    experiment: Annotated[Path, typer.Argument(help="experiment.toml whose inputs and parameters both get")],
+    experiment: Annotated[
+        Path, typer.Argument(help="experiment.toml with the inputs and parameters for both FMUs")
+    ],
     out: Out = Path("out"),
     tolerance: Annotated[float, typer.Option(help="relative difference that is accepted")] = 1e-9,
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
 ) -> None:
-    """Run two FMUs side by side and report where they differ: exit 1 if by more than the tolerance."""
+    """Simulate two FMUs and report their differences; exit 1 if one is larger than the tolerance."""
     from scenarios.comparing.comparing import compare as side_by_side
 
     with said.status("reading the experiment") as status:

@@ -1,4 +1,4 @@
-"""What all commands share: the application, the console beside the results, common options."""
+"""Parts shared by all commands: the application, the console for progress, common options."""
 
 from pathlib import Path
 from typing import Annotated

@@ -16,7 +16,7 @@ def estimate(
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
 ) -> None:
-    """Estimate states, parameters and unknown inputs of an FMU: exit 1 if its own tests reject the filter."""
+    """Estimate states, parameters and unknown inputs of an FMU; exit 1 if the filter fails its tests."""
     from scenarios.estimating.estimating import estimate as filtered
 
     with said.status("reading the experiment") as status:

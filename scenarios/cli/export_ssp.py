@@ -1,4 +1,4 @@
-"""`railfmi export-ssp`: a scenario for other tools."""
+"""`railfmi export-ssp`: write a scenario as an SSP package for other tools."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,16 +13,18 @@ from scenarios.cli.console import app, said
 def export_scenario(
     scenario: Annotated[Path, typer.Argument(help="scenario file")],
     out: Annotated[Path, typer.Option("--out", help="folder, or a file ending in .ssp")] = Path("out"),
-    kind: Annotated[str, typer.Option(help="of the FMUs: native or python")] = "native",
-    variant: Annotated[str | None, typer.Option(help="of the scenario; its first by default")] = None,
+    kind: Annotated[str, typer.Option(help="kind of FMUs: native or python")] = "native",
+    variant: Annotated[str | None, typer.Option(help="variant of the scenario, by default the first")] = None,
     fmi: Annotated[int, typer.Option(help="FMI version, 2 or 3; 3 is native")] = 2,
-    platform: Annotated[list[str] | None, typer.Option(help="of native FMUs; see build")] = None,
+    platform: Annotated[
+        list[str] | None, typer.Option(help="platforms of native FMUs; see railfmi build")
+    ] = None,
 ) -> None:
-    """Write a scenario as an SSP 1.0 package that other tools open."""
+    """Write a scenario as an SSP 1.0 package that other tools can open."""
     from scenarios.exchange import export_ssp
 
     if kind not in ("native", "python"):
-        raise BadInput(f"--kind {kind}: 'native' and 'python' are built")
+        raise BadInput(f"--kind {kind}: not a kind of FMU; use 'native' or 'python'")
     with said.status("reading the scenario") as status:
         package = export_ssp(
             scenario,

@@ -1,4 +1,4 @@
-"""`railfmi import-ssp`: a package of another tool as a scenario."""
+"""`railfmi import-ssp`: read an SSP package of another tool as a scenario."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +12,7 @@ from scenarios.cli.console import Out, app, said
 def import_package(
     package: Annotated[Path, typer.Argument(help="SSP package (.ssp)")], out: Out = Path("out")
 ) -> None:
-    """Read an SSP package as a scenario folder that `railfmi run` runs."""
+    """Read an SSP package and write a scenario folder for `railfmi run`."""
     from scenarios.exchange import import_ssp
 
     with said.status("reading the package") as status:

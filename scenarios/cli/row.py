@@ -1,4 +1,4 @@
-"""`railfmi row`: estimates of the literature, rebuilt."""
+"""`railfmi row`: repeat estimates that are published in the literature."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,14 +10,19 @@ from scenarios.cli.console import Out, app, said
 
 @app.command("row")
 def rebuild(
-    name: Annotated[str | None, typer.Argument(help="of a row; without, all are listed")] = None,
-    records: Annotated[
-        Path | None, typer.Option(help="folder with CASE.csv each; without, the FMU makes them itself")
+    name: Annotated[
+        str | None, typer.Argument(help="name of the row; without a name, all rows are listed")
     ] = None,
-    case: Annotated[list[str] | None, typer.Option(help="of the row's; all by default")] = None,
+    records: Annotated[
+        Path | None,
+        typer.Option(
+            help="folder with a record CASE.csv for each case; by default the FMU simulates the records"
+        ),
+    ] = None,
+    case: Annotated[list[str] | None, typer.Option(help="case of the row, by default all")] = None,
     out: Out = Path("out"),
 ) -> None:
-    """Rebuild an estimate of the literature: exit 1 if a target is not met. Without a name, list them."""
+    """Repeat an estimate of the literature; exit 1 if a target is not met. Without a name, list all rows."""
     from scenarios.literature import ROWS, run_row
 
     if name is None:
@@ -26,7 +31,7 @@ def rebuild(
         return
     outcome = run_row(name, out, records, cases=case, tell=lambda line: said.print(line, markup=False))
     for found in outcome.missed:
-        typer.echo(f"not met: {found.case}: {found.what} = {found.ours:.4g}, wanted {found.wanted}")
+        typer.echo(f"not met: {found.case}: {found.what} = {found.ours:.4g}, target {found.wanted}")
     typer.echo(f"{outcome.met} of {outcome.aimed} targets met; table: {out / 'table.md'}")
     if not outcome.ok:
         raise typer.Exit(1)

@@ -1,4 +1,4 @@
-"""`railfmi run`: scenarios, and whether what must come true does."""
+"""`railfmi run`: simulate scenarios and check their expectations."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,18 +14,20 @@ def run_scenarios(
     out: Out = Path("out"),
     watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
 ) -> None:
-    """Run scenarios and see whether what must come true does: exit 1 if not. Ctrl-C keeps the record."""
+    """Run scenarios and check their expectations; exit 1 if one is not met. Ctrl-C keeps the recording."""
     from scenarios.simulating import Result, run_all
 
     def done(result: Result) -> None:
         held = sum(finding.holds for finding in result.expectations)
         if result.interrupted_at is not None:
-            typer.echo(f"{result.id}: broken off at {result.interrupted_at:g} s; what was recorded is kept")
+            typer.echo(
+                f"{result.id}: interrupted at {result.interrupted_at:g} s; the recording up to then is kept"
+            )
         else:
             took = f"{result.wall_seconds:.1f} s"
-            typer.echo(f"{result.id}: {held} of {len(result.expectations)} came true ({took})")
+            typer.echo(f"{result.id}: {held} of {len(result.expectations)} expectations met ({took})")
         for finding in result.failed:
-            typer.echo(f"  not: {finding.sentence}; {finding.because}")
+            typer.echo(f"  not met: {finding.sentence}; {finding.because}")
 
     with said.status("reading the scenarios") as status:
         results = run_all(scenarios, out, status.update if watch else (lambda _: None), done)

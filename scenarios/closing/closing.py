@@ -36,7 +36,7 @@ Tell = Callable[[str], None]
 Builder = ModelBuilder | ForeignBuilder
 
 
-STAGES = ".stages"  # folder of the checkpoints that an interrupted run leaves
+STAGES = ".stages"  # folder of the checkpoints, kept when a run is interrupted
 
 
 def close_loop(
@@ -48,13 +48,15 @@ def close_loop(
     seed: int = 0,
     resume: bool = False,
 ) -> Result:
-    """What `railfmi close-loop` does; returns the result that is written as result.json.
+    """Run `railfmi close-loop` and return the result that is written as result.json.
 
-    experiment: path of an experiment.toml, or its folder; out: folder for result.json, report.html, the
-    figures and the augmented FMU (nothing is written without); data_dir: where the data files lie, by
-    default beside the experiment; jobs: processes, by default one a core; seed: of the bootstrap; resume: go
-    on from the checkpoints that an interrupted run left in `out`.
-    Raises BadInput for a wrong experiment.
+    experiment: path of an experiment.toml, or of its folder.
+    out: folder for result.json, report.html, the figures and the augmented FMU; None writes nothing.
+    data_dir: folder of the data files, by default the folder of the experiment.
+    jobs: number of processes, by default one per core.
+    seed: seed of the random numbers.
+    resume: continue from the checkpoints that an interrupted run left in `out`.
+    Raises BadInput if the experiment is wrong.
     """
     begun = time.monotonic()
     declared = experiment_of(experiment, data_dir)
@@ -70,7 +72,7 @@ def close_loop(
 
 @dataclass(frozen=True)
 class Posed:
-    """An experiment whose files are read and found good, and the question that it asks."""
+    """An experiment whose files have been read and checked, with the problem to be solved."""
 
     declared: Experiment
     builder: Builder
@@ -78,16 +80,21 @@ class Posed:
 
 
 def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
-    """The experiment in a file or folder; BadInput also where nothing is held out to test."""
+    """Read the experiment in a file or folder; raises BadInput also if it declares no test part."""
     where = Path(path)
     declared = load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir)
     if declared.split is None:
-        raise BadInput(f"{declared.file}: key 'split' is missing; close-loop tests on data held out by it")
+        raise BadInput(
+            f"{declared.file}: key 'split' is missing; close-loop needs it to set a test part apart"
+        )
     return declared
 
 
 def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> Stages:
-    """Where a run keeps its checkpoints until its results are written; old ones go without `resume`."""
+    """The checkpoints of a run; they are kept until its results are written.
+
+    Without `resume`, the checkpoints of an earlier run are deleted.
+    """
     if folder is None:
         return Stages()
     files = [e.file, *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
@@ -107,9 +114,9 @@ def closed(
     begun: float,
     stages: Stages,
 ) -> tuple[Outcome, Result]:
-    """Trace an experiment and write all that belongs to it into a folder, if one is given; see close_loop.
+    """Trace the residual of an experiment and write all results into a folder, if one is given.
 
-    begun: when it was, by time.monotonic().
+    begun: time.monotonic() at the start of the run. The other arguments are those of close_loop.
     """
     e, problem = posed.declared, posed.problem
     try:
@@ -127,17 +134,17 @@ def closed(
 
 
 def builder_for(e: Experiment, work: Path) -> Builder:
-    """What builds the FMUs of an experiment: our model, or the foreign FMU that it names."""
+    """The builder of the experiment's FMUs: from one of our models, or from a foreign FMU."""
     if e.model is not None:
         return ModelBuilder(e.model, work)
     if e.fmu_path is None:
-        raise BadInput(f"{e.file}: names neither a model nor an FMU")
+        raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
     ports = tuple(PortNames(p.name, p.force, p.velocity, p.displacement) for p in e.ports)
     return ForeignBuilder(e.fmu_path, ports, work)
 
 
 def pose(e: Experiment, builder: Builder) -> Problem:
-    """The question that an experiment asks of its FMU."""
+    """The problem to be solved: the FMU, the record, and the parameters to calibrate."""
     description = describe(e.fmu_path or builder(()))
     record = load_record(e, description)
     form = {n: bounds for n, bounds in builder.form.items() if n not in e.parameters}
@@ -148,7 +155,7 @@ def pose(e: Experiment, builder: Builder) -> Problem:
 
 
 def _starts(description: FmuDescription, calibrate: Iterable[str]) -> dict[str, float]:
-    """The FMU's own values of parameters to calibrate that the experiment may not declare."""
+    """The FMU's start values of the parameters to calibrate; the experiment may declare others."""
     return {n: description.variables[n].start or 0.0 for n in calibrate}
 
 
@@ -160,10 +167,11 @@ def augment(
     folder: Path,
     tell: Tell,
 ) -> tuple[Path, ...]:
-    """Write the FMU with the effects found; declared and found values are its start values. All files.
+    """Write the FMU with the effects found, and return the files written.
 
-    The first is a PythonFMU build. The second is of our models the native build, of a foreign FMU an SSP
-    package of it and the effects; `tell` hears why where there is none.
+    The start values of the FMU are the declared values and the estimates. The first file is a PythonFMU
+    build. The second file is the native build for our models, and for a foreign FMU an SSP package of that
+    FMU and the effects. If the second cannot be built, `tell` gets the reason.
     """
     best = found.built_in or found.base
     effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
@@ -176,12 +184,13 @@ def augment(
             package = files[0].with_suffix(".ssp")
             files.append(export_augmented(builder, effects, problem.record, starts, origin, package))
     except (BadInput, FmuError) as error:
-        tell(f"{files[0].name} has no second form: {error}")
+        second = "native build" if isinstance(builder, ModelBuilder) else "SSP package"
+        tell(f"{files[0].name} was written, but its {second} was not: {error}")
     return tuple(files)
 
 
 def origin_of(e: Experiment, best: Hypothesis, verdict: str) -> Origin:
-    """The experiment with the estimates of a hypothesis; faults of sensors are none of the FMU."""
+    """The experiment and the estimates of a hypothesis; sensor faults are left out, as the FMU has none."""
     faults = {u.name for c in best.candidates if c.is_fault for u in c.unknowns}
     errors = {n: s if isfinite(s) else None for n, s in best.fit.std.items() if n not in faults}
     return Origin(

@@ -1,4 +1,4 @@
-"""What close-loop says on the command line."""
+"""The result of close-loop as lines for the command line."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,11 +12,11 @@ from scenarios.closing.several_results import (
 
 SHOWN = ("experiment", "verdict", "gap closed", "output", "before", "after", "noise", "seconds", "effects")
 
-TOLD = ("confirmed", "agrees", "differs", "surpassed")  # transfers; the others stand on the page
+TOLD = ("confirmed", "agrees", "differs", "surpassed")  # transfers printed here; the page shows all
 
 
 def lines_of(result: Result) -> Iterator[str]:
-    """The verdict of one experiment, its effects and errors."""
+    """The verdict, effects and errors of one experiment."""
     yield f"{result.verdict}: {result.reason}"
     for found in result.effects:
         values = ", ".join(f"{n} = {v:.4g} ± {e:.2g}" for n, (v, e) in found.parameters.items())
@@ -30,7 +30,7 @@ def lines_of(result: Result) -> Iterator[str]:
 
 
 def table_of(found: Results) -> Iterator[str]:
-    """The table of several experiments, and what they say of one another."""
+    """The table of several experiments, followed by the comparison between them."""
     rows = []
     for row, result in zip(found.table, found.results, strict=True):
         gap = f"{100 * float(row['gap_closed']):.1f} %" if row["gap_closed"] != "" else "-"
@@ -50,7 +50,7 @@ def table_of(found: Results) -> Iterator[str]:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of cells as lines, columns below one another."""
+    """Rows of cells as lines with aligned columns."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
 
@@ -62,7 +62,7 @@ def _carried(c: Carried) -> str:
 
 
 def _joint(j: Joint) -> Iterator[str]:
-    yield f"together: {j.reason}"
+    yield f"joint fit: {j.reason}"
     for name, (value, error) in j.parameters.items():
         alone = ", ".join(f"{e} {j.alone[e][name][0]:.4g} ± {j.alone[e][name][1]:.2g}" for e in j.experiments)
         yield f"  {name} = {value:.5g} ± {error:.2g} ({alone})"

@@ -1,4 +1,4 @@
-"""The report of close-loop: one self-contained page, and its figures as files."""
+"""The report of close-loop: one self-contained page, with each figure also as a file."""
 
 import base64
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ Values = dict[str, Any]
 def write_report(folder: Path, problem: Problem, found: Outcome, result: Result) -> None:
     """Write report.html and the figures into a folder.
 
-    The page holds its figures and its style and asks for nothing else.
+    The page contains its figures and its style sheet and loads no other file.
     """
     free = (found.free_form,) if found.free_form else ()
     case = Case(problem, found, result, glossary(problem, (*found.judgement.members, *free)))
@@ -63,7 +63,7 @@ def write_report(folder: Path, problem: Problem, found: Outcome, result: Result)
 
 
 def _figures(case: Case, folder: Path) -> Values:
-    """Draw all figures, write them, and embed them."""
+    """Draw all figures, write them to files, and embed them in the page."""
     problem, found, words, free = case.problem, case.found, case.words, case.found.free_form
 
     errors = error_table.error_values(case)
@@ -127,7 +127,7 @@ def _rejection(case: Case) -> Values:
 
 
 def _use(case: Case, folder: Path) -> Values:
-    """How to run the augmented FMU and how to repeat the run."""
+    """Values for the section on running the augmented FMU and repeating the run."""
     chosen, fmu = case.found.built_in, folder / case.result.augmented_fmu
     effects = [c for c in (chosen.candidates if chosen else ()) if not c.is_fault]
     theta = chosen.fit.theta if chosen else {}

@@ -1,4 +1,4 @@
-"""What close-loop found, as it is written to result.json."""
+"""The result of close-loop, as it is written to result.json."""
 
 import json
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A hypothesis that was rejected; score: log score on the part to choose, less that of the best."""
+    """A rejected hypothesis; score: its log score on the part to choose minus that of the best one."""
 
     kind: str
     location: str
@@ -47,14 +47,17 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Result:
-    """The contract's result of close-loop; `error` holds RMSE on the test part by output.
+    """The result of close-loop, one field for each key of result.json.
 
-    decision: the checks that the verdict follows from, in their order, with the number and the limit of each;
-    policy: the version of all limits. In `error`, `placebo` is that of the best wrong effect, `black_box`
-    that of the calibrated FMU with a linear model of its residual. power: the smallest effects that the
-    record would have shown, null where none; free_form: where nothing explains, the curve that comes nearer,
-    which `after` and the FMU then hold.
-    seconds: of wall time, by stage. start_values: of the states that are not declared, see start_values.
+    decision: the checks that lead to the verdict, in order, each with its value and limit.
+    policy: the version of all limits.
+    error: RMSE on the test part by output. `placebo` is the error with the best wrong effect. `black_box` is
+    the error of the calibrated FMU with a linear model of its residual.
+    power: the smallest size of each effect that the record would have shown, null if it could show none.
+    free_form: the curve that comes nearest if no effect explains the residual; `after` and the augmented FMU
+    then contain this curve.
+    seconds: wall time by stage.
+    start_values: see the function start_values.
     """
 
     experiment: str
@@ -80,7 +83,7 @@ class Result:
     start_values: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
-        """Write as JSON, whole or not at all."""
+        """Write the result as JSON; an interrupted write leaves no partial file."""
         part = path.with_suffix(".part")
         part.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
         part.replace(path)
@@ -93,7 +96,7 @@ def result_of(
     seconds: float,
     augmented: Sequence[Path],
 ) -> Result:
-    """Put an outcome into the contract's words; augmented: files of the augmented FMU, the FMU first."""
+    """The result of an outcome; augmented: files of the augmented FMU, the FMU itself first."""
     members, diagnostics, curve = found.judgement.members, found.diagnostics, found.free_form
     best = found.built_in or found.base
     rms = errors(problem, found, best)
@@ -129,12 +132,13 @@ def result_of(
 
 
 def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
-    """Start values that are not declared, by state: `value`, and `how` it came about.
+    """Start values that the experiment does not declare, by state: `value`, and `how` it was obtained.
 
-    "fitted", with `std_error`; all others are left at the FMU's own start value, None where it states none:
-    "not seen" where another start would not have shown in the residual; of outputs of a foreign FMU that are
-    measured or at a port, "not settable" where it takes no start value, "not exact" where it does not say
-    that the start value is exactly that of the state.
+    "fitted": estimated, with `std_error`. All others keep the FMU's own start value, or None if it has none.
+    "not seen": another start value would not have changed the residual.
+    The last two apply to a foreign FMU's outputs that are measured or belong to a port.
+    "not settable": the FMU accepts no start value.
+    "not exact": the FMU does not state that the start value is exactly that of the state.
     """
     fitted, known = found.base.fit, describe(problem.builder(())).variables
     best = found.built_in or found.base
@@ -145,7 +149,7 @@ def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
             table[name] = {"how": "fitted", "value": fit.theta[name], "std_error": fit.std[name]}
         else:
             table[name] = {"how": "not seen", "value": known[name].start}
-    if isinstance(problem.builder, ForeignBuilder):  # our own outputs are states, or worked out from these
+    if isinstance(problem.builder, ForeignBuilder):  # outputs of our models follow from states
         own = describe(problem.builder.fmu).variables
         at_ports = [name for port in problem.ports for name in (port.displacement, port.velocity)]
         for name in dict.fromkeys([*problem.record.outputs, *at_ports]):
@@ -156,7 +160,7 @@ def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
 
 
 def errors(problem: Problem, found: Outcome, best: Hypothesis) -> dict[str, Array]:
-    """RMSE on the test part, free run, of everything that is compared, (n_y,) each, and the noise floor."""
+    """RMSE on the test part in free simulation of each compared model, (n_y,) each, and the noise floor."""
     compared = {"declared": found.declared, "before": found.base, "after": best}
     wrong = best_wrong(found)
     if wrong:
@@ -168,10 +172,10 @@ def errors(problem: Problem, found: Outcome, best: Hypothesis) -> dict[str, Arra
 
 
 def best_wrong(found: Outcome) -> Hypothesis | None:
-    """The best single hypothesis that was rejected: an error that any effect of the kind would reach.
+    """The best rejected single effect; its error shows what a wrong effect can reach.
 
-    A law that becomes a member at a limit of its shape, or that a member becomes, holds what was found: its
-    error says nothing of a wrong effect, and it is passed over.
+    A law is skipped if it turns into the law found at a limit of its shape, or the law found turns into it:
+    such a law contains the right effect, so its error says nothing about a wrong one.
     """
     members = found.judgement.members
     return next((h for h in found.singles if h not in members and not _nested(h, members)), None)
@@ -182,7 +186,7 @@ def _nested(h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
 
 
 def _check(c: Check) -> dict[str, Any]:
-    """A line of the decision; JSON has no infinity."""
+    """A check of the decision as a row; an infinite value becomes null, as JSON has no infinity."""
     return {
         "check": c.name,
         "value": c.value if np.isfinite(c.value) else None,
@@ -192,7 +196,7 @@ def _check(c: Check) -> dict[str, Any]:
 
 
 def _line(v: Visible) -> dict[str, Any]:
-    """A line of the power statement; JSON has no infinity."""
+    """A row of the power statement; an infinite size becomes null, as JSON has no infinity."""
     sizes = {k: x if np.isfinite(x) else None for k, x in (("smallest", v.smallest), ("largest", v.largest))}
     return {"kind": v.kind, "location": v.location, "parameter": v.parameter, **sizes, "shape": v.shape}
 
@@ -218,7 +222,7 @@ def _parameters(h: Hypothesis, c: Candidate) -> dict[str, Figure]:
     if c.is_fault:
         return {FAULTS[c.kind].parameter: _figure(h, c.amplitudes[0].name)}
     found = {u.name.removeprefix(prefix): _figure(h, u.name) for u in c.unknowns}
-    if is_wave(c):  # the size of sine and cosine together is what an engineer asks for
+    if is_wave(c):  # engineers need the resultant amplitude of sine and cosine
         names = [u.name for u in h.fit.unknowns]
         i = [names.index(u.name) for u in c.amplitudes]
         values, covariance = h.fit.values[i], h.fit.covariance[np.ix_(i, i)]
@@ -233,7 +237,7 @@ def _figure(h: Hypothesis, name: str) -> Figure:
 
 
 def alternatives(problem: Problem, found: Outcome) -> list[Alternative]:
-    """Rejected hypotheses, best first; pairs are named by their parts joined with '+'."""
+    """Rejected hypotheses, best first; the names of a pair of effects are joined by '+'."""
     best = found.chosen or found.base
     rejected = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
     rows = [

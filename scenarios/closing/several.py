@@ -1,4 +1,4 @@
-"""Close the loop on several experiments: each by itself, then what they say of one another, in one table."""
+"""Close the loop on several experiments: each by itself, then compare their findings in one table."""
 
 import tempfile
 import time
@@ -39,7 +39,7 @@ from scenarios.experiment.experiment import Experiment
 from scenarios.output import writable
 
 Done = Callable[[Result], None]
-OURS = ("index.html", "table.csv", "results.json")  # files beside the folders of the experiments
+OURS = ("index.html", "table.csv", "results.json")  # written beside the folders of the experiments
 
 
 def close_loops(
@@ -52,12 +52,14 @@ def close_loops(
     seed: int = 0,
     resume: bool = False,
 ) -> Results:
-    """What `railfmi close-loop` does with several experiments; see close_loop for what it does with one.
+    """Run `railfmi close-loop` on several experiments; see close_loop for a single one.
 
-    Each is written to `out`/ID, and index.html, table.csv and results.json of all to `out`. Where experiments
-    use the same FMU, each effect found is carried to the others, and fitted to all that show it. done: gets
-    each result as soon as it is there. Ctrl-C keeps what is finished; the result says so. Raises BadInput for
-    a wrong experiment, before the first one is run.
+    The results of each experiment are written to `out`/ID; index.html, table.csv and results.json, which
+    cover all experiments, are written to `out`. If experiments use the same FMU, each effect found is tested
+    on the other records and fitted jointly to all records that show it.
+    done: called with each result as soon as it is finished.
+    After Ctrl-C, the finished results are kept, and `interrupted` is set in the result.
+    Raises BadInput if an experiment is wrong, before the first one is run.
     """
     declared = [experiment_of(e, data_dir) for e in experiments]
     _check_ids(declared)
@@ -84,7 +86,7 @@ def _check_ids(declared: Sequence[Experiment]) -> None:
     for e in declared:
         if e.id in files:
             raise BadInput(
-                f"{e.file}: id '{e.id}' is also that of {files[e.id]}; give each experiment an id of its own"
+                f"{e.file}: id '{e.id}' is also used by {files[e.id]}; give each experiment an id of its own"
             )
         if Path(e.id).name != e.id or e.id in (*OURS, ".."):
             raise BadInput(
@@ -94,7 +96,7 @@ def _check_ids(declared: Sequence[Experiment]) -> None:
 
 
 def _posed(e: Experiment, work: Path) -> Posed:
-    """Read all files of an experiment; models share their builds."""
+    """Read all files of an experiment; experiments with the same model share one folder of builds."""
     folder = work if e.model is None else work.parent / e.model
     folder.mkdir(exist_ok=True)
     builder = builder_for(e, folder)
@@ -102,13 +104,13 @@ def _posed(e: Experiment, work: Path) -> Posed:
 
 
 def fmu_of(e: Experiment) -> str:
-    """What two experiments with the same FMU have in common: the model's name, or the file's checksum."""
+    """A key that is equal for experiments with the same FMU: the model's name, or the file's checksum."""
     return checksum(e.fmu_path) if e.fmu_path else (e.model or "").lower()
 
 
 @dataclass
 class _Campaign:
-    """Experiments on their way; what is finished is kept whatever happens next."""
+    """Several experiments in progress; finished results are kept if a later experiment fails."""
 
     posed: Sequence[Posed]
     folder: Path | None
@@ -121,7 +123,7 @@ class _Campaign:
     interrupted: bool = False
 
     def run(self, tell: Tell, done: Done, seed: int, resume: bool) -> None:
-        """Each experiment, then each group of the same FMU."""
+        """Run each experiment, then compare the experiments that use the same FMU."""
         groups: dict[str, list[Traced]] = {}
         kept: list[Stages] = []
         for p in self.posed:
@@ -141,24 +143,24 @@ class _Campaign:
             stages.forget()
 
     def _compare(self, records: Sequence[Traced], tell: Tell) -> None:
-        """Carry each effect to the other records, and fit those that stand to all that show them."""
+        """Test each effect on the other records, and fit the ones left to all records that show them."""
         found = []
         for a in records:
             for b in records:
                 if a is not b and a.members:
-                    tell(f"carrying what {a.name} shows to {b.name}")
+                    tell(f"testing the effects found in {a.name} on {b.name}")
                     new = transfers(a, b, self.jobs)
                     found += new
                     self.carried += [carried(t, b) for t in new]
         standings = [standing(a, found) for a in records]
         self.together |= together(standings)
-        tell("fitting what several experiments show to all of them")
+        tell("fitting effects that several experiments show with one value for all of them")
         left = [h for s in standings for h in s.left]
         by_name = {r.name: r for r in records}
         self.joint += [joint(c, by_name[c.names[0]]) for c in commons(records, found, left, self.jobs)]
 
     def results(self) -> Results:
-        """All that is finished."""
+        """The results finished so far."""
         return Results(self.finished, self.carried, self.joint, self.together, self.units, self.interrupted)
 
 

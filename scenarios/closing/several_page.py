@@ -1,4 +1,4 @@
-"""The page of several closed loops: a table that leads to the single reports, and what they say together."""
+"""The page of several experiments: a table with links to the single reports, and their comparison."""
 
 import base64
 from collections import Counter
@@ -27,7 +27,7 @@ Values = dict[str, Any]
 
 
 def write_page(folder: Path, found: Results) -> None:
-    """Write index.html and its figures into the folder that holds the folders of the experiments."""
+    """Write index.html and its figures into the folder that contains the experiments' folders."""
     env = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -70,20 +70,20 @@ def _row(r: Result, found: Results) -> Values:
 
 
 def words_of(e: Effect) -> str:
-    """An effect in words with its parameters."""
+    """An effect in words, with its parameters."""
     values = ", ".join(f"{n} = {with_error(v, s)}" for n, (v, s) in e.parameters.items())
     return f"{effect_words(e.kind)} at {e.location}: {values}"
 
 
 def label_words(label: str) -> str:
-    """A label, kind@location or several joined by "+", in words."""
+    """A label in words; the label is kind@location, or several of these joined by "+"."""
     return " and ".join(
         f"{effect_words(k)} at {at}" for k, _, at in (p.partition("@") for p in label.split(" + "))
     )
 
 
 def _transfer(c: Carried, found: Results) -> Iterator[Values]:
-    """One line an output; one without figures where the effect could not be carried over."""
+    """One row per output, or one row without numbers if the effect could not be tested on the target."""
     free = [n.removeprefix(f"{_prefix(c.effect)}_") for n in c.free]
     shared: Values = {k: getattr(c, k) for k in ("source", "target", "status", "reason")}
     shared |= {"effect": label_words(c.effect), "lines": max(1, len(c.error)), "free": ", ".join(free)}
@@ -99,7 +99,7 @@ def _transfer(c: Carried, found: Results) -> Iterator[Values]:
 
 
 def _prefix(label: str) -> str:
-    """How the names of an effect's parameters begin in the FMU; of several effects a name for all."""
+    """The prefix of an effect's parameters in the FMU; several effects get one combined name."""
     return label.replace("@", "_").replace(" + ", "_")
 
 

@@ -1,4 +1,4 @@
-"""What several closed loops found together, as it is written to results.json and table.csv."""
+"""The results of several experiments, as they are written to results.json and table.csv."""
 
 import csv
 import json
@@ -24,11 +24,14 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Carried:
-    """An effect found in `source`, in the FMU of `target`; see estimator.closeloop.several.transfer.Status.
+    """An effect found in `source` and tested on the record of `target`.
 
-    error: RMSE on the test part of `target` by output, `before` without an effect, `transferred` with the
-    values of `source`, `own` with values fitted to `target`, and `noise`; distance: between both values in
-    standard errors, p_value its chance; free: values that `source` does not tell.
+    status: see estimator.closeloop.several.transfer.Status.
+    error: RMSE on the test part of `target` by output: `before` without an effect, `transferred` with the
+    values found in `source`, `own` with values fitted to `target`, and `noise`.
+    distance: difference between both sets of values in standard errors; p_value: probability of at least this
+    distance by chance.
+    free: parameters that `source` does not determine.
     """
 
     source: str
@@ -45,13 +48,15 @@ class Carried:
 
 @dataclass(frozen=True)
 class Joint:
-    """An effect with one value for several experiments; parameters by the FMU's names, [value, error].
+    """An effect fitted with one value for several experiments.
 
-    units: of the parameters.
-
-    alone: the same of each experiment's own fit; chi2, chi2_alone: mean square of the weighted residual on
-    the identify part with the common values and with its own; rise: of the sum of squares by having one value
-    for all, and p_value its chance where one value is true; serves: whether it accounts for all of them.
+    parameters: [value, standard error] by the names in the FMU; units: their units.
+    alone: the parameters from each experiment's own fit.
+    chi2, chi2_alone: mean square of the weighted residual on the identify part, with the common values and
+    with the experiment's own values.
+    rise: increase of the sum of squares caused by one value for all; p_value: probability of at least this
+    increase if one value is true for all.
+    serves: whether the effect with common values accounts for the residual of every experiment.
     """
 
     effect: str
@@ -69,10 +74,11 @@ class Joint:
 
 @dataclass(frozen=True)
 class Results:
-    """All that close_loops found.
+    """The results of close_loops.
 
-    together: by experiment what the others of the same FMU say of its finding; units: of its outputs;
-    interrupted: not all that was asked for was done.
+    together: for each experiment, a sentence on what the other records of the same FMU say about its finding.
+    units: for each experiment, the units of its outputs.
+    interrupted: whether the run stopped before all experiments were finished.
     """
 
     results: list[Result]
@@ -84,11 +90,11 @@ class Results:
 
     @property
     def table(self) -> list[Table]:
-        """One row an experiment, with the output that is farthest from its noise; keys are COLUMNS."""
+        """One row per experiment, for the output with the largest error over noise; keys are COLUMNS."""
         return [self._row(r) for r in self.results]
 
     def write(self, folder: Path) -> None:
-        """results.json and table.csv, each whole or not at all."""
+        """Write results.json and table.csv; an interrupted write leaves no partial file under these names."""
         part = folder / "results.part"
         part.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
         part.replace(folder / "results.json")
@@ -115,13 +121,13 @@ class Results:
 
 
 def effect_text(e: Effect) -> str:
-    """An effect in a cell: kind@location NAME = value +- error, ..."""
+    """An effect as the text of one cell: kind@location NAME = value +- error, ..."""
     values = ", ".join(f"{n} = {v:.4g} +- {s:.2g}" for n, (v, s) in e.parameters.items())
     return f"{e.kind}@{e.location} {values}"
 
 
 def carried(t: Transfer, target: Traced) -> Carried:
-    """A transfer in figures."""
+    """The numbers of a transfer to the record of `target`."""
     said = Carried(t.source, t.target, t.member.label, t.status, t.reason)
     if t.held is None or t.own is None or t.difference is None:
         return said
@@ -141,7 +147,7 @@ def carried(t: Transfer, target: Traced) -> Carried:
 
 
 def joint(c: Common, target: Traced) -> Joint:
-    """A joint fit in figures; target: one of its records."""
+    """The numbers of a joint fit; target: one of its records, which supplies the units."""
     each = dict(zip(c.names, c.said, strict=True))
     effects = [x for x in c.alone[0].candidates if x.label in c.label.split(" + ")]
     words = glossary(target.problem, [c.alone[0]])
@@ -170,5 +176,5 @@ def _figures(said: Estimates) -> dict[str, Figure]:
 
 
 def together(standings: Sequence[Standing]) -> Mapping[str, str]:
-    """What each comes to, by experiment; those left out of which nothing is to be said."""
+    """The conclusion on each experiment's finding; experiments without a conclusion are left out."""
     return {s.record: s.sentence for s in standings if s.sentence}

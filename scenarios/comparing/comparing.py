@@ -1,4 +1,4 @@
-"""Two FMUs side by side on the inputs and parameters of an experiment: where they differ, and by how much."""
+"""Compare two FMUs on the inputs and parameters of an experiment: which outputs differ, and by how much."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -39,15 +39,16 @@ def compare(
     data_dir: str | Path | None = None,
     tell: Tell = lambda _: None,
 ) -> Comparison:
-    """What `railfmi compare` does; returns what is written to `out`/result.json beside its figure.
+    """Run `railfmi compare`; returns the result that is written to `out`/result.json with its figure.
 
-    experiment: path of an experiment.toml or its folder; of it count inputs, parameters, initial states and
-    declared noise. A measured state that is not declared starts at its first sample, any other at the
-    FMU's own start value. tolerance: of the largest difference over the rms of a's output.
-    Raises BadInput for wrong input, FmuError where an FMU refuses a call.
+    experiment: path of an experiment.toml, or of its folder. Its inputs, parameters, initial states and
+    declared noise are used. A measured state that is not declared starts at its first sample, any other state
+    at the FMU's own start value.
+    tolerance: limit of the largest difference divided by the rms of the output of `a`.
+    Raises BadInput if the input is wrong, FmuError if an FMU refuses a call.
     """
     if not (isfinite(tolerance) and tolerance >= 0):
-        raise BadInput(f"tolerance {tolerance:g}: give a number from 0 on")
+        raise BadInput(f"tolerance {tolerance:g}: give a number of 0 or more")
     path = Path(experiment)
     declared = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
     folder = None if out is None else writable(Path(out))
@@ -57,7 +58,7 @@ def compare(
     _check_second(declared, about[1])
     names, unfit = _common(*about, f"{a} and {b}")
     tell(f"running {Path(a).name} and {Path(b).name}, the second FMU, over {_length(record):g} s")
-    with ThreadPoolExecutor(2) as pool:  # each waits for a process
+    with ThreadPoolExecutor(2) as pool:  # each thread waits for a process
         files = zip((a, b), about, strict=True)
         asked = [pool.submit(_simulated, Path(f), own, about[0], record, declared, names) for f, own in files]
         both = [answer.result() for answer in asked]
@@ -88,7 +89,7 @@ def _length(record: Record) -> float:
 
 
 def _check_second(e: Experiment, fmu: FmuDescription) -> None:
-    """The experiment is about the first FMU; the second one must know its names too."""
+    """Raise BadInput if the second FMU lacks a name that the experiment declares for the first."""
     try:
         check_names(e, fmu)
     except BadInput as error:
@@ -96,7 +97,7 @@ def _check_second(e: Experiment, fmu: FmuDescription) -> None:
 
 
 def _common(a: FmuDescription, b: FmuDescription, both: str) -> tuple[list[str], tuple[str, ...]]:
-    """Outputs of both FMUs, and those among them whose units do not fit."""
+    """The outputs that both FMUs have, and those among them whose units cannot be converted."""
     common = [n for n in a.outputs if n in b.outputs]
     unfit = []
     for name in common:
@@ -111,7 +112,10 @@ def _common(a: FmuDescription, b: FmuDescription, both: str) -> tuple[list[str],
 
 
 def _scale(source: FmuDescription, target: FmuDescription, name: str) -> tuple[float, float]:
-    """Factor and offset from a variable's number in one FMU to that in another; units not said are alike."""
+    """Factor and offset from a variable's value in one FMU to that in another.
+
+    A variable without a unit is taken to have the unit of the other FMU.
+    """
     units = [d.variables[name].unit for d in (source, target)]
     if units[0] is None or units[1] is None:
         return 1.0, 0.0
@@ -121,7 +125,7 @@ def _scale(source: FmuDescription, target: FmuDescription, name: str) -> tuple[f
 def _simulated(
     file: Path, own: FmuDescription, of: FmuDescription, record: Record, e: Experiment, names: list[str]
 ) -> Array:
-    """Free runs of an FMU through all runs of a record one after the other, (N, n), in the units of `of`."""
+    """Free simulations of all runs of a record, one after the other, (N, n), in the units of `of`."""
     scales = np.array([_scale(of, own, n) for n in record.inputs]).reshape(-1, 2)
     runs = []
     for run in record.runs:
@@ -138,7 +142,7 @@ def _simulated(
 
 
 def _measured(run: Run, record: Record, fmu: FmuDescription) -> dict[str, float]:
-    """States that are measured, at their first sample, within the limits that the FMU states."""
+    """Measured states at their first sample, clipped to the limits that the FMU declares."""
     found = {}
     for j, name in enumerate(record.outputs):
         if name in fmu.states:
@@ -151,7 +155,7 @@ def _measured(run: Run, record: Record, fmu: FmuDescription) -> dict[str, float]
 def _differences(
     record: Record, names: Sequence[str], both: Sequence[Array], a: FmuDescription, tolerance: float
 ) -> dict[str, Difference]:
-    """By output, the largest relative one first."""
+    """The differences by output, the largest relative difference first."""
     t = np.concatenate([run.t for run in record.runs])
     noise = dict(zip(record.outputs, record.noise_std.tolist(), strict=True))
     found = {
@@ -168,7 +172,7 @@ def _rank(d: Difference) -> float:
 def _difference(
     t: Array, a: Array, b: Array, v: FmuVariable, noise: float | None, tolerance: float
 ) -> Difference:
-    """Two courses (N,) of an output; what is the same, also if it is no number, does not differ."""
+    """The difference between two time series (N,) of an output; nan in both at once counts as equal."""
     with np.errstate(invalid="ignore"):
         gap = np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, np.abs(b - a))
     gap[np.isnan(gap)] = np.inf
@@ -188,7 +192,7 @@ def _difference(
 
 
 def _mismatches(a: FmuDescription, b: FmuDescription) -> Iterator[Mismatch]:
-    """What both FMUs say of a variable of one name, differently."""
+    """The attributes in which variables of the same name differ between the FMUs."""
     for name, v in a.variables.items():
         if name in b.variables:
             for what in SAID:

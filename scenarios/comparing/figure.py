@@ -1,4 +1,4 @@
-"""The figure of compare: the outputs that differ most, of both FMUs, and the difference below each."""
+"""The figure of compare: the outputs that differ most, from both FMUs, each with its difference below."""
 
 from collections.abc import Sequence
 
@@ -26,7 +26,7 @@ MOST = 4  # outputs drawn
 def difference_plot(
     found: Comparison, record: Record, names: Sequence[str], courses: Sequence[Array]
 ) -> Plot:
-    """Courses (N, n) of both FMUs over all runs: the first MOST outputs of the comparison."""
+    """Time series (N, n) of both FMUs over all runs, for the first MOST outputs of the comparison."""
     shown = list(found.outputs)[:MOST]
     layout = [[f"{name}{panel}"] for name in shown for panel in ("", "-")]
     heights = [1.3, 0.8] * len(shown)
@@ -47,4 +47,6 @@ def difference_plot(
         name_axes(axes[f"{name}-"], "", "difference")
     legend(figure, axes[shown[0]])
     axes[layout[-1][0]].set_xlabel(time_label(record), fontsize=9)
-    return Plot("compare", figure, "The outputs that differ most; below each, the second FMU less the first.")
+    return Plot(
+        "compare", figure, "The outputs that differ most; below each, the second FMU minus the first."
+    )

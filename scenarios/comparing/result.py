@@ -1,4 +1,4 @@
-"""What compare found, as it is written to result.json and said in lines."""
+"""The result of compare, as it is written to result.json and printed in lines."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -7,16 +7,17 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-SMALLEST = 1e-6  # of its nominal value: below it an output is at rest, and its course is rounding
+SMALLEST = 1e-6  # share of the nominal value below which an output is rounding error at rest
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A common output: b less a, in a's unit, over all samples of the record.
+    """The difference b minus a of a common output, in the unit of `a`, over all samples of the record.
 
-    largest is at `time`, s, and without end where one is no number. relative, rms_relative: over the size of
-    a's output, its rms, at least SMALLEST of its nominal value; in_noise: the rms over the declared standard
-    deviation of the noise. None where that is 0 or not declared.
+    largest: the largest difference, at `time` in s; infinite if one of the two outputs is not a number.
+    relative, rms_relative: divided by the rms of the output of `a`, or by SMALLEST times its nominal value if
+    this is larger.
+    in_noise: rms of the difference over the declared standard deviation of the noise, None without one.
     """
 
     unit: str | None
@@ -31,7 +32,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Mismatch:
-    """What both FMUs say of a variable, differently."""
+    """An attribute of a variable that differs between the FMUs."""
 
     variable: str
     what: str
@@ -41,7 +42,7 @@ class Mismatch:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What compare found; `outputs` from the largest relative difference down."""
+    """The result of compare; `outputs` is sorted by the relative difference, the largest first."""
 
     experiment: str
     a: str
@@ -53,7 +54,7 @@ class Comparison:
     only_a: tuple[str, ...]
     only_b: tuple[str, ...]
     mismatches: tuple[Mismatch, ...]
-    not_compared: tuple[str, ...]  # common outputs whose units do not fit
+    not_compared: tuple[str, ...]  # common outputs whose units cannot be converted
 
     @property
     def ok(self) -> bool:
@@ -61,7 +62,7 @@ class Comparison:
         return not self.not_compared and all(d.agrees for d in self.outputs.values())
 
     def write(self, file: Path) -> None:
-        """Write as JSON, whole or not at all."""
+        """Write the result as JSON; an interrupted write leaves no partial file."""
         part = file.with_suffix(".part")
         table = {"ok": self.ok, **asdict(self)}
         table["outputs"] = {n: {k: _known(v) for k, v in d.items()} for n, d in table["outputs"].items()}
@@ -70,7 +71,7 @@ class Comparison:
         part.replace(file)
 
     def lines(self) -> Iterator[str]:
-        """For people: the verdict, then each output, then what else differs."""
+        """Lines to print: the verdict, then each output, then other differences."""
         bad = sum(not d.agrees for d in self.outputs.values()) + len(self.not_compared)
         total = len(self.outputs) + len(self.not_compared)
         verdict = f"{bad} of {total} common outputs differ" if bad else f"all {total} common outputs agree"
@@ -78,7 +79,7 @@ class Comparison:
         for name, d in self.outputs.items():
             yield f"  {name}: {_sentence(d)}"
         for name in self.not_compared:
-            yield f"  {name}: not compared, its units do not fit"
+            yield f"  {name}: not compared, because its units cannot be converted"
         for which, file, names in (("first", self.a, self.only_a), ("second", self.b, self.only_b)):
             if names:
                 yield f"  only in the {which} FMU, {file}: {', '.join(names)}"
@@ -103,5 +104,5 @@ def _shown(value: str | float | None) -> str:
 
 
 def _known(value: Any) -> Any:
-    """A number for JSON, which knows none without end."""
+    """A number for JSON, which cannot represent infinity."""
     return None if isinstance(value, float) and not isfinite(value) else value

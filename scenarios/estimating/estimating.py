@@ -46,19 +46,21 @@ def estimate(
     options: Options | None = None,
     truth: Mapping[str, tuple[Array, Array]] | None = None,
 ) -> EstimateResult:
-    """What `railfmi estimate` does; returns the result that is written as result.json.
+    """Run `railfmi estimate` and return the result that is written as result.json.
 
-    experiment: path of an experiment.toml, or its folder; out: folder for estimate.csv, result.json,
-    estimate.html and its figures (nothing is written without); data_dir: where the data files lie, by
-    default beside the experiment; options: in place of those of the experiment; truth: true values by name
-    as (times, values), for errors and figures. Raises BadInput for a wrong experiment. A filter that
-    diverges stops with what it has, and says so in `diverged` and `reason`.
+    experiment: path of an experiment.toml, or of its folder.
+    out: folder for estimate.csv, result.json, estimate.html and its figures; None writes nothing.
+    data_dir: folder of the data files, by default the folder of the experiment.
+    options: replace the options of the experiment.
+    truth: true values by name as (times, values), for errors and figures.
+    Raises BadInput if the experiment is wrong. If the filter diverges, the result contains the estimates up
+    to that time, and `diverged` and `reason` are set.
     """
     begun = time.monotonic()
     path = Path(experiment)
     e = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
     if e.estimate is None:
-        raise BadInput(f"{e.file}: has no [estimate]; say there which parameters, states or inputs to find")
+        raise BadInput(f"{e.file}: has no [estimate]; list there the parameters, states or inputs to find")
     chosen = options or e.estimate.options
     folder = None if out is None else writable(Path(out))
     with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work:
@@ -79,38 +81,38 @@ def estimate(
 
 
 def fmu_of(e: Experiment, work: Path) -> Path:
-    """The FMU of an experiment: the foreign one it names, or ours, built."""
+    """The FMU of an experiment: the foreign FMU that it names, or a build of its model."""
     if e.model is not None:
         return build_python(model_class(e.model)(), work)
     if e.fmu_path is None:
-        raise BadInput(f"{e.file}: names neither a model nor an FMU")
+        raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
     return e.fmu_path
 
 
 def _standing_notes(found: Findings) -> Iterator[str]:
-    """Of each unknown that lies at a bound, or of which the data tell too little, where it came from."""
+    """A note on each unknown that lies at a bound, or about which the record contains too little."""
     told = informed(found)
     for name, s in standings(found).items():
         if s.side:
             yield (
-                f"'{name}' is at its {s.side} bound {s.bound:.4g}: the record pushes it there from "
-                f"{s.start:.4g}, so its standard error says nothing; widen the bound, or look for what the "
+                f"'{name}' was moved from its start {s.start:.4g} to its {s.side} bound {s.bound:.4g} by the "
+                "record, so its standard error is not valid; widen the bound, or look for an effect that the "
                 "model lacks"
             )
         elif not told.get(name, True) and not s.moved:
-            yield f"the data tell nothing of '{name}': its value is what was believed before"
+            yield f"the record contains no information on '{name}': its value is still the start value"
         elif not told.get(name, True):
             left = max(
                 i.left[i.names.index(name)] for i in (found.before, found.after) if i and name in i.names
             )
             yield (
-                f"the data tell little of '{name}': {left:.0%} of its first deviation is left, yet its value "
-                f"moved from {s.start:.4g} to {s.value:.4g}"
+                f"the record contains little information on '{name}': {left:.0%} of its start deviation is "
+                f"left, yet its value moved from {s.start:.4g} to {s.value:.4g}"
             )
 
 
 def _notes(found: Findings) -> list[str]:
-    """What must be known of the outcome, in sentences."""
+    """Sentences that a reader of the estimates has to know."""
     notes = list(_standing_notes(found))
     if found.after is not None:
         notes += [
@@ -120,18 +122,21 @@ def _notes(found: Findings) -> list[str]:
     undeclared = [
         o for o, known in zip(found.setup.outputs, found.setup.declared_noise, strict=True) if not known
     ]
-    notes += [f"the noise of '{o}' was not declared; it was taken from its roughness" for o in undeclared]
+    notes += [
+        f"the noise of '{o}' was not declared; it was estimated from the roughness of the measurements"
+        for o in undeclared
+    ]
     if found.joint.others:
-        notes.append(f"carried, not estimated: {', '.join(found.joint.others)}")
+        notes.append(f"states that are simulated, not estimated: {', '.join(found.joint.others)}")
     return notes
 
 
 def result_of(
     found: Findings, truth: Mapping[str, tuple[Array, Array]], notes: list[str], seconds: float
 ) -> EstimateResult:
-    """Put findings into words and numbers."""
+    """The result of the findings, in words and numbers."""
     s, h, joint = found.setup, found.history, found.joint
-    reason = h.broken and f"{h.broken}; the estimate ends there"
+    reason = h.broken and f"{h.broken}; the estimate ends at this time"
     access = joint.access
     tests = checks(h.nis, h.freedom, h.innovation, s.outputs)
     bounds = {name: ended.side for name, ended in standings(found).items() if ended.side}
@@ -173,7 +178,10 @@ def rms_errors(found: Findings, truth: Mapping[str, tuple[Array, Array]]) -> dic
 def _write(
     folder: Path, found: Findings, result: EstimateResult, truth: Mapping[str, tuple[Array, Array]]
 ) -> None:
-    """All files beside one another first, then into the folder, result.json last: whole or not at all."""
+    """Write all files to a temporary folder first, then move them, result.json last.
+
+    An error while writing thus leaves no incomplete set of files.
+    """
     with tempfile.TemporaryDirectory(prefix=".writing_", dir=folder) as part:
         made = Path(part)
         write_csv(made / "estimate.csv", found.history.names, found.history.t, found.value, found.std)

@@ -1,4 +1,4 @@
-"""The page of estimate: one self-contained file with its figures, which lie beside it too."""
+"""The page of estimate: one self-contained file, with each figure also as a file beside it."""
 
 import base64
 import math
@@ -30,7 +30,7 @@ Truth = Mapping[str, tuple[Array, Array]]
 
 
 def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Truth) -> None:
-    """Write estimate.html and its figures into a folder; it asks for nothing else."""
+    """Write estimate.html and its figures into a folder; the page loads no other file."""
     env = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -53,9 +53,9 @@ def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Tru
 
 
 def headline(result: EstimateResult) -> str:
-    """What was found, in a sentence."""
+    """The main estimates in one sentence."""
     if result.diverged:
-        return "The filter diverged; what it had until then is shown."
+        return "The filter diverged; the estimates up to that time are shown."
     wanted = {n: e for n, e in result.estimated.items() if e["kind"] == "parameter"} or result.estimated
     said = [_headed(n, e) for n, e in wanted.items()]
     values = ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
@@ -63,13 +63,13 @@ def headline(result: EstimateResult) -> str:
 
 
 def _headed(name: str, e: Row) -> str:
-    """One quantity of the headline, with its bound where it lies at one."""
+    """One quantity of the headline, with a remark if it lies at one of its bounds."""
     bound = f" (at its {e['at_bound']} bound)" if "at_bound" in e else ""
     return f"{name} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}{bound}"
 
 
 def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
-    """Last values, one row a quantity, parameters and inputs first."""
+    """Last values, one row for each quantity, parameters and inputs first."""
     variables = found.joint.archive.description.variables
     for name, e in sorted(result.estimated.items(), key=lambda pair: pair[1]["kind"] == "state"):
         low, high = e["band_95"]
@@ -77,7 +77,9 @@ def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
         yield {
             "name": name,
             "kind": e["kind"],
-            "meaning": variables[name].description if name in variables else "rate of the input before",
+            "meaning": variables[name].description
+            if name in variables
+            else "rate of the input in the row above",
             "value": with_error(e["value"], e["std_error"]),
             "unit": unit(e["unit"]),
             "band": " to ".join(short(v, _digits(v, e["std_error"])) for v in (low, high)),
@@ -88,7 +90,7 @@ def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
 
 
 def channels(result: EstimateResult) -> Iterator[Row]:
-    """One row an output: how well it was foreseen."""
+    """One row for each output: how well the filter predicted it."""
     for name, c in result.innovations.items():
         gated = c["gated_share"]
         yield {
@@ -103,14 +105,14 @@ def channels(result: EstimateResult) -> Iterator[Row]:
 
 
 def checked(result: EstimateResult) -> Iterator[Row]:
-    """One row a test that the filter makes of itself."""
+    """One row for each consistency test of the filter."""
     for c in result.checks:
         limit = " to ".join(short(end) for end in c.limit)
         yield {"check": c.check, "value": short(c.value), "limit": limit, "passed": c.passed}
 
 
 def raised(result: EstimateResult) -> Iterator[Row]:
-    """One row an alarm."""
+    """One row for each alarm."""
     for a in result.alarms:
         end = "the end" if a.end is None else f"{short(a.end)} s"
         yield {
@@ -120,7 +122,7 @@ def raised(result: EstimateResult) -> Iterator[Row]:
 
 
 def unknowns(result: EstimateResult) -> Iterator[Row]:
-    """One row an unknown: how much of its first deviation is left, before and after."""
+    """One row for each unknown: the share of its start deviation that is left, before and after."""
     left = {when: told["deviation_left"] for when, told in result.identifiability.items()}
     for name in left.get("after", left.get("before", {})):
         yield {"name": name} | {
@@ -130,7 +132,7 @@ def unknowns(result: EstimateResult) -> Iterator[Row]:
 
 
 def noise(found: Findings, result: EstimateResult) -> Iterator[Row]:
-    """One row a state: the noise that drives it."""
+    """One row for each state: the process noise that drives it."""
     variables = found.joint.archive.description.variables
     for name, value in result.process_noise.items():
         of = unit(variables[name].unit)
@@ -138,7 +140,7 @@ def noise(found: Findings, result: EstimateResult) -> Iterator[Row]:
 
 
 def _digits(value: float, std: float) -> int:
-    """Significant digits of a value of which the second digit of its deviation is still shown."""
+    """Significant digits of a value so that two digits of its standard deviation are visible."""
     if not (value and std > 0):
         return 4
     return min(max(3, math.floor(math.log10(abs(value))) - math.floor(math.log10(std)) + 2), 12)

@@ -25,8 +25,8 @@ from scenarios.drawing.typography import label
 from scenarios.estimating.findings import Findings
 from scenarios.estimating.result import BAND
 
-ROW = 1.55  # in, height of a panel
-SAID = "Estimate of {}, with the band in which it lies with 95 % probability{}."
+ROW = 1.55  # inches, height of a panel
+SAID = "Estimate of {}, with the band that contains the true value with 95 % probability{}."
 
 
 def band_plots(found: Findings, truth: Mapping[str, tuple[Array, Array]]) -> Iterator[Plot]:
@@ -55,7 +55,7 @@ def _band(ax: Axes, found: Findings, name: str, true: tuple[Array, Array] | None
     ax.plot(t, value, color=AFTER, linewidth=1.1, label="estimate")
     if true is not None:
         ax.plot(t, np.interp(t, *true), color=LAW, linewidth=1.0, linestyle="--", label="truth")
-    # the start shows what was believed before; the view is that of what was learnt
+    # the wide band at the start is left out of the range of the axis
     later = slice(len(t) // 20, None)
     shown = np.concatenate([value[later], low[later], high[later]])
     margin = 0.06 * float(np.ptp(shown)) or 0.5 * abs(float(shown[0])) or 1.0
@@ -66,7 +66,7 @@ def _band(ax: Axes, found: Findings, name: str, true: tuple[Array, Array] | None
 
 
 def innovation_plots(found: Findings) -> Iterator[Plot]:
-    """What each measurement brought that was not foreseen, over time and by its memory."""
+    """Innovations (measured minus predicted outputs) over time, and their autocorrelation."""
     h = found.history
     for ending, some in sheets(list(found.setup.outputs) if len(h.t) > 1 else []):
         layout = [[name, f"{name} memory"] for name in some]
@@ -93,13 +93,14 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
         yield Plot(
             f"innovations{ending}",
             figure,
-            "Innovations over their expected deviation. Where all is right, 95 % lie between the dashed "
-            "lines (left) and nothing is remembered beyond the grey band (right).",
+            "Left: innovations divided by their expected standard deviation. Right: autocorrelation of the "
+            "innovations. If model and noise are right, 95 % of the innovations lie between the dashed lines "
+            "and all correlations lie within the grey band.",
         )
 
 
 def correlation_plots(found: Findings) -> Iterator[Plot]:
-    """Which unknowns the data could not tell apart, at the end."""
+    """Correlations of the unknowns at the end; unknowns near 1 or -1 cannot be told apart."""
     after = found.after
     if after is None or len(after.names) < 2:
         return

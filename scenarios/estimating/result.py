@@ -1,4 +1,4 @@
-"""What estimate found, as it is written to result.json and estimate.csv."""
+"""The result of estimate, as it is written to result.json and estimate.csv."""
 
 import json
 from dataclasses import asdict, dataclass, field
@@ -22,28 +22,30 @@ from estimator.filters.system import Joint
 from estimator.record import Array
 from scenarios.experiment.declaration import Alarm, Options
 
-BAND = 1.959964  # deviations of the 95 % band
+BAND = 1.959964  # half width of the 95 % band in standard deviations
 CLEAR = 0.5  # probability below which an alarm ends
 
 
 @dataclass(frozen=True)
 class Raised:
-    """A stretch of time [s] in which a quantity was beyond its limit with the probability asked for."""
+    """An interval of time in s in which a quantity was beyond its limit with the required probability."""
 
     name: str
     limit: str
     begin: float
-    end: float | None  # None where it lasts to the end of the record
-    probability: float  # the highest
+    end: float | None  # None if it lasts to the end of the record
+    probability: float  # the highest in the interval
 
 
 @dataclass(frozen=True)
 class EstimateResult:
-    """The result of estimate. `estimated` holds, by name, kind, value, standard error, band of 95 %, ...
+    """The result of estimate.
 
-    innovations, by output: noise, rms over what is expected of it (1 where all is right), largest
-    correlation, p value of whiteness, share gated. checks: the filter's tests of itself; consistent: whether
-    it passes them all. rms_error: where a truth was given.
+    estimated: by name, the kind, value, standard error, 95 % band and further properties of each quantity.
+    innovations: by output, the noise, the rms over its expected value (1 if model and noise are right), the
+    largest correlation, the p value of whiteness, and the share of measurements rejected by the gate.
+    checks: the consistency tests of the filter; consistent: whether it passes all of them.
+    rms_error: errors of the estimates, only if true values were given.
     """
 
     experiment: str
@@ -70,11 +72,11 @@ class EstimateResult:
 
     @property
     def doubt(self) -> str:
-        """What the filter's own tests say against its standard errors; empty where they all pass."""
+        """A sentence on failed consistency tests and the standard errors; empty if all tests pass."""
         return "" if self.consistent or self.diverged else doubt(self.checks)
 
     def write(self, path: Path) -> None:
-        """Write as JSON."""
+        """Write the result as JSON."""
         path.write_text(json.dumps(asdict(self), indent=1, allow_nan=False), encoding="utf-8")
 
 
@@ -84,10 +86,10 @@ def passes(checks: tuple[Check, ...]) -> bool:
 
 
 def doubt(checks: tuple[Check, ...]) -> str:
-    """Which tests fail, with what against what is expected, and what follows for the standard errors."""
+    """The failed tests with their values and expected ranges, and what follows for the standard errors."""
     nis = next((c for c in checks if c.check == NIS), None)
     if nis is None:
-        return "not tested against the record: it has too few innovations, so the error may be wrong"
+        return "not tested, because the record has too few innovations; the standard error may be wrong"
     said, low, high = [], *nis.limit
     if not nis.passed:
         said.append(f"NIS {nis.value:.4g}, expected {low:.4g} to {high:.4g}")
@@ -102,13 +104,13 @@ def doubt(checks: tuple[Check, ...]) -> str:
     wrong = "is too small"
     if nis.value < low:
         wrong = "cannot be relied on" if remembering else "is too large"
-    return f"not consistent with the record: {'; '.join(said)}; so the error {wrong}"
+    return f"not consistent with the record: {'; '.join(said)}; so the standard error {wrong}"
 
 
 def estimated(
     joint: Joint, h: History, informed: dict[str, bool], bounds: dict[str, str]
 ) -> dict[str, dict[str, Any]]:
-    """The last value of each quantity in the FMU's units; bounds: on which side one lies at its bound."""
+    """The last value of each quantity in the FMU's units; bounds: side of the bound that it lies at."""
     if not len(h.t):
         return {}
     kinds = ["state"] * len(joint.states) + ["parameter"] * len(joint.parameters)
@@ -131,7 +133,7 @@ def estimated(
 
 
 def innovations(h: History, outputs: tuple[str, ...], noise: Array) -> dict[str, dict[str, float | None]]:
-    """How well each output was foreseen."""
+    """How well the filter predicted each output."""
     found = {}
     for j, name in enumerate(outputs):
         e = h.innovation[:, j]
@@ -150,7 +152,7 @@ def innovations(h: History, outputs: tuple[str, ...], noise: Array) -> dict[str,
 
 
 def nis(h: History) -> dict[str, float | None]:
-    """Normalised innovations squared, against their 95 % band."""
+    """Normalised innovations squared, with their 95 % band."""
     used = h.freedom > 0
     band = mean_band(h.nis[used], h.freedom[used])
     share = share_within(h.nis[used], h.freedom[used])
@@ -163,7 +165,7 @@ def nis(h: History) -> dict[str, float | None]:
 
 
 def identified(before: Identifiability | None, after: Identifiability | None) -> dict[str, Any]:
-    """What the data tell of each unknown parameter and input, before and after filtering."""
+    """How much the record tells about each unknown parameter and input, before and after filtering."""
     found: dict[str, Any] = {}
     for when, i in (("before", before), ("after", after)):
         if i is not None:
@@ -176,7 +178,7 @@ def identified(before: Identifiability | None, after: Identifiability | None) ->
 
 
 def alarms(joint: Joint, h: History, options: Options) -> list[Raised]:
-    """When each quantity with a limit was beyond it."""
+    """The intervals in which a quantity with a limit was beyond it."""
     found = []
     for name, alarm in options.alarms.items():
         if name in h.names:
@@ -189,7 +191,10 @@ def alarms(joint: Joint, h: History, options: Options) -> list[Raised]:
 
 
 def probability(joint: Joint, h: History, i: int, limit: float, below: bool) -> Array:
-    """Of quantity number i being beyond its limit, (N,); parameters are normal in their own coordinate."""
+    """Probability that quantity number i is beyond its limit, (N,).
+
+    A parameter is taken to be normally distributed in the coordinate in which the filter estimates it.
+    """
     at = i - len(joint.states)
     if 0 <= at < len(joint.parameters):
         transform = joint.parameters[at].transform
@@ -202,15 +207,18 @@ def probability(joint: Joint, h: History, i: int, limit: float, below: bool) -> 
 
 
 def stretches(name: str, limit: str, t: Array, p: Array, alarm: Alarm) -> list[Raised]:
-    """From where the probability reaches that of the alarm and stays there, to where it is even again."""
+    """Begin and end of each alarm.
+
+    It begins when the probability reaches that of the alarm and stays there, and ends when it falls below CLEAR.
+    """
     likely = p >= alarm.probability
     edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))
     found: list[Raised] = []
     for begin, after in edges.reshape(-1, 2):
         known = not found or (found[-1].end is not None and t[begin] >= found[-1].end)
         if known and t[after - 1] - t[begin] >= alarm.hold:
-            even = after + np.flatnonzero(~(p[after:] >= CLEAR))
-            last = even[0] if len(even) else len(t)
+            below = after + np.flatnonzero(~(p[after:] >= CLEAR))
+            last = below[0] if len(below) else len(t)
             end = float(t[last]) if last < len(t) else None
             found.append(Raised(name, limit, float(t[begin]), end, float(p[begin:last].max())))
     return found
@@ -222,7 +230,7 @@ def finite(value: float) -> float | None:
 
 
 def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: Array) -> None:
-    """Columns time, then NAME and NAME_std of each quantity."""
+    """Write the columns time, then NAME and NAME_std of each quantity."""
     columns = np.column_stack([t, np.stack([value, std], axis=2).reshape(len(t), 2 * len(names))])
     header = ",".join(["time", *(c for n in names for c in (n, f"{n}_std"))])
     np.savetxt(path, columns, fmt="%.9g", delimiter=",", header=header, comments="")

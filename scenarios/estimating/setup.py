@@ -1,4 +1,4 @@
-"""From an experiment to the system of its filter: samples, unknowns, noise."""
+"""Prepare the system of a filter from an experiment: samples, unknowns, noise."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,18 +30,21 @@ from scenarios.experiment.declaration import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
 MIN_SAMPLES = 10
-MOST_PARTS = 16  # of a step
-TOLD_APART = 0.1  # of the noise: a smaller change of the outputs is none
+MOST_PARTS = 16  # largest number of parts of a step
+TOLD_APART = 0.1  # share of the noise below which a change of the outputs is neglected
 
 
 @dataclass(frozen=True)
 class Setup:
-    """An experiment as a filter sees it. scale: (n_states,) motion per sqrt(s), for noise not declared."""
+    """An experiment prepared for a filter.
+
+    scale: (n_states,) motion of each state per sqrt(s), for process noise that is not declared.
+    """
 
     experiment: Experiment
     options: Options
     samples: Samples
-    noise: Array  # (m,) deviations of the measured outputs
+    noise: Array  # (m,) standard deviations of the measurement noise
     declared_noise: tuple[bool, ...]
     constants: dict[str, float]
     states: tuple[UnknownState, ...]
@@ -50,10 +53,10 @@ class Setup:
     scale: Array
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    free_run: Array  # (N, m) outputs with the values that the filter starts from, nan where it fails
+    free_run: Array  # (N, m) outputs simulated with the start values, nan where it fails
 
     def joint(self, archive: Archive, part: float) -> Joint:
-        """The system, with states driven by `part` of their motion where no noise is declared for them."""
+        """The system; a state without declared noise is driven by noise of `part` of its motion."""
         given = self.options.process_std
         states = [
             replace(s, noise=given.get(s.name, part * scale))
@@ -67,7 +70,7 @@ class Setup:
 
 
 def set_up(e: Experiment, options: Options, record: Record, archive: Archive) -> Setup:
-    """Everything that is to be known before filtering; BadInput where names or values do not fit."""
+    """All that the filter needs before its first sample; raises BadInput for wrong names or values."""
     d = archive.description
     run = record.runs[0]
     check_options(e, options, d)
@@ -76,7 +79,9 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
         every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
     s = samples(run.t, run.u, run.y, every)
     if len(s.t) < MIN_SAMPLES:
-        raise BadInput(f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher one")
+        raise BadInput(
+            f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher rate"
+        )
     _check_measured(e, record, s)
     noise = noise_of(record)
     constants = {**e.parameters, **e.initial}
@@ -98,22 +103,22 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
 
 
 def _check_measured(e: Experiment, record: Record, s: Samples) -> None:
-    """Each output needs measurements among the samples, and enough of them to show noise not declared."""
+    """Raise BadInput if an output has no measurements, or too few to estimate its undeclared noise."""
     for j, name in enumerate(record.outputs):
         if not np.isfinite(s.y[:, j]).any():
             raise BadInput(
-                f"{e.file}: [estimate] rate leaves no measurement of output '{name}'; use a higher one"
+                f"{e.file}: [estimate] rate leaves no measurement of output '{name}'; use a higher rate"
             )
         found = int(np.isfinite(record.runs[0].y[:, j]).sum())
         if np.isnan(record.noise_std[j]) and found < MIN_SAMPLES:
             raise BadInput(
-                f"{e.file}: [outputs.{name}] has {found} measurements, too few to tell its noise; "
+                f"{e.file}: [outputs.{name}] has {found} measurements, too few to estimate its noise; "
                 "add noise_std = ..."
             )
 
 
 def _check_alarms(e: Experiment, options: Options, estimated: tuple[str, ...]) -> None:
-    """Alarms that were asked for must be about something that is estimated."""
+    """Raise BadInput if an alarm is declared for a quantity that is not estimated."""
     for name in options.alarms:
         if name not in estimated:
             where = f"{e.file}: [estimate.options] alarms '{name}'"
@@ -121,7 +126,7 @@ def _check_alarms(e: Experiment, options: Options, estimated: tuple[str, ...]) -
 
 
 def with_alarms(e: Experiment, options: Options) -> Options:
-    """The options with the alarms that the model declares, where they have none; a foreign FMU has none."""
+    """The options; if they declare no alarms, those of the model are used (a foreign FMU has none)."""
     if e.model is None or "alarms" in options.model_fields_set:
         return options
     alarms = {
@@ -133,7 +138,7 @@ def with_alarms(e: Experiment, options: Options) -> Options:
 
 
 def noise_of(record: Record) -> Array:
-    """Deviation of each output's noise (m,): as declared, else what third differences of it leave."""
+    """Standard deviation of each output's noise (m,), as declared or estimated from third differences."""
     found = record.noise_std.copy()
     for j in np.flatnonzero(np.isnan(found)):
         seen = record.runs[0].y[:, j]
@@ -143,7 +148,7 @@ def noise_of(record: Record) -> Array:
 
 
 def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: Record) -> tuple[str, ...]:
-    """The states that the measured outputs depend on, by plain restarts."""
+    """The states on which the measured outputs depend, found by restarting the FMU."""
     d = archive.description
     states = d.states
     if not states:
@@ -163,9 +168,9 @@ def _fine_enough(
     archive: Archive, values: Mapping[str, float], record: Record, states: tuple[str, ...], noise: Array,
     every: int, parts: int | None,
 ) -> tuple[Samples, Array]:  # fmt: skip
-    """Samples with inputs in as many parts as the outputs' noise can tell apart, and their free run.
+    """The samples, each step divided until finer parts change the outputs less than noise, and a simulation.
 
-    A step with a held input ends in another slip than one with a running input where physics is stiff.
+    In a stiff model, the slip at the end of a step differs between a constant input and a changing one.
     """
     run = record.runs[0]
     found = samples(run.t, run.u, run.y, every, parts or 1)
@@ -183,7 +188,7 @@ def _fine_enough(
 def _free_run(
     archive: Archive, values: Mapping[str, float], s: Samples, record: Record, states: tuple[str, ...]
 ) -> Array:
-    """Outputs and states (N, m + n) of a run with what is believed at the start; nan where the FMU fails."""
+    """Outputs and states (N, m + n) simulated with the start values; nan where the FMU fails."""
     names, parts = [*record.outputs, *states], s.held.shape[1]
     with Fmu(archive) as fmu:
         try:
@@ -194,7 +199,7 @@ def _free_run(
 
 
 def finely(s: Samples, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
-    """Times (M,) at which the parts of the steps meet, and inputs by name at them, (M,) each."""
+    """Times (M,) at which the parts of the steps begin, and the inputs by name at these times, (M,) each."""
     parts = s.held.shape[1]
     share = np.arange(parts) / parts
     t = np.append((s.t[:-1, None] + np.diff(s.t)[:, None] * share).ravel(), s.t[-1])

@@ -1,4 +1,4 @@
-"""The unknowns of an experiment with what is believed of them before: parameters, inputs, states."""
+"""The unknown parameters, inputs and states of an experiment, with their start values and deviations."""
 
 from collections.abc import Iterator
 from math import inf, sqrt
@@ -19,12 +19,12 @@ from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.experiment.declaration import EstimatedParameter, Options
 from scenarios.experiment.experiment import Experiment
 
-FIRST = 10.0  # noise deviations: what is known of the start of a measured state
-ROUGH = 0.1  # of what is usual of a state that is not measured but declared
+FIRST = 10.0  # start deviation of a measured state, in standard deviations of its noise
+ROUGH = 0.1  # start deviation of a declared but unmeasured state, as a share of its usual size
 
 
 def check_options(e: Experiment, o: Options, d: FmuDescription) -> None:
-    """Names in the options must be among what is estimated, or states of the FMU."""
+    """Raise BadInput if a name in the options is neither estimated nor a state of the FMU."""
     chosen = e.estimate
     parameters = set(chosen.parameters) if chosen else set()
     inputs = set(chosen.inputs) if chosen else set()
@@ -41,17 +41,21 @@ def check_options(e: Experiment, o: Options, d: FmuDescription) -> None:
 
 
 def parameters_of(e: Experiment, o: Options, d: FmuDescription) -> Iterator[UnknownParameter]:
-    """The unknown parameters; BadInput where one has no start or deviation, or starts on its bounds."""
+    """The unknown parameters; raises BadInput if one has no start or deviation, or starts at a bound."""
     for name, wanted in (e.estimate.parameters if e.estimate else {}).items():
         v = d.variables[name]
         start = wanted.start if wanted.start is not None else e.parameters.get(name, v.start)
         where = f"{e.file}: [estimate.parameters] {name}"
         if start is None:
-            raise BadInput(f"{where}: neither the experiment nor {d.name} gives it a start; add start = ...")
+            raise BadInput(
+                f"{where}: neither the experiment nor {d.name} gives a start value; add start = ..."
+            )
         transform = _transform(wanted, v, name in o.clip, where)
         std = wanted.std or _std(wanted, start)
         if std == 0:
-            raise BadInput(f"{where}: what is known of its start is not declared; add std = ... or bounds")
+            raise BadInput(
+                f"{where}: the uncertainty of its start value is not declared; add std = ... or bounds"
+            )
         try:
             transform.z(start)
         except BadInput as error:
@@ -70,7 +74,7 @@ def _transform(wanted: EstimatedParameter, v: FmuVariable, clip: bool, where: st
 
 
 def _std(wanted: EstimatedParameter, start: float) -> float:
-    """A quarter of the bounds, or of the value."""
+    """A quarter of the distance of the bounds, or of the value."""
     return (wanted.bounds[1] - wanted.bounds[0]) / 4 if wanted.bounds else abs(start) / 4
 
 
@@ -86,7 +90,7 @@ def inputs_of(e: Experiment, o: Options) -> Iterator[UnknownInput]:
 def states_of(
     e: Experiment, o: Options, d: FmuDescription, record: Record, noise: Array, names: tuple[str, ...]
 ) -> Iterator[UnknownState]:
-    """Where states start: as declared, else as first measured, else as the FMU does."""
+    """Start values of the states: as declared, else the first measurement, else the FMU's own."""
     y = record.runs[0].y
     for name in names:
         v = d.variables[name]
@@ -103,5 +107,5 @@ def states_of(
 
 
 def usual(v: FmuVariable, declared: float | None) -> float:
-    """What is usual of a variable, in its unit."""
+    """The usual size of a variable, in its unit."""
     return v.nominal or abs(declared or 0.0) or abs(v.start or 0.0) or 1.0

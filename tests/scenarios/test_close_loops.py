@@ -1,4 +1,4 @@
-"""Several experiments in one run: their folders and table, bad input, runs that are broken off."""
+"""Several experiments in one run: their folders and table, bad input, interrupted runs."""
 
 import csv
 import json
@@ -139,7 +139,7 @@ def test_the_page_leads_to_the_reports_and_says_what_the_results_say(closed: tup
         assert sentence in text
     value, _ = found.joint[0].parameters["coulomb_friction_carriage_F_c"]
     assert f"{value:.2f}" in text
-    assert "broken off" not in text
+    assert "The run was interrupted" not in text
     assert (out / "common_coulomb_friction_carriage.png").is_file()
 
 
@@ -167,7 +167,7 @@ def never(*arguments, **more):
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
-        ("experiment.toml", 'id = "fast"', 'id = "slow"', "id 'slow' is also that of"),
+        ("experiment.toml", 'id = "fast"', 'id = "slow"', "id 'slow' is also used by"),
         ("experiment.toml", 'id = "fast"', 'id = "a/b"', "id 'a/b' cannot name a folder"),
         ("experiment.toml", 'id = "fast"', 'id = ".."', "id '..' cannot name a folder"),
         ("experiment.toml", 'id = "fast"', 'id = "table.csv"', "id 'table.csv' cannot name a folder"),
@@ -205,7 +205,7 @@ def test_no_experiment_at_all_is_refused() -> None:
         close_loops([])
 
 
-# ---- broken off
+# ---- interrupted runs
 
 
 def second_raises(error: BaseException, monkeypatch) -> None:
@@ -230,7 +230,7 @@ def test_ctrl_c_keeps_what_is_finished_and_its_table(
     assert json.loads((tmp_path / "results.json").read_text())["interrupted"] is True
     assert (tmp_path / "fast" / "result.json").is_file()
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "broken off" in words(page)
+    assert "The run was interrupted" in words(page)
     assert "slow/report.html" not in page
     printed = capsys.readouterr()
     assert "1 of 2 experiments are finished" in printed.err

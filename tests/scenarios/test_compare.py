@@ -211,8 +211,8 @@ def test_wrong_input_is_one_clear_line(drive, tmp_path):
     foreign = foreign_builder(tmp_path)()
     for fmus, more, words in (
         ((drive, foreign), {}, "second FMU"),
-        ((drive, drive), {"tolerance": -1.0}, "from 0 on"),
-        ((drive, drive), {"tolerance": float("nan")}, "from 0 on"),
+        ((drive, drive), {"tolerance": -1.0}, "of 0 or more"),
+        ((drive, drive), {"tolerance": float("nan")}, "of 0 or more"),
         ((drive, tmp_path / "gone.fmu"), {}, "no such FMU"),
     ):
         with pytest.raises(BadInput, match=words) as refused:

@@ -16,7 +16,7 @@ from tests.scenarios.test_command_line import railfmi
 from tests.scenarios.test_estimate_command import write_rig, write_vdp
 from tests.truth.rig import write_record
 
-BELIEVED = "its value is what was believed before"
+BELIEVED = "its value is still the start value"
 
 
 def checks_of(innovation):
@@ -67,7 +67,7 @@ def test_a_number_that_its_own_tests_reject_says_so_everywhere(vdp, tmp_path, ca
     page = (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
     (head,) = re.findall(r"<h1>(.*?)</h1>", page, re.DOTALL)
     assert re.search(sentence, head)
-    assert "passes its own tests" not in page
+    assert "passes its consistency tests" not in page
 
 
 def test_a_number_that_passes_its_tests_stands_alone(vdp, tmp_path, capsys):

@@ -108,10 +108,13 @@ def test_the_page_says_which_start_values_were_fitted_and_why_others_were_not(
     case = SimpleNamespace(problem=problem, result=told, words=SimpleNamespace(unit=lambda _: ""))
     said = [(s["sentence"], [n for n, _ in s["states"]]) for s in sections.start_values(case)]
     fitted, unseen, no_start, vague = said
-    assert fitted == ("Start values that were not declared, fitted together with the parameters", ["x"])
+    assert fitted == (
+        "Start values that were not declared and were fitted together with the parameters",
+        ["x"],
+    )
     assert "would not have shown in the residual" in unseen[0]
     assert unseen[1] == ["z"]
-    assert "takes no start value" in no_start[0]
+    assert "accepts no start value" in no_start[0]
     assert no_start[1] == ["w"]
     assert "can be declared in [initial]" in vague[0]
     assert vague[1] == ["v"]
@@ -124,7 +127,7 @@ def test_the_start_values_of_a_file_that_is_held_out_are_told() -> None:
     case = SimpleNamespace(problem=problem, result=told, words=SimpleNamespace(unit=lambda _: "m"))
     first, second = sections.start_values(case)
     assert first["states"][0][1].endswith("m")
-    assert "file that is held out" in second["sentence"]
+    assert "new start value in the test file" in second["sentence"]
 
 
 def test_the_result_tells_the_start_values(page: str, demo: tuple[Result, Path]) -> None:

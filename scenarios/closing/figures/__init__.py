@@ -1,1 +1,1 @@
-"""Figures of the report, by what they show."""
+"""Figures of the report, one file for each subject."""

@@ -29,12 +29,12 @@ times,
 )  # fmt: skip
 from scenarios.drawing.typography import label, unit
 
-SEGMENTS = 8  # of the test part, between which the spectrum is averaged
+SEGMENTS = 8  # segments of the test part over which the spectrum is averaged
 Series = list[tuple[str, Hypothesis, str]]
 
 
 def series(found: Outcome, free: Hypothesis | None) -> Series:
-    """Whose residuals are drawn: name, hypothesis and colour; free: the force of free form, if any."""
+    """The residuals to draw: name, hypothesis and colour; free: the force of free form, if any."""
     if found.chosen is None and free:
         return [("calibrated", found.base, BEFORE), ("with a force of free form", free, AFTER)]
     if found.chosen is None:
@@ -45,7 +45,7 @@ def series(found: Outcome, free: Hypothesis | None) -> Series:
 
 
 def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
-    """Every output and input over time with the test part shaded."""
+    """Every output and input over time, with the test part shaded."""
     record = problem.record
     channels = [(n, False, j) for j, n in enumerate(record.outputs)]
     channels += [(n, True, j) for j, n in enumerate(record.inputs)]
@@ -68,7 +68,7 @@ def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
 def residual_plots(
     problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None
 ) -> Iterator[Plot]:
-    """Residual of each output over time, and again at the scale of the noise where something was added."""
+    """Residual of each output over time; if something was added, also at the scale of the noise."""
     record, shown = problem.record, series(found, free)
     zoom = found.chosen is not None or free is not None
     for ending, some in sheets(record.outputs, 1 if zoom else 3):
@@ -142,12 +142,15 @@ def _spectrum(ax: Axes, problem: Problem, shown: Series, j: int, noise: float) -
 
 
 def _density(x: Array, rate: float) -> tuple[Array, Array]:
-    """Frequencies up to the Nyquist frequency, without both ends, and the density of x (N,) at `rate` Hz."""
+    """Frequencies between zero and the Nyquist frequency, and the density of x (N,) at `rate` Hz.
+
+    Both ends of the frequency range are left out.
+    """
     f, power = welch(x, rate, nperseg=max(min(len(x), 64), 2 * len(x) // SEGMENTS))
     return f[1:-1], np.sqrt(power[1:-1])
 
 
 def time_label(record: Record) -> str:
-    """What the time axis of a record shows."""
+    """The label of a record's time axis."""
     again = any(b.t[0] <= a.t[-1] for a, b in zip(record.runs, record.runs[1:], strict=False))
-    return "time in s (test file set behind the first)" if again else "time in s"
+    return "time in s (test file drawn after the first)" if again else "time in s"

@@ -14,10 +14,10 @@ from scenarios.drawing.sheet import (
 )
 from scenarios.drawing.typography import label
 
-ROW = 0.24  # in, of an experiment
-ERRORS = 2.0  # standard errors that a bar reaches to either side
+ROW = 0.24  # inches, height of the row of an experiment
+ERRORS = 2.0  # half length of a bar in standard errors
 CAPTION = (
-    "Parameters of {} as each experiment tells them by itself, and as all do together. "
+    "Parameters of {}, fitted to each experiment by itself and to all experiments together. "
     "The bars reach two standard errors to either side."
 )
 Value = Sequence[float]  # value and standard error
@@ -27,7 +27,7 @@ def common_plot(
     name: str, words: str, together: Mapping[str, Value], alone: Mapping[str, Mapping[str, Value]],
     units: Mapping[str, str],
 ) -> Plot:  # fmt: skip
-    """One panel a parameter; together: by parameter; alone: by experiment, then by parameter."""
+    """One panel per parameter; together: values by parameter; alone: by experiment, then parameter."""
     figure, axes = sheet(0.9 + ROW * (len(alone) + 1), [list(together)])
     for i, (parameter, value) in enumerate(together.items()):
         rows = {e: own[parameter] for e, own in alone.items() if parameter in own}

@@ -25,19 +25,20 @@ NAMES = {
     "black_box": "black box",
 }
 FREE = NAMES | {"before": "calibrated", "after": "with free form", "placebo": "nearest effect"}
-ALONE = {k: v for k, v in FREE.items() if k != "after"}  # nothing was added
-STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labelled in each decade, by the decades that are shown
-LABELS = 3  # decades that have room for a label
+ALONE = {k: v for k, v in FREE.items() if k != "after"}  # used if nothing was added to the FMU
+STEPS = {1.2: (1, 2, 5), 2.5: (1, 3), np.inf: (1,)}  # labels in each decade, by the decades of the axis
+LABELS = 3  # largest number of decades that get a label
 CAPTION = (
     "Error on the test part in multiples of the noise floor, on a logarithmic scale. The bars begin at "
-    "the floor, which no model can be expected to pass."
+    "the noise floor: no model can be expected to have a smaller error."
 )
 
 
 def error_plot(errors: dict[str, dict[str, float]], words: Glossary, free: bool) -> Plot:
-    """Bars of the errors of each output, by output and by the keys of NAMES and `noise`.
+    """Bars of the errors of each output.
 
-    free: what was added is a force of free form, not an effect.
+    errors: by output, then by the keys of NAMES and `noise`.
+    free: whether a force of free form was added to the FMU instead of an effect.
     """
     added = all("after" in values for values in errors.values())
     names = (FREE if free else NAMES) if added else ALONE
@@ -53,7 +54,7 @@ def error_plot(errors: dict[str, dict[str, float]], words: Glossary, free: bool)
 
 
 def _bars(ax: Axes, values: dict[str, float], names: dict[str, str], unit: str) -> None:
-    """One bar a model, from the noise floor to its error."""
+    """One bar per model, from the noise floor to its error."""
     shown = [k for k in reversed(names) if k in values]
     over = {k: values[k] / values["noise"] for k in shown}
     decades = np.log10(max(*over.values(), 3.0))
@@ -66,7 +67,7 @@ def _bars(ax: Axes, values: dict[str, float], names: dict[str, str], unit: str) 
     low = min(*over.values(), 10 ** (-0.05 * decades))
     ax.set_xlim(low, 10 ** (1.55 * decades))
     steps = next(s for limit, s in STEPS.items() if decades <= limit)
-    powers = range(0, int(decades) + 1, max(1, round(decades / LABELS)))  # so that labels keep apart
+    powers = range(0, int(decades) + 1, max(1, round(decades / LABELS)))  # keeps labels from overlapping
     ticks = [s * 10**d for d in powers for s in steps if s * 10**d <= 10 ** (1.1 * decades)]
     ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
     ax.minorticks_off()

@@ -1,4 +1,4 @@
-"""The force that each port lacks: over time, against velocity and displacement, with the law found."""
+"""The missing force of each port over time, velocity and displacement, with the law found."""
 
 from collections.abc import Iterator
 
@@ -23,21 +23,21 @@ from scenarios.drawing.sheet import (
 )
 from scenarios.drawing.typography import label
 
-BINS = 25  # of velocity or displacement, over which the missing force is averaged
-TURNS = 16  # sign changes of a law that a time axis shows legibly
-OTHERS = 8  # ports shown beside those with a law
+BINS = 25  # bins of velocity or displacement in which the missing force is averaged
+TURNS = 16  # sign changes of a law that can be told apart on a time axis
+OTHERS = 8  # largest number of ports without a law that are shown
 OF_LAW = (
     "Missing force at the port “{}”, inferred from the residual without assuming a law (band: two standard "
-    "deviations; dots: averages), and the law found there by the joint fit."
+    "deviations; dots: averages). The line is the law that was found there by fitting it inside the FMU."
 )
 OF_OTHERS = (
-    "Force that each port would need if all that is missing acted there alone: over time, with two standard "
-    "deviations, and against the velocity there (dots: averages)."
+    "Missing force at each of the other ports, if the whole missing force acted at that port alone: over "
+    "time (band: two standard deviations) and against the velocity of the port (dots: averages)."
 )
 
 
 def force_plots(found: Outcome, words: Glossary) -> Iterator[Plot]:
-    """The ports with a law found, each on a sheet of its own, then the others."""
+    """One sheet for each port at which a law was found, then the other ports."""
     laws = laws_found(found)
     for i, law in enumerate(laws):
         yield _law_plot(law, words, f"_{i + 1}" if i else "")
@@ -100,7 +100,7 @@ def _over_time(ax: Axes, m: MissingForce, words: Glossary, law: Law | None) -> N
 
 
 def _legible(force: Array) -> slice:
-    """All of a law's force (n,), or the middle piece of it in which it changes sign some TURNS times."""
+    """The part of a law's force (n,) to draw: all, or the middle part with about TURNS sign changes."""
     turns = np.flatnonzero(np.diff(np.sign(force)))
     if len(turns) <= 3 * TURNS:
         return slice(None)
@@ -116,7 +116,7 @@ def _against(ax: Axes, x: Array, m: MissingForce, words: Glossary, name: str, mo
 
 
 def averages(x: Array, y: Array) -> tuple[Array, Array]:
-    """Means of x and y (n,) in bins of x that hold enough of them."""
+    """Means of x and y (n,) in the bins of x that contain enough samples."""
     edges = np.linspace(x.min(), x.max(), BINS + 1)
     place = np.clip(np.digitize(x, edges) - 1, 0, BINS - 1)
     held = np.bincount(place, minlength=BINS)

@@ -1,4 +1,4 @@
-"""The force of free form that comes nearest where no law explains, over what it is a curve of."""
+"""The force of free form that comes nearest to the record when no law explains it."""
 
 import numpy as np
 
@@ -21,9 +21,9 @@ from scenarios.drawing.sheet import (
 from scenarios.drawing.typography import label
 
 CAPTION = (
-    "Force of free form at the port “{port}”, fitted inside the FMU, over the {against} there (line; band: "
-    "two standard errors), and the force inferred from the residual without assuming a law (dots). The curve "
-    "names no cause."
+    "Force of free form at the port “{port}” over the {against} of the port (line; band: two standard "
+    "errors). It was fitted inside the FMU. The dots are the force inferred from the residual without "
+    "assuming a law. The curve does not identify a cause."
 )
 
 
@@ -52,7 +52,7 @@ def free_form_plot(found: Outcome, h: Hypothesis, words: Glossary) -> Plot:
 
 
 def _over(m: MissingForce, against: str, period: float) -> Array:
-    """What a curve is over, along the motion at a port (n,); angles folded into a period."""
+    """The quantity on a curve's horizontal axis along the motion at a port (n,); angles in one period."""
     if against == "velocity":
         return m.velocity
     return np.mod(m.displacement, period) if against == "angle" else m.displacement

@@ -1,4 +1,4 @@
-"""The whole story in one small figure: residual before and after, and the law behind it."""
+"""The main finding in one small figure: residual before and after, and the law found."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from scenarios.drawing.typography import label
 
 
 def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypothesis | None) -> Plot:
-    """Residual of the output that stands out most from its noise, and the first law found, if any."""
+    """Residual of the output with the largest error over noise, and the first law found, if any."""
     j = int(np.argmax(found.base.rms(problem, "test") / found.noise))
     name, laws = problem.record.outputs[j], laws_found(found)
     ratios = [1.35, 1] if laws else [1]
@@ -26,10 +26,10 @@ def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypot
     draw_residual(axes["residual"], problem.record, series(found, free), j, found.noise[j])
     name_axes(axes["residual"], time_label(problem.record), label("residual", words.unit(name)), name)
     legend(figure, axes["residual"])
-    caption = f"Residual of {name} in free simulation, test part shaded."
+    caption = f"Residual of {name} in free simulation; the test part is shaded."
     if laws:
         port = laws[0].missing.port.name
         draw_law(axes["law"], laws[0], words)
         axes["law"].set_title(f"missing at {port}", loc="left", fontsize=9, fontweight="bold")
-        caption += f" Right: the force that is missing at the port “{port}” (dots), and the law found (line)."
+        caption += f" Right: the missing force at the port “{port}” (dots) and the law found (line)."
     return Plot("headline", figure, caption)

@@ -36,7 +36,7 @@ class Law:
 
     @property
     def of_displacement(self) -> bool:
-        """Whether it depends on the displacement."""
+        """Whether the force depends on the displacement."""
         q, v = self.missing.displacement, self.missing.velocity
         return not np.allclose(self.along(q[::-1], v), self.force, rtol=1e-6, atol=1e-12)
 
@@ -48,7 +48,7 @@ class Law:
 
 
 def law_at(h: Hypothesis | None, missing: MissingForce) -> Law | None:
-    """The law that a hypothesis sees at the port of a missing force, if any."""
+    """The fitted law of a hypothesis at the port of a missing force, if any."""
     if h is None:
         return None
     for c in h.candidates:

@@ -1,1 +1,1 @@
-"""What stands on the report's page: names, sentences and tables."""
+"""The contents of the report: names, sentences and tables."""

@@ -1,4 +1,4 @@
-"""What a report is about."""
+"""The problem, outcome and result that a report describes."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from estimator.closeloop.question.problem import Problem
 from scenarios.closing.page.glossary import Glossary
 from scenarios.closing.result import Result
 
-GAP_OVER_NOISE = 1.1  # an error nearer to its noise leaves no gap whose share means anything
+GAP_OVER_NOISE = 1.1  # error over noise below which the share of the gap closed has no meaning
 
 
 @dataclass(frozen=True)
 class Case:
-    """A question, what was found, and the names of things."""
+    """A problem, its outcome, its result, and the words for its variables and effects."""
 
     problem: Problem
     found: Outcome
@@ -23,17 +23,17 @@ class Case:
 
     @property
     def diagnostics(self) -> Diagnostics | None:
-        """What the report owes its reader beside the finding."""
+        """Diagnostics that are reported beside the finding, if there are any."""
         return self.found.diagnostics
 
     @property
     def best(self) -> Hypothesis:
-        """The first member of the verdict's class."""
+        """The best of the hypotheses that the verdict names."""
         return self.found.judgement.members[0]
 
     @property
     def gaps(self) -> dict[str, float]:
-        """Share of the gap closed, by the outputs that stood out from their noise."""
+        """Share of the gap closed, for the outputs whose error before was clearly above the noise."""
         error = self.result.error
         return {
             output: share

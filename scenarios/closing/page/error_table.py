@@ -16,7 +16,7 @@ Row = dict[str, str]
 
 
 def error_values(case: Case) -> dict[str, dict[str, float]]:
-    """Errors on the test part by output; `after` only where something was added."""
+    """Errors on the test part by output; `after` only if something was added to the FMU."""
     return {
         output: {k: v for k, v in values.items() if k != "after" or case.found.built_in}
         for output, values in case.result.error.items()
@@ -35,7 +35,7 @@ def error_rows(case: Case) -> list[Row]:
 
 
 def gap_cards(case: Case) -> list[Row]:
-    """Headline numbers of each output: share of the gap closed, or error over noise where none is."""
+    """Headline numbers of each output: the share of the gap closed, or else the error over noise."""
     cards = []
     for output, e in case.result.error.items():
         of = case.words.unit(output)

@@ -1,4 +1,4 @@
-"""The power statement as a table: what this record would have shown."""
+"""The power statement as a table: the smallest effects that this record would have shown."""
 
 from itertools import groupby
 
@@ -20,7 +20,7 @@ Row = dict[str, str]
 
 
 def power_rows(case: Case) -> list[tuple[str, list[Row]]]:
-    """Rows by kind of effect, ready to print; none where no statement was made."""
+    """Rows by kind of effect, ready to print; empty if there is no power statement."""
     statement = case.diagnostics.power if case.diagnostics else ()
     units = parameter_units(case, statement)
     return [
@@ -45,7 +45,7 @@ def _row(v: Visible, units: dict[str, str]) -> Row:
 
 
 def parameter_units(case: Case, statement: tuple[Visible, ...]) -> dict[str, str]:
-    """Units by the full name of each parameter that a statement names."""
+    """The unit of each parameter in a power statement, by the parameter's full name."""
     site = case.problem.builder.outside()
     chosen = sorted({(v.kind, v.location) for v in statement if v.kind in EFFECTS})
     site.build([(EFFECTS[kind], location) for kind, location in chosen])

@@ -1,4 +1,4 @@
-"""What was rejected and why, and the test for a discrepancy, in words."""
+"""The rejected hypotheses with the reasons, and the test for a discrepancy, in words."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,12 +16,15 @@ from estimator.record import Array
 from scenarios.closing.page.glossary import candidate_words, title
 from scenarios.drawing.typography import HELD, number, percent
 
-NIL = 0.05  # a score or a significance that is nothing
+NIL = 0.05  # a score or a significance below this is shown as zero
 
 
 @dataclass(frozen=True)
 class Rejected:
-    """A rejected hypothesis: errors by output, and how far the best leads it on the part to choose."""
+    """A rejected hypothesis: its errors by output, and its score on the part to choose.
+
+    score: log score minus that of the best hypothesis.
+    """
 
     name: str
     errors: list[str]
@@ -30,7 +33,7 @@ class Rejected:
 
 
 def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
-    """All rejected hypotheses, best first on the part to choose."""
+    """All rejected hypotheses in the order of their score on the part to choose, best first."""
     best = found.chosen or found.base
     others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
     others.sort(key=lambda h: found.baseline.lead(best, h)[0])
@@ -48,7 +51,7 @@ def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
 
 
 def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
-    """Why a hypothesis was rejected, most telling first."""
+    """The reasons why a hypothesis was rejected, the strongest first."""
     weak = found.baseline.idle(h)
     for c in weak:
         z = h.significance(found.base)[h.candidates.index(c)]
@@ -56,7 +59,7 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
         from_zero = (
             f"only {number(z, 2)} standard errors from zero ({problem.policy.decision.significant:g} needed)"
         )
-        yield f"size{which} {from_zero if z >= NIL else 'zero'}"
+        yield f"size{which} is {from_zero if z >= NIL else 'zero'}"
     if weak or not explains(found.baseline, h):
         yield from _left(problem, found, h)
         return
@@ -66,11 +69,11 @@ def reasons(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     if score > 0 and error > 0:
         yield f"worse than the best by {number(score / error, 2)} standard errors"
     elif len(h.candidates) > len(found.chosen.candidates):
-        yield "no better than fewer effects by more than chance"
+        yield "more effects, but no better than the best beyond chance"
 
 
 def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
-    """What a hypothesis leaves of the residual, where that is too much."""
+    """The parts of the residual that a hypothesis leaves, if they are too large."""
     over, declared = h.rms(problem, "choose") / found.noise, found.baseline.noise.declared
     short = np.flatnonzero(declared & ~form_of(found.baseline).reached(h))
     if short.size:
@@ -84,7 +87,7 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
         )
         needed = problem.policy.decision.explained
         if share < needed:
-            yield f"takes away {percent(max(share, 0.0))} of the residual's variance ({needed:.0%} needed)"
+            yield f"explains {percent(max(share, 0.0))} of the residual's variance ({needed:.0%} needed)"
 
 
 def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
@@ -104,36 +107,40 @@ def decided(c: Check) -> dict[str, str]:
 
 
 def detection_words(problem: Problem, found: Outcome) -> str:
-    """The test for a discrepancy."""
+    """The test for a discrepancy, in sentences."""
     d, draws = found.detection, problem.policy.detection.replicates
     at_floor = d.p_value <= 1.001 * len(d.figures) / (draws + 1)
-    least = ", the least that so many records can show" if at_floor else ""
-    verdict = "more than noise" if d.detected else "no more than what noise leaves"
+    least = ", the smallest value that this number of records allows" if at_floor else ""
+    verdict = "larger than noise explains" if d.detected else "no larger than noise explains"
     size = "large enough to matter" if d.material else "too small to matter"
     return (
-        f"Before any effect the residual is {verdict} (p = {d.p_value:.2g}{least}; below {d.level:g} it "
-        f"counts) and {size}. It was held against {draws} draws of white noise of the record's size; "
-        "what calibration to that noise would change follows from the FMU's sensitivities, to first order."
+        f"Before any effect is added, the residual is {verdict} (p = {d.p_value:.2g}{least}; a discrepancy "
+        f"needs p < {d.level:g}) and {size}. The test compares it with {draws} random records of white "
+        "noise of the same length. The change that calibrating to this noise would make is computed to first "
+        "order from the FMU's sensitivities."
     )
 
 
 def chance_words(found: Outcome, diagnostics: Diagnostics) -> str:
-    """What decoys reached, and how stable the nomination of the finding is."""
+    """How much decoy regressors explain by chance, and how stable the screening of the finding is."""
     chi2 = float(found.base.fit.residual @ found.base.fit.residual)
-    words = "No regressor of this record is broad enough in frequency to be held against chance ones."
+    words = "No regressor of this record covers enough frequencies to be compared with random ones."
     if diagnostics.decoy_gain:
         reached = percent(diagnostics.decoy_gain / chi2)
-        words = f"Ones that mean nothing but have the spectra of the leading ones explain {reached} of it."
+        words = (
+            "Random signals with the same spectra as the leading candidates, which have no physical meaning, "
+            f"explain {reached} of the residual."
+        )
     named = [c for h in found.judgement.members for c in h.candidates]
     for label, name in {c.label: candidate_words(c) for c in named}.items():
         if label in diagnostics.stability:
             often = percent(diagnostics.stability[label])
-            words += f" In {often} of random halves of the record {name} is among the leading ones."
-    return f"In the screening, effects were ranked by what they explain of the residual. {words}"
+            words += f" In {often} of random halves of the record, {name} is among the leading candidates."
+    return f"The screening ranks candidate effects by the share of the residual that they explain. {words}"
 
 
 def tried(problem: Problem) -> dict[str, list[str]]:
-    """Kinds of effects that the library offered, by location."""
+    """The kinds of effects that the library offers, by location."""
     places: dict[str, list[str]] = {}
     for kind, location in problem.builder.offers:
         places.setdefault(location, []).append(kind)

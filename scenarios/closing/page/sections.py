@@ -1,4 +1,4 @@
-"""What stands in the report's sections: numbers and names, ready to print."""
+"""The tables of the report's sections: numbers and names, ready to print."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ from scenarios.drawing.typography import (
     with_error,
 )
 
-AT_BOUND = 1e-3  # of the distance of the bounds, within which an estimate stands at one of them
+AT_BOUND = 1e-3  # an estimate this near to a bound is at it, as a share of the distance of the bounds
 Row = dict[str, Any]
 
 
@@ -48,7 +48,7 @@ class LawText:
 
 
 def channels(case: Case) -> Iterator[Row]:
-    """Outputs, then inputs: name, part, meaning, unit, range, noise."""
+    """A row for each output, then for each input: name, part, meaning, unit, range, noise."""
     record = case.problem.record
     y, u = (np.vstack([getattr(run, part) for run in record.runs]) for part in ("y", "u"))
     for j, name in enumerate(record.outputs):
@@ -66,7 +66,7 @@ def _channel(case: Case, name: str, part: str, low: float, high: float, noise: s
 
 
 def runs(case: Case) -> list[Row]:
-    """Duration, sampling and split of each run."""
+    """A row for each run: duration, sampling, and its identify part, part to choose and test part."""
     return [_run(run) for run in case.problem.record.runs]
 
 
@@ -89,28 +89,28 @@ def _window(run: Run, mask: BoolArray) -> str:
 
 
 _STARTS = {
-    "fitted": "Start values that were not declared, fitted together with the parameters",
+    "fitted": "Start values that were not declared and were fitted together with the parameters",
     "not seen": (
         "Start values that were not declared and were left at the FMU's own value, because another value "
         "would not have shown in the residual"
     ),
     "not settable": (
-        "Outputs for which the FMU takes no start value (initial = calculated); a state behind them starts "
-        "at the FMU's own value, and nothing was fitted there"
+        "Outputs for which the FMU accepts no start value (initial = calculated), so that no start value was "
+        "fitted; the states behind them start at the FMU's own values"
     ),
     "not exact": (
-        "Outputs whose start value the FMU does not say to be exact (initial = exact); it was left at the "
-        "FMU's own value, not fitted, and can be declared in [initial]"
+        "Outputs whose start value is not marked as exact in the FMU (initial = exact), so that it was left "
+        "at the FMU's own value and not fitted; it can be declared in [initial]"
     ),
 }
 _HELD_OUT = (
-    "In the file that is held out, these start anew: measured ones on a line through the first samples, the "
-    "others at the FMU's own value"
+    "States that get a new start value in the test file, from a line through the first samples if they are "
+    "measured, otherwise the FMU's own value"
 )
 
 
 def start_values(case: Case) -> Iterator[Row]:
-    """A sentence on each way in which start values that are not declared came about, and these."""
+    """A sentence for each way in which undeclared start values were obtained, with the states concerned."""
     found = case.result.start_values
     for how, sentence in _STARTS.items():
         states = [(n, _start(case, n, s)) for n, s in found.items() if s["how"] == how]
@@ -129,7 +129,7 @@ def _start(case: Case, name: str, found: Row) -> str:
 
 
 def laws(case: Case) -> Iterator[tuple[str, list[LawText]]]:
-    """Each member of the verdict's class: in words, and its laws."""
+    """Each hypothesis that the verdict names: in words, and its laws."""
     for h in case.found.judgement.members:
         yield hypothesis_words(h), [_law(case, h, c) for c in h.candidates]
 
@@ -171,7 +171,7 @@ def _parameters(case: Case, h: Hypothesis, c: Candidate) -> Iterator[Row]:
 
 
 def calibrated(case: Case) -> Iterator[Row]:
-    """Calibrated parameters: declared, bounds, estimate without and with the effect."""
+    """A row for each calibrated parameter: declared value, bounds, estimate without and with the effect."""
     base, with_effect = case.found.base.fit, case.found.chosen is not None
     for name, (low, high) in case.problem.calibrate.items():
         value, error = case.result.calibrated[name]

@@ -1,4 +1,4 @@
-"""What may be said about an outcome, in sentences."""
+"""The report's sentences about an outcome, by verdict."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,6 @@ from scenarios.closing.page.glossary import (
 from scenarios.closing.result import Figure, effects_of
 from scenarios.drawing.typography import (
     HELD,
-    capital,
     percent,
     quantity,
     with_error,
@@ -25,7 +24,7 @@ from scenarios.drawing.typography import (
 
 @dataclass(frozen=True)
 class Story:
-    """An outcome in words: its headline, what that means, and what is claimed as a law."""
+    """An outcome in words: its headline, the meaning of the verdict, and the statement about the law."""
 
     headline: str
     lead: str
@@ -38,7 +37,7 @@ def story(case: Case) -> Story:
 
 
 def lacks_words(h: Hypothesis, words: Glossary) -> str:
-    """What a hypothesis adds, with sizes: "quadratic damping at the roller: c = 0.2998 ± 0.0002 ..."."""
+    """The effects of a hypothesis with sizes: "quadratic damping at the roller: c = 0.2998 ± 0.0002 ..."."""
     sizes = [
         _sizes(effect.parameters, c, words) for effect, c in zip(effects_of(h), h.candidates, strict=True)
     ]
@@ -50,7 +49,7 @@ def lacks_words(h: Hypothesis, words: Glossary) -> str:
 
 def _sizes(parameters: dict[str, Figure], c: Candidate, words: Glossary) -> str:
     told = dict(parameters)
-    if "amplitude" in told:  # it says what its sine and cosine say apart
+    if "amplitude" in told:  # the resultant of the sine and cosine amplitudes replaces both
         for u in c.amplitudes:
             told.pop(u.name.removeprefix(c.prefix))
         told = {"amplitude": told.pop("amplitude"), **told}
@@ -62,47 +61,51 @@ def _sizes(parameters: dict[str, Figure], c: Candidate, words: Glossary) -> str:
 
 
 def gap_words(case: Case, closes: str = "It closes") -> str:
-    """How much of the gap is closed, judged by the output where it is least."""
+    """The share of the gap closed, for the output with the smallest share."""
     shares = case.gaps.values()
     if not shares:
-        return "No output had a gap to its noise on the test part."
+        return "Without an effect, no output had an error clearly above its noise on the test part."
     least = "at least " if len(shares) > 1 else ""
     return f"{closes} {least}{percent(min(shares))} of the gap between model and measurement."
 
 
 def missed_words(case: Case) -> str:
-    """What the missing forces show."""
+    """An explanation of the missing forces."""
     if not case.found.forces:
-        return "The FMU shows no states or has no ports, so no missing force could be inferred."
+        return "The FMU gives no access to its states or has no ports, so no missing force could be inferred."
     how = (
-        "The residual, turned into the force that would have to act at each port to make up for it. No law "
-        "is assumed, only that all that is missing acts at this one port. "
+        "The missing force of a port is the force that would have to act there to remove the residual. It is "
+        "computed without assuming a law, only that the whole missing force acts at this one port. "
     )
     if case.result.verdict == "no_discrepancy":
-        return f"{how}No discrepancy was found: what is seen here is noise, or too small to matter."
+        return f"{how}No discrepancy was found: these forces are noise, or too small to matter."
     if case.result.verdict == "sensor_fault":
         return f"{how}A faulty sensor explains the record better, so these forces are not real."
-    rests = "It rests on the parameters calibrated without an effect"
+    rests = "It is computed with the parameters that were calibrated without an effect."
     if case.found.chosen is None:
-        return f"{how}{rests}."
-    return f"{how}{rests}; where these were bent to make up for it, the missing force departs from the law."
+        return f"{how}{rests}"
+    return (
+        f"{how}{rests} If that calibration shifted the parameters to compensate for the missing effect, the "
+        "missing force deviates from the law found."
+    )
 
 
 def _traced(case: Case) -> Story:
     return Story(
         _lacks(case),
-        "One effect of the library accounts for the residual, and every other one that was tried is rejected "
-        "(section 6). It was fitted inside the FMU together with the calibrated parameters.",
-        "The effect was built into the FMU and its size found by simulation of the identify part.",
+        "One effect of the library explains the residual, and every other effect that was tried is rejected "
+        "(section 6).",
+        "The effect was built into the FMU. Its parameters were fitted to the identify part by simulation, "
+        "together with the calibrated parameters.",
     )
 
 
 def _several(case: Case) -> Story:
     return Story(
         _lacks(case, "Together they close"),
-        "No single effect accounts for the residual; these together do, and each of them is needed. They "
-        "were fitted inside the FMU together with the calibrated parameters.",
-        "The effects were built into the FMU, their sizes found together by simulation of the identify part.",
+        "No single effect explains the residual. These effects together explain it, and each is needed.",
+        "The effects were built into the FMU. Their parameters were fitted to the identify part by "
+        "simulation, together with the calibrated parameters.",
     )
 
 
@@ -113,63 +116,64 @@ def _lacks(case: Case, closes: str = "It closes") -> str:
 def _ambiguous(case: Case) -> Story:
     names = _either([hypothesis_words(h) for h in case.found.judgement.members])
     return Story(
-        f"{capital(names)} explains what the model misses; this record cannot tell which. "
+        f"The model lacks one of these effects, but this record cannot tell which: {names}. "
         + gap_words(case, "The first closes"),
-        "Each of them accounts for the residual, and the part to choose does not tell them apart beyond "
-        "chance and small differences of form. None may be taken for the cause before the run named in "
-        "section 6 has been made.",
-        "The class has these members, best first. The figures and the augmented FMU show the first.",
+        "Each of these candidate effects explains the residual. Their errors on the part to choose differ no "
+        "more than by chance or by small differences of form. Take none of them for the cause before the "
+        "experiment proposed in section 6 has been made.",
+        "These are the candidate effects, best first. The figures and the augmented FMU contain the first.",
     )
 
 
 def _sensor_fault(case: Case) -> Story:
     return Story(
-        f"A sensor is at fault, with {lacks_words(case.best, case.words)}. {gap_words(case)}",
-        "A fault of the measurement accounts for the residual better than any missing force that was tried. "
+        f"A sensor is at fault, with {lacks_words(case.best, case.words)}. "
+        + gap_words(case, "Correcting the fault closes"),
+        "A fault of the measurement explains the residual better than any missing force that was tried. "
         "Nothing was added to the model. Check the sensor and its channel first.",
-        "No law of force is claimed. This fault was fitted together with the calibrated parameters.",
+        "No force law was found. The sensor fault was fitted together with the calibrated parameters.",
     )
 
 
 def _unexplained(case: Case) -> Story:
     singles = case.found.singles
-    near = f" The nearest, {hypothesis_words(singles[0])}, does not suffice." if singles else ""
-    headline = f"The model lacks something that the library does not hold.{near}"
-    real = "The residual is real, but no effect that was tried brings it down to the noise. "
+    near = f" The nearest effect, {hypothesis_words(singles[0])}, does not suffice." if singles else ""
+    headline = f"The model lacks something that the library of effects does not contain.{near}"
+    real = "The residual is larger than noise, but no effect that was tried reduces it to the noise. "
     if case.found.free_form is None:
         return Story(
             headline,
-            f"{real}Nothing is claimed and nothing was added to the model. The missing forces in section 2 "
+            f"{real}No cause was found, and nothing was added to the model. The missing forces in section 2 "
             "show where to look.",
-            "No law is claimed. What was tried, and what speaks against it, stands in section 6.",
+            "No law was found. Section 6 lists the effects that were tried and why each was rejected.",
         )
     curve = curve_of(case.found.free_form)
     return Story(
         f"{headline} {gap_words(case, 'A force of free form closes')}",
-        f"{real}No cause is claimed. The augmented FMU holds a force of free form at {curve.location}, a "
-        f"curve over the {curve.against} there (section 3): it is nearer to the measurement, in the range "
-        "of this record.",
-        "No law is claimed. The curve was fitted inside the FMU together with the calibrated parameters; of "
-        "several ports and quantities it left the least. Its form may hint at the cause.",
+        f"{real}No cause was found. The augmented FMU contains a force of free form at {curve.location}: a "
+        f"curve over the {curve.against} there (section 3). It brings the simulation nearer to the "
+        "measurement within the range of this record.",
+        "No law was found. The curve was fitted inside the FMU together with the calibrated parameters. It "
+        "left the smallest residual of all ports and quantities tried. Its form may hint at the cause.",
     )
 
 
 def _no_discrepancy(case: Case) -> Story:
-    small = "what it misses is more than noise, but too small to matter"
-    left = small if case.found.detection.detected else "what is left is what noise would leave"
+    small = "the residual is larger than noise, but too small to matter"
+    left = small if case.found.detection.detected else "the residual is no larger than noise explains"
     return Story(
         f"The model explains the record: {left}.",
-        "With the declared parameters calibrated within their bounds, the free simulation needs no further "
-        "effect. None was fitted, and nothing was added to the model.",
-        "No law was looked for, because no discrepancy calls for one.",
+        "With the parameters calibrated within their bounds, the free simulation needs no further effect. No "
+        "effect was fitted, and nothing was added to the model.",
+        "No law was searched for, because no discrepancy was found.",
     )
 
 
 def _insufficient(case: Case) -> Story:
     return Story(
-        "The record moves too little to tell what the model lacks.",
-        f"The chain's reason: {case.result.reason}. Nothing is claimed and nothing was added to the model.",
-        "No law is claimed; a record with more motion is needed.",
+        "The motion in the record is too small to tell what the model lacks.",
+        f"The reason in detail: {case.result.reason}. No cause was found. Nothing was added to the model.",
+        "No law was found; a record with more motion is needed.",
     )
 
 
