@@ -209,7 +209,7 @@ def probability(joint: Joint, h: History, i: int, limit: float, below: bool) -> 
 def stretches(name: str, limit: str, t: Array, p: Array, alarm: Alarm) -> list[Raised]:
     """Begin and end of each alarm.
 
-    It begins when the probability reaches that of the alarm and stays there, and ends when it falls below CLEAR.
+    It begins when the probability reaches its limit and stays there. It ends when it falls below CLEAR.
     """
     likely = p >= alarm.probability
     edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))

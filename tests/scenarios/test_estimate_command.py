@@ -285,7 +285,7 @@ def test_options_are_checked_against_what_is_estimated(vdp, tmp_path):
 def test_without_the_table_there_is_nothing_to_estimate(vdp, tmp_path):
     file = write_vdp(tmp_path, vdp, n=60)
     file.write_text(file.read_text().split("[estimate]")[0])
-    with pytest.raises(BadInput, match=r"has no \[estimate\]; say there which parameters"):
+    with pytest.raises(BadInput, match=r"has no \[estimate\]; list there the parameters"):
         estimate(file, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
