@@ -1,4 +1,4 @@
-"""A foreign FMU with the effects that were found, as an SSP package of both, driven as in its experiment."""
+"""Write a foreign FMU and the effects found as an SSP package with the inputs of the experiment."""
 
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -37,11 +37,11 @@ def export_augmented(
     origin: Origin,
     out: Path,
 ) -> Path:
-    """Write a package of the FMU and of an FMU of the effects (kind, location) to `out`; its path.
+    """Write a package of the FMU and an FMU of the effects (kind, location) to `out`; returns its path.
 
-    It runs the experiment's first record from its beginning. starts: values by the name in the FMU that
-    carries the effects; origin: what they rest on. BadInput where an effect changes a parameter while
-    running, to which SSP has no connection.
+    The package simulates the experiment's first record from its beginning.
+    starts: start values by their names in the augmented FMU; origin: the experiment and its estimates.
+    Raises BadInput if an effect changes a parameter during the run, as SSP cannot connect to parameters.
     """
     t = record.runs[0].t
     step = coupling_step(t)
@@ -66,7 +66,7 @@ def coupling_step(t: Array) -> float:
 
 
 def _built(model: EffectsAlone, folder: Path, origin: Origin) -> tuple[Path, Kind]:
-    """The FMU of the effects: native, or PythonFMU where no compiler is at hand."""
+    """The FMU of the effects: native, or a PythonFMU build if there is no compiler."""
     try:
         return build_native(model, folder, origin=origin), "native"
     except BadInput:
@@ -85,7 +85,7 @@ def _scenario(
         {"that": f"max(abs({BASE}.{name})) < 1e300", "because": f"{name} stays finite"} for name in outputs
     ]
     return {
-        "question": f"What does {base.name} do with the effects that were found: {model.about}?",
+        "question": f"How does {base.name} behave with the effects found: {model.about}?",
         "duration": step * max(1, floor(min(t[-1] - t[0], longest) / step)),  # never past the record
         "step": step,
         "fmus": {BASE: _member(fmu, base, {**starts, **plugs.constant})},
@@ -117,7 +117,7 @@ def _columns(record: Record) -> Iterator[tuple[str, Array]]:
 
 
 def _inputs(plugs: Plugs, name: str, u: Array) -> Iterator[tuple[str, Any]]:
-    """What drives an input, at each member that takes it."""
+    """The signal that drives an input, for each member that has this input."""
     given: Any = float(u[0]) if np.ptp(u) == 0 else {"data": DATA, "time": TIME, "column": name}
     if name in plugs.through:
         yield f"{EFFECTS}.{plugs.through[name]}", given

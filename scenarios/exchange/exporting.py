@@ -1,4 +1,4 @@
-"""A scenario as an SSP 1.0 package that other tools run."""
+"""Write a scenario as an SSP 1.0 package that other tools can simulate."""
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -50,7 +50,7 @@ Tell = Callable[[str], None]
 
 @dataclass
 class _Content:
-    """What goes into the package."""
+    """The content of the package."""
 
     components: list[Component] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
@@ -66,13 +66,14 @@ def export_ssp(
     platforms: str | Sequence[str] = (),
     tell: Tell = lambda _: None,
 ) -> Path:
-    """Write `out`/ID.ssp, or `out` itself where it ends in .ssp, and return its path.
+    """Write `out`/ID.ssp, or `out` itself if it ends in .ssp, and return its path.
 
-    kind, fmi, platforms: of the FMUs of our models, see build_native; this machine's platform is always one.
-    FMUs given as files go in as they are.
-    variant: which one of a scenario that has several. tell: gets a line on what is being done, and on what
-    other tools will not see. The same scenario gives the same bytes, but for FMUs that PythonFMU itself
-    builds from a source, which it dates. BadInput for a wrong scenario.
+    kind, fmi, platforms: of the FMUs of our models, see build_native; this machine's platform is always
+    included. FMUs given as files are copied unchanged.
+    variant: the variant to write, if the scenario has several.
+    tell: called with lines on the progress, and on parts of the scenario that other tools cannot use.
+    The same scenario gives the same bytes, except for FMUs built by PythonFMU, which contain a date.
+    Raises BadInput if the scenario is wrong.
     """
     read = load_scenario(scenario)
     name = chosen(read, variant)
@@ -89,12 +90,12 @@ def export_ssp(
 
 
 def _content(read: Scenario, name: str, label: str, form: Form, tell: Tell) -> _Content:
-    """All of a variant but the structure, which is written from it."""
+    """The content of a variant's package, except for the structure file, which is written from it."""
     d = read.variants[name]
     with ExitStack() as stack, of_file(read.file):
         work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_ssp_")))
         packer = Packer(work / "models", form, d)
-        tell(f"{label}: building its FMUs and checking all that it names")
+        tell(f"{label}: building its FMUs and checking all names in it")
         prepared(d, read.file, wanted(asked(read), name, read), packer, stack)
         archives = {n: stack.enter_context(Archive(path)) for n, path in packer.paths.items()}
         fmus = {n: archive.description for n, archive in archives.items()}
@@ -134,7 +135,7 @@ def _members(
 
 
 def _connectors(fmu: FmuDescription, connected: set[str]) -> tuple[Connector, ...]:
-    """Inputs that are connected (FMPy stumbles over others), outputs and parameters."""
+    """Connected inputs, outputs and parameters; FMPy fails on inputs without a connection."""
     inputs = [Connector(n, "input", fmu.variables[n].unit) for n in fmu.inputs if n in connected]
     outputs = [Connector(n, "output", fmu.variables[n].unit) for n in fmu.outputs]
     parameters = [Connector(n, "parameter", fmu.variables[n].unit) for n in fmu.parameters]
@@ -142,7 +143,7 @@ def _connectors(fmu: FmuDescription, connected: set[str]) -> tuple[Connector, ..
 
 
 def _feed(content: _Content, fed: str, signals: Fed, form: Form, folder: Path) -> None:
-    """Add a component that feeds another one with its signals, and the same signals as CSV."""
+    """Add a component that supplies another one with its signals, and the same signals as CSV."""
     taken = {component.name for component in content.components}
     name = f"inputs_{fed}"
     while name in taken:
@@ -151,7 +152,7 @@ def _feed(content: _Content, fed: str, signals: Fed, form: Form, folder: Path) -
     fmu, data = f"{RESOURCES}/{name}.fmu", f"{RESOURCES}/{name}.csv"
     content.files |= {fmu: form.build(model, folder).read_bytes(), data: signals.csv}
     outputs = tuple(Connector(n, "output", unit) for n, (unit, _) in signals.even.items())
-    # before the one that it feeds, for tools that step in the order of the file
+    # placed first for tools that step components in the file's order
     i = next(i for i, c in enumerate(content.components) if c.name == fed)
     step = content.components[i].step
     content.components.insert(i, Component(name, fmu, outputs, step=step, feeds=fed, data=data))
@@ -178,14 +179,14 @@ def _known_of(fmu: Path) -> dict[str, Any] | None:
 
 
 def _unsaid(scenario: Scenario, variant: str, d: Declaration) -> list[str]:
-    """What only railfmi will see of a scenario."""
+    """Sentences on the parts of a scenario that only railfmi can use."""
     said = []
     if d.events:
-        said.append(f"its {len(d.events)} events are for railfmi alone; SSP 1.0 has no word for them")
+        said.append(f"only railfmi applies its {len(d.events)} events; SSP 1.0 cannot represent them")
     if (d.order, d.extrapolation) != ("jacobi", "hold"):
-        said.append(f"order '{d.order}' with extrapolation '{d.extrapolation}' is for railfmi alone")
+        said.append(f"order '{d.order}' with extrapolation '{d.extrapolation}' is used by railfmi only")
     if any(wire.delayed for wire in d.connections):
-        said.append("delayed connections are delayed by railfmi alone")
+        said.append("only railfmi delays the delayed connections")
     for member in (n for n, m in d.fmus.items() if m.source is not None):
         said.append(f"'{member}' is built from a PythonFMU source and needs Python wherever it runs")
     if left := dropped(scenario, variant):

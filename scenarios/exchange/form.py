@@ -1,4 +1,4 @@
-"""In which form the FMUs of a scenario are built into a package."""
+"""The form in which the FMUs of a scenario are built for a package."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ Kind = Literal["native", "python"]
 
 @dataclass(frozen=True)
 class Form:
-    """How models are built into a package; see build_native."""
+    """The form in which models are built; see build_native."""
 
     kind: Kind = "native"
     fmi: int = 2
@@ -30,7 +30,7 @@ class Form:
         if self.kind == "native":
             return build_native(model, out, self.fmi, (*self._named, "host"))  # looked at from here too
         if self.fmi != 2:
-            raise BadInput(f"FMI {self.fmi}: PythonFMU builds are FMI 2; choose native ones")
+            raise BadInput(f"FMI {self.fmi}: PythonFMU builds are FMI 2 only; choose native FMUs")
         return build_python(model, out)
 
     @property
@@ -39,9 +39,10 @@ class Form:
 
 
 class Packer(Builder):
-    """Builds all models of a scenario in one form, and knows where the FMU of each member is.
+    """Builds all models of a scenario in one form, and keeps the path of each member's FMU.
 
-    The scenario's values are the start values of its FMUs too: libcosim sets none of states, FMPy none.
+    The scenario's values are also written into the FMUs as start values, because libcosim does not set start
+    values of states, and FMPy does not set any.
     """
 
     def __init__(self, folder: Path, form: Form, d: Declaration) -> None:
@@ -67,7 +68,7 @@ class Packer(Builder):
 
 
 def starts(d: Declaration) -> dict[str, dict[str, float]]:
-    """Values that a scenario sets before the start, by member and variable; moving inputs are none."""
+    """Values that a scenario sets before the start, by member and variable; without time-varying inputs."""
     found: dict[str, dict[str, float]] = {}
     for name, member in d.fmus.items():
         friction = CONDITIONS[member.friction] if member.friction else {}
@@ -80,6 +81,6 @@ def starts(d: Declaration) -> dict[str, dict[str, float]]:
 
 
 def _set_starts(model: Model, values: Mapping[str, float]) -> None:
-    """Unknown names are left to the master, which says what is wrong with them."""
+    """Unknown names are passed on, because the master reports them with an error."""
     for name in values.keys() & model.variables.keys():
         model.variables[name] = replace(model.variables[name], start=values[name])

@@ -1,4 +1,4 @@
-"""An SSP 1.0 package, of ours or of another tool, as a folder with a scenario that runs here."""
+"""Read an SSP 1.0 package of railfmi or of another tool, and write it as a folder with a scenario."""
 
 import re
 import tomllib
@@ -28,17 +28,18 @@ from scenarios.simulating.reading import load_scenario
 
 Tell = Callable[[str], None]
 Descriptions = Mapping[str, FmuDescription]
-STEP = 1e-3  # s, where neither the package nor its FMUs name one
+STEP = 1e-3  # s, if neither the package nor its FMUs declare a step
 FILE = "scenario.toml"
 KEPT = ("id", "question", "order", "extrapolation", "seed", "record", "sensors", "events", "expect", "figure")
 
 
 def import_ssp(package: str | Path, out: str | Path, tell: Tell = lambda _: None) -> Path:
-    """Write a package as a scenario with its FMUs and data into the folder `out`; the scenario's path.
+    """Write a package as a scenario with its FMUs and data into the folder `out`; returns its path.
 
-    A package of ours runs as the scenario that it was made from; what was changed in its structure or its
-    values counts. One of another tool expects that the outputs stay finite. tell: gets a line on what is
-    left out or was changed. BadInput where it is no SSP 1.0 package or holds what cannot be run here.
+    A package of railfmi becomes the scenario that it was made from, with any changes made to its structure or
+    its values. The scenario of another tool's package expects only that the outputs stay finite.
+    tell: called with lines on parts that are left out or were changed.
+    Raises BadInput if it is not an SSP 1.0 package, or contains parts that cannot be simulated here.
     """
     system, files = read_package(package)
     folder = writable(Path(out))
@@ -83,7 +84,7 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path) -> dict[
 
 
 def _settings(files: Mapping[str, bytes]) -> dict[str, Any]:
-    """What a package of ours says beyond its structure."""
+    """The settings in a package of railfmi that go beyond its structure."""
     if PLACE not in files:
         return {}
     try:
@@ -93,7 +94,7 @@ def _settings(files: Mapping[str, bytes]) -> dict[str, Any]:
 
 
 def _sources(system: System, files: Mapping[str, bytes]) -> dict[str, str]:
-    """Components that only hand on signals which the package holds as data too, with that file."""
+    """Components that only supply signals which the package also contains as data, with the data file."""
     found = {c.name: c.data for c in system.components if c.data is not None and c.data in files}
     plain = {"gain": 1.0, "offset": 0.0}
     for link in system.links:
@@ -104,11 +105,13 @@ def _sources(system: System, files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _names(members: list[Component]) -> dict[str, str]:
-    """Names that a scenario allows."""
+    """Names that are allowed in a scenario."""
     names = {c.name: re.sub(r"^(?=\d)|\W", "_", c.name, flags=re.ASCII) for c in members}
     for name, new in names.items():
         if list(names.values()).count(new) > 1:
-            raise BadInput(f"component '{name}' would become '{new}' as others do; rename it")
+            raise BadInput(
+                f"component '{name}' would get the name '{new}', like another component; rename it"
+            )
     return names
 
 
@@ -120,7 +123,7 @@ def _duration(system: System) -> float:
 
 
 def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
-    """The communication step, s: of the package, else the shortest that an FMU names for itself."""
+    """The communication step in s: that of the package, else the shortest that an FMU declares."""
     if system.step is not None:
         return system.step
     own = [d.step_size for d in fmus.values() if d.step_size]
@@ -128,7 +131,7 @@ def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
 
 
 def _member(c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any]) -> dict[str, Any]:
-    """An FMU with its values; those of inputs go to `inputs`."""
+    """An FMU with its values; values of inputs are added to `inputs`."""
     member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
     for variable, (value, unit) in c.start.items():
         known = fmu.variables.get(variable)
@@ -146,7 +149,7 @@ def _member(c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any]
 
 
 def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: list[str]) -> dict[str, Any]:
-    """A connection in a scenario's words, where units are converted before gain and offset."""
+    """A connection as a scenario declares it, in which units are converted before gain and offset."""
     (source, output), (target, inlet) = link.source, link.target
     to = f"{names[target]}.{inlet}"
     wire: dict[str, Any] = {"from": f"{names[source]}.{output}", "to": to}
@@ -167,13 +170,13 @@ def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: lis
 
 
 def _finite(name: str, fmu: FmuDescription) -> dict[str, Any]:
-    """What can be expected of FMUs of which nothing else is known."""
+    """Expectations for FMUs about which nothing else is known."""
     parts = [f"max(abs({name}.{output})) < 1e300" for output in fmu.outputs]
     return {"that": " and ".join(parts), "because": f"the outputs of {name} stay finite"}
 
 
 def _changed(files: Mapping[str, bytes]) -> list[str]:
-    """FMUs and data that are not as they were when the package was written by railfmi."""
+    """Sentences on FMUs and data that were changed after railfmi wrote the package."""
     if PROVENANCE not in files:
         return []
     try:

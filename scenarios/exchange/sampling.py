@@ -1,4 +1,4 @@
-"""What moves the FMUs of a scenario from outside, at the times at which the master reads it."""
+"""The external inputs of a scenario's FMUs, at the times at which the master reads them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Fed:
 
     @property
     def csv(self) -> bytes:
-        """Times and values to the last bit, names in line 1."""
+        """Times and values as CSV in full precision, with the names in line 1."""
         text = StringIO()
         table = pd.DataFrame({TIME: self.times, **self.values})
         table.to_csv(text, index=False, lineterminator="\n")
@@ -46,13 +46,13 @@ class Fed:
 
 
 def constants(sources: Mapping[str, Source]) -> dict[str, float]:
-    """Inputs that stay as they are, by 'fmu.variable'."""
+    """Constant inputs by 'fmu.variable'."""
     found = {name: signal(name, source).constant for name, source in sources.items()}
     return {name: value for name, value in found.items() if value is not None}
 
 
 def sampled(d: Declaration, fmus: Descriptions, sources: Mapping[str, Source]) -> dict[str, Fed]:
-    """Signals by FMU, of those that have any; BadInput where one does not reach over the run."""
+    """Signals of each FMU that has any; raises BadInput if a signal does not cover the run."""
     moving: dict[str, list[Signal]] = {}
     for name, source in sources.items():
         given = signal(name, source)
@@ -80,7 +80,7 @@ def _fed(signals: list[Signal], times: Array, name: str, d: Declaration, fmus: D
 
 
 def _times(d: Declaration, fmus: Descriptions) -> dict[str, Array]:
-    """Begin, middle and end of each step by FMU, (n,) s, as the master works them out."""
+    """Begin, middle and end of each step by FMU, (n,) s, as the master computes them."""
     own = {name: m.step for name, m in d.fmus.items() if m.step is not None}
     master = clock(fmus, d.step or 0.0, own, d.record.step)
     plan = master.plan(d.duration or 0.0, [(moment.time, {}) for moment in d.events])

@@ -1,4 +1,4 @@
-"""What a scenario says and SSP 1.0 has no words for: a file of its own in the package."""
+"""The settings of a scenario that SSP 1.0 cannot represent, as a separate file in the package."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -36,7 +36,7 @@ def settings(scenario: Scenario, variant: str) -> bytes:
 
 
 def dropped(scenario: Scenario, variant: str) -> int:
-    """How many expectations are left out, being about other variants or several at once."""
+    """The number of expectations left out because they concern other variants or several at once."""
     return len(scenario.declared.expect) - len(_expectations(scenario, variant))
 
 
@@ -82,18 +82,20 @@ def _single(names: Sequence[Sequence[str]], scenario: Scenario) -> bool:
 
 
 def chosen(scenario: Scenario, variant: str | None) -> str:
-    """The variant to export: the one that is named, or the only one."""
+    """The variant to export: the given one, or the only one."""
     names = list(scenario.variants)
     if variant is None and len(names) > 1:
-        raise BadInput(f"{scenario.file}: has variants {', '.join(names)}; a package holds one, name it")
+        raise BadInput(f"{scenario.file}: has variants {', '.join(names)}; choose one with --variant")
     if variant is not None and variant not in names:
         raise BadInput(f"{scenario.file}: there is no variant '{variant}'; {did_you_mean(variant, names)}")
     return variant or names[0]
 
 
 def motion(scenario: Scenario, variant: str) -> Declaration:
-    """A variant's declaration; BadInput where it has no FMUs."""
+    """The declaration of a variant; raises BadInput if it has no FMUs."""
     d = scenario.variants[variant]
     if d.contact is not None:
-        raise BadInput(f"{scenario.file}: is about a contact table, without FMUs; there is nothing to pack")
+        raise BadInput(
+            f"{scenario.file}: is a scenario of a contact table without FMUs; choose a scenario with FMUs"
+        )
     return d

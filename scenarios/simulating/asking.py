@@ -1,4 +1,4 @@
-"""Formulas of a scenario and the variants they are about."""
+"""Formulas of a scenario and the variants to which they apply."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,13 +21,13 @@ E = TypeVar("E", bound=Expression)
 
 @dataclass(frozen=True)
 class Question(Generic[E]):
-    """A formula, and the variants for each of which it is asked; none where it names all by itself."""
+    """A formula and the variants to which it is applied; none if it names its variants by itself."""
 
     formula: E
     variants: tuple[str, ...]
 
     def asked(self) -> tuple[str | None, ...]:
-        """One entry for each answer: its variant, or None."""
+        """One entry for each evaluation: its variant, or None."""
         return self.variants or (None,)
 
 
@@ -49,7 +49,7 @@ class Asked:
 
 
 def asked(scenario: Scenario) -> Asked:
-    """The formulas of a scenario, parsed; BadInput for the first that is wrong."""
+    """The parsed formulas of a scenario; raises BadInput for the first that is wrong."""
     d = scenario.declared
     expectations = [
         (e, _question(statement(e.that, f"key 'expect[{i}].that'"), e.variants, scenario))
@@ -81,7 +81,7 @@ def _question(formula: E, variants: tuple[str, ...], scenario: Scenario) -> Ques
 
 
 def wanted(questions: Asked, variant: str, scenario: Scenario) -> list[Expression]:
-    """The formulas with the names that they take from one variant, written without it."""
+    """The formulas with the names that they use from one variant, without the variant's prefix."""
     found = []
     for question in questions.formulas():
         names = []
@@ -97,7 +97,7 @@ def wanted(questions: Asked, variant: str, scenario: Scenario) -> list[Expressio
 
 
 def lookup(runs: Mapping[str, Run], variant: str | None) -> Lookup:
-    """Signals by name, those without a variant from the given one."""
+    """Signals by name; a name without a variant is taken from the given variant."""
 
     def find(name: str) -> Value:
         first, _, rest = name.partition(".")

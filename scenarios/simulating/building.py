@@ -1,4 +1,4 @@
-"""The FMUs of a scenario: files as they are, models and PythonFMU sources built on the fly, each once."""
+"""The FMUs of a scenario: files are used unchanged, models and PythonFMU sources are built once each."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from scenarios.simulating.declaration import Member
 
 
 class Builder:
-    """Builds FMUs into a folder; what was built for one variant or scenario serves the next."""
+    """Builds FMUs into a folder and reuses them for further variants and scenarios."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._made = folder, dict[str, Path]()
@@ -40,7 +40,9 @@ class Builder:
 
 def _built(model: Model, kind: str, out: Path) -> Path:
     if kind == "native":
-        from fmus.export.builders.native.build import build_native  # here because few ask for a compiler
+        from fmus.export.builders.native.build import (
+            build_native,
+        )  # imported here, because few scenarios need a compiler
 
         return build_native(model, out)
     from fmus.export.builders.pythonfmu import build_python

@@ -24,8 +24,8 @@ from scenarios.simulating.value import Value
 from scenarios.track.sensors import Sensor, measure, read_sensors
 
 Progress = Callable[[float, float], None]
-SENSORS = "sensors"  # the name before that of a sensor's reading
-CONTACT = "contact"  # the name before a column of a contact table
+SENSORS = "sensors"  # prefix of a sensor's reading
+CONTACT = "contact"  # prefix of a column of a contact table
 SHIFT = "y"  # the axis of a contact table
 UNITS = {
     "r": "m",
@@ -42,7 +42,7 @@ UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What came out of a variant: its recording, and all of its signals by name."""
+    """The output of a variant: its recording, and all of its signals by name."""
 
     recording: Recording
     signals: Mapping[str, Value]
@@ -50,7 +50,7 @@ class Run:
 
 
 class Case(Protocol):
-    """A variant that is ready to run; `names` are the signals that it gives."""
+    """A variant that is ready to run; `names` are the signals that it produces."""
 
     names: frozenset[str]
     duration: float | None
@@ -63,7 +63,7 @@ class Case(Protocol):
 def prepared(
     d: Declaration, file: Path, wanted: Iterable[Expression], builder: Builder, stack: ExitStack
 ) -> Case:
-    """A variant with all that it names checked; wanted: formulas over it, names without variant."""
+    """A variant in which all names have been checked; wanted: its formulas, with names without variant."""
     if d.contact is not None:
         return _TableCase(d.contact, file.parent, wanted)
     return _MotionCase(d, file, wanted, builder, stack)
@@ -96,7 +96,7 @@ class _TableCase:
 
 
 class _MotionCase:
-    """FMUs on one clock."""
+    """FMUs that are simulated together."""
 
     def __init__(
         self, d: Declaration, file: Path, wanted: Iterable[Expression], builder: Builder, stack: ExitStack
@@ -141,7 +141,7 @@ class _MotionCase:
         )
 
     def run(self, tell: Progress | None) -> Run:
-        """Run the FMUs, and have the sensors measure them."""
+        """Run the FMUs, and compute the readings of the sensors."""
         recording = self._master.run(self._length, tell)
         data = recording.data
         t = data[TIME].to_numpy()
@@ -170,7 +170,7 @@ def _reading(times: Array, reading: Array, unit: str | None) -> Value:
 
 
 def _check_known(wanted: Iterable[Expression], known: Iterable[str]) -> list[str]:
-    """All names in formulas; BadInput where one is not there."""
+    """All names in formulas; raises BadInput if one does not exist."""
     names, found = frozenset(known), list[str]()
     for formula in wanted:
         for name in formula.names:

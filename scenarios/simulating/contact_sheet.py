@@ -29,14 +29,14 @@ def write_contact_sheet(results: Sequence[Result], target: Path) -> Path:
 
 
 def _tile(result: Result, figure: Path | None) -> Image.Image:
-    """A figure made small, below the scenario's name and what became of it."""
+    """A figure at a small size, below the scenario's id and its verdict."""
     tile = Image.new("RGB", TILE, "white")
     pen, font = ImageDraw.Draw(tile), ImageFont.load_default(FONT)
     held = sum(finding.holds for finding in result.expectations)
     if result.interrupted_at is not None:
-        verdict = f"broken off at {result.interrupted_at:g} s"
+        verdict = f"interrupted at {result.interrupted_at:g} s"
     else:
-        verdict = f"{held} of {len(result.expectations)} came true"
+        verdict = f"{held} of {len(result.expectations)} expectations met"
     pen.text((MARGIN, MARGIN), result.id, INK, font)
     width = pen.textlength(verdict, font)
     pen.text((TILE[0] - MARGIN - width, MARGIN), verdict, NOISE if result.ok else LAW, font)

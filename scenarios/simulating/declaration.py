@@ -1,4 +1,4 @@
-"""What a scenario file may say: one class a table, one field a key."""
+"""The keys of a scenario file: one class for each table, one field for each key."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
@@ -19,10 +19,11 @@ Whole = Annotated[int, Field(strict=True, ge=0)]
 
 
 class Member(Table):
-    """An FMU: our model built on the fly, a PythonFMU source built on the fly, or a file.
+    """An FMU: a file, or built from one of our models or from a PythonFMU source.
 
-    options: values of the model's build options, also read from the key 'contact'; friction: a row of the
-    thesis's Table 4.1, on which `parameters` have the last word; step: s, where not the common one.
+    options: values of the model's build options, which may also stand in the key 'contact'.
+    friction: a row of the thesis's Table 4.1; values in `parameters` replace those of the row.
+    step: communication step in s, if it differs from the common step.
     """
 
     model: str | None = None
@@ -59,9 +60,9 @@ class Wire(Table):
 
 
 class Ride(Table):
-    """Who runs over the track at what speed [m/s]: FMUs with their geometry, and as which model they feel.
+    """The FMUs that run over the track, with their geometry, the model that they follow, and the speed.
 
-    V: a number, or {times, speeds}.
+    V: speed in m/s, a number or {times, speeds}.
     """
 
     V: Any
@@ -69,7 +70,7 @@ class Ride(Table):
 
 
 class Moment(Table):
-    """Parameters that change at a time [s]; friction: the condition that an FMU's contact gets."""
+    """Parameters that change at a time in s; friction: the new condition of an FMU's contact."""
 
     time: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
     set: dict[str, Number] = Field(default_factory=dict)
@@ -77,7 +78,7 @@ class Moment(Table):
 
 
 class Recorded(Table):
-    """What is written: names 'fmu.variable' (by default all outputs), how often [s], and how."""
+    """The recording: names 'fmu.variable' (by default all outputs), interval in s, and file format."""
 
     names: tuple[str, ...] | None = None
     step: Positive | None = None
@@ -85,7 +86,7 @@ class Recorded(Table):
 
 
 class Geometry(Table):
-    """A contact table over the lateral shift, in place of FMUs; see fmus.contact.contact_table."""
+    """A contact table over the lateral shift, instead of FMUs; see fmus.contact.contact_table."""
 
     wheel: str = "S1002"
     rail: str = "60E1"
@@ -100,7 +101,7 @@ class Geometry(Table):
 
 
 class Expectation(Table):
-    """What must come true, and why; for some variants or, where it names none, for each."""
+    """A statement that must be true, and the reason; for some variants, or for each if none is named."""
 
     that: str
     because: str
@@ -108,7 +109,7 @@ class Expectation(Table):
 
 
 class Panel(Table):
-    """Curves on common axes: expressions over x, in the units that the axes show."""
+    """Curves on common axes: expressions over x, shown in the units of the axes."""
 
     draw: Annotated[tuple[str, ...], Field(min_length=1)]
     names: tuple[str, ...] = ()
@@ -139,7 +140,7 @@ class Picture(Table):
 
 
 class Declaration(Table):
-    """The keys of a scenario file; `variants` holds keys of the same kind that take the place of these."""
+    """The keys of a scenario file; keys in `variants` replace these keys for one variant."""
 
     id: FileName
     question: str
@@ -172,16 +173,16 @@ MOTION = ("fmus", "connections", "track", "ride", "inputs", "events", "sensors",
 
 
 def _contradictions(d: Declaration) -> Iterator[str]:
-    """What each key for itself does not show."""
+    """Check conditions that involve several keys."""
     given = [key for key in MOTION if key in d.model_fields_set]
     if d.contact and given:
-        yield f"[contact] is a table without motion, and key '{given[0]}' belongs to FMUs; keep one of them"
+        yield f"[contact] is a table without motion, but key '{given[0]}' needs FMUs; remove one of the two"
     if not d.contact:
         for key in ("fmus", "duration", "step"):
             if key not in d.model_fields_set:
                 yield f"key '{key}' is missing"
     if (d.track is None) != (d.ride is None):
-        yield "[track] and [ride], who runs over it, go together"
+        yield "[track] and [ride] need each other; give both or neither"
     names = [p.name for p in d.figure]
     for name in sorted({n for n in names if names.count(n) > 1}):
         yield f"[[figure]] name '{name}' is used twice"

@@ -33,15 +33,15 @@ from scenarios.simulating.expression import Expression
 from scenarios.simulating.value import Value
 
 COLOURS = (AFTER, BEFORE, LAW, "#4f8a5b", NOISE, "#7d5ba6", CLOUD, INK)
-PANEL = 1.75  # in, height of a panel
-HEAD = 0.75  # in, for title, legend and the axis below
+PANEL = 1.75  # inches, height of a panel
+HEAD = 0.75  # inches, for title, legend and the axis below
 COLUMNS = 4  # of a legend
 LINE = 78  # characters in a line of a title
 
 
 @dataclass(frozen=True)
 class Curve:
-    """What is drawn, in shown units; `even` where x is the axis of the run, which increases."""
+    """A curve in the units shown; `even` is true if x is the axis of the run, which increases."""
 
     x: Array
     y: Array
@@ -50,7 +50,7 @@ class Curve:
 
 
 def write_figure(picture: Picture, place: int, asked: Asked, runs: Mapping[str, Run], folder: Path) -> Path:
-    """Draw a figure, number `place` of its scenario, and write it as PNG; its path."""
+    """Draw figure number `place` of a scenario and write it as PNG; returns its path."""
     names = [f"{j}" for j in range(len(picture.panels))]
     heights = [panel.height for panel in picture.panels]
     figure, axes = sheet(HEAD + PANEL * sum(heights), [[n] for n in names], height_ratios=heights)
@@ -98,10 +98,12 @@ def _curve(
     signals = lookup(runs, variant)
     value = question.formula.value(signals)
     if value.x is None:
-        raise BadInput(f"{question.formula.where}: '{question.formula.text}' is one number; draw a signal")
+        raise BadInput(
+            f"{question.formula.where}: '{question.formula.text}' is a single number; give a signal to draw"
+        )
     x = Value(value.x, value.x, _axis(runs)[1]) if over is None else over.formula.value(signals)
     if np.shape(x.y) != np.shape(value.y):
-        raise BadInput(f"{where}.x': has other times than '{question.formula.text}'; use on(a, b)")
+        raise BadInput(f"{where}.x': has different times from '{question.formula.text}'; use on(a, b)")
     shown = _shown(x, panel.x_unit, f"{where}.x_unit'"), _shown(value, panel.unit, f"{where}.unit'")
     if over is None and panel.window is not None:
         kept = (shown[0] >= panel.window[0]) & (shown[0] <= panel.window[1])
@@ -124,7 +126,7 @@ def _shown(value: Value, unit: str | None, where: str) -> Array:
 
 
 def _axis(runs: Mapping[str, Run]) -> tuple[str, str]:
-    """What the axis of the runs is, and its unit."""
+    """The label of the runs' axis, with its unit."""
     recording = next(iter(runs.values())).recording
     return ("lateral shift", "m") if recording.data.columns[0] == "y" else ("time", "s")
 
@@ -136,14 +138,14 @@ def _x_label(panel: Panel, runs: Mapping[str, Run]) -> str:
 
 
 def _join(axes: list[Axes]) -> None:
-    """The same axis label once, below."""
+    """If all panels have the same axis label, show it only once, below."""
     for upper, lower in pairwise(axes):
         if upper.get_xlabel() == lower.get_xlabel() and upper.get_xlim() == lower.get_xlim():
             upper.set_xlabel("")
 
 
 def _legends(figure: Figure, axes: list[Axes]) -> None:
-    """One legend where all panels show the same, else one in each panel."""
+    """One legend if all panels show the same curves, else one in each panel."""
     labels = [tuple(ax.get_legend_handles_labels()[1]) for ax in axes]
     if not any(labels):
         return

@@ -1,4 +1,4 @@
-"""Expressions over signals as text, as 'max(abs(variant.fmu.output)) < 2e-3'; no other code runs."""
+"""Expressions over signals, such as 'max(abs(variant.fmu.output)) < 2e-3'; no other code can be run."""
 
 import ast
 import operator
@@ -44,9 +44,10 @@ COMPARISONS: Mapping[type[ast.AST], Callable[[float, float], bool]] = MappingPro
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a statement holds, and the numbers on the sides of its comparisons, in order.
+    """Whether a statement is true, and the numbers on the sides of its comparisons, in order.
 
-    problem: which of them is not finite, and why; then neither the statement nor its negation holds.
+    problem: a sentence if one of these numbers is not finite; the statement then counts as not true, and so
+    does its negation.
     """
 
     holds: bool
@@ -64,7 +65,7 @@ class Expression:
     names: tuple[str, ...]
 
     def value(self, lookup: Lookup) -> Value:
-        """Its value with the signals that `lookup` gives by name."""
+        """The value of the formula with the signals that `lookup` returns by name."""
         return _value(self.tree, lookup, self.where)
 
 
@@ -73,7 +74,7 @@ class Statement(Expression):
     """A comparison of numbers, or several joined by and, or, not."""
 
     def verdict(self, lookup: Lookup) -> Verdict:
-        """Whether it holds: never where a number in it is not finite."""
+        """Whether the statement is true; it is not if one of its numbers is not finite."""
         sides: list[Side] = []
         try:
             holds = _holds(self.tree, lookup, self.where, sides)
@@ -88,13 +89,13 @@ class Statement(Expression):
 
 
 def expression(text: str, where: str) -> Expression:
-    """A formula from text; `where` begins the message of the BadInput."""
+    """A formula from text; the message of a BadInput begins with `where`."""
     tree = _parsed(text, where)
     return Expression(text, where, tree, tuple(dict.fromkeys(_names(tree, where))))
 
 
 def statement(text: str, where: str) -> Statement:
-    """A comparison from text; `where` begins the message of the BadInput."""
+    """A comparison from text; the message of a BadInput begins with `where`."""
     tree = _parsed(text, where)
     sides = list(_sides(tree, where))
     names = [name for side in sides for name in _names(side, where)]
@@ -109,7 +110,7 @@ def _parsed(text: str, where: str) -> ast.expr:
         return ast.parse(" ".join(text.split()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise BadInput(
-            f"{where}: '{text[:80]}' is no formula, such as 'max(abs(fmu.output)) < 3e3'"
+            f"{where}: '{text[:80]}' is not a formula; write one such as 'max(abs(fmu.output)) < 3e3'"
         ) from None
 
 
@@ -128,7 +129,7 @@ def _sides(node: ast.expr, where: str) -> Iterator[ast.expr]:
 
 
 def _names(node: ast.expr, where: str) -> Iterator[str]:
-    """Signals in a formula; BadInput for anything that is not a formula's."""
+    """The signals in a formula; raises BadInput for anything that a formula may not contain."""
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return
@@ -158,7 +159,7 @@ def _dotted(node: ast.expr, where: str) -> str:
             return name
         case ast.Attribute(value=inner, attr=name):
             return f"{_dotted(inner, where)}.{name}"
-    raise BadInput(f"{where}: '{ast.unparse(node)}' is no name of a signal, as 'fmu.output'")
+    raise BadInput(f"{where}: '{ast.unparse(node)}' is not the name of a signal; write it as 'fmu.output'")
 
 
 def _check_call(name: str, count: int, where: str) -> None:
@@ -167,7 +168,7 @@ def _check_call(name: str, count: int, where: str) -> None:
     counts = FUNCTIONS[name][1]
     if count not in counts:
         wanted = " or ".join(map(str, counts))
-        raise BadInput(f"{where}: '{name}' takes {wanted} arguments, not {count}; give these")
+        raise BadInput(f"{where}: '{name}' takes {wanted} arguments, not {count}; correct their number")
 
 
 def _is_signal(node: ast.expr) -> bool:
@@ -186,7 +187,7 @@ def _is_signal(node: ast.expr) -> bool:
 
 
 def _value(node: ast.expr, lookup: Lookup, where: str) -> Value:
-    """The value of a formula that `_names` has gone through."""
+    """The value of a formula that `_names` has checked."""
     match node:
         case ast.Constant(value=int() | float() as number):
             return Value(float(number))
@@ -214,7 +215,7 @@ def _value(node: ast.expr, lookup: Lookup, where: str) -> Value:
 
 
 def _not_finite(names: Iterable[str], lookup: Lookup) -> Iterator[str]:
-    """A sentence on each of these signals that is not finite, with the first place where it is not."""
+    """A sentence on each of these signals that is not finite, with the first such place."""
     for name in dict.fromkeys(names):
         signal = lookup(name)
         bad = np.flatnonzero(~np.isfinite(signal.y))
@@ -224,7 +225,7 @@ def _not_finite(names: Iterable[str], lookup: Lookup) -> Iterator[str]:
 
 
 def _holds(node: ast.expr, lookup: Lookup, where: str, sides: list[Side]) -> bool:
-    """Whether a statement of finite numbers holds; all sides of its comparisons are worked out."""
+    """Whether a statement of finite numbers is true; all sides of its comparisons are evaluated."""
     match node:
         case ast.BoolOp(op=op, values=parts):
             found = [_holds(part, lookup, where, sides) for part in parts]

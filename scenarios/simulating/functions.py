@@ -1,4 +1,4 @@
-"""What an expression can ask of a signal: extremes, levels, growth, frequency, times of events."""
+"""Functions of signals in expressions: extremes, levels, growth, frequency, times of events."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -24,7 +24,7 @@ AXIS = "s"  # unit of the axis of a run
 
 
 def _measure(function: Callable[[Array], Any]) -> Function:
-    """A number of all samples, in their unit."""
+    """A function of all samples that gives a number in their unit."""
 
     def measure(a: Value) -> Value:
         return Value(float(function(a.finite_signal()[1])), unit=a.unit)
@@ -33,7 +33,7 @@ def _measure(function: Callable[[Array], Any]) -> Function:
 
 
 def _of_one_sample(function: Callable[[Array], Any]) -> Function:
-    """A number of one of the samples, in their unit; the others do not matter."""
+    """A function that picks one of the samples; the others may be anything."""
 
     def measure(a: Value) -> Value:
         return Value(float(function(a.signal()[1])), unit=a.unit)
@@ -42,7 +42,7 @@ def _of_one_sample(function: Callable[[Array], Any]) -> Function:
 
 
 def _each(function: Callable[..., Any], keeps_unit: bool = False) -> Function:
-    """Sample by sample."""
+    """A function applied sample by sample."""
 
     def each(a: Value) -> Value:
         return combined(function, [a], a.unit if keeps_unit else "1")
@@ -51,7 +51,7 @@ def _each(function: Callable[..., Any], keeps_unit: bool = False) -> Function:
 
 
 def _extreme(of_one: Callable[[Array], Any], of_two: Callable[..., Any]) -> Function:
-    """Of a signal's samples, or of two values sample by sample."""
+    """A function of a signal's samples, or of two values sample by sample."""
 
     def extreme(a: Value, b: Value | None = None) -> Value:
         return _measure(of_one)(a) if b is None else combined(of_two, [a, b], alike([a, b]))
@@ -60,7 +60,7 @@ def _extreme(of_one: Callable[[Array], Any], of_two: Callable[..., Any]) -> Func
 
 
 def _cut(inside: Callable[[Array, float, float], Any]) -> Function:
-    """The part of a signal about one or two places of its axis."""
+    """The part of a signal between two places of its axis, or on one side of one place."""
 
     def cut(a: Value, first: Value, second: Value | None = None) -> Value:
         x, y = a.signal()
@@ -74,7 +74,7 @@ def _cut(inside: Callable[[Array, float, float], Any]) -> Function:
 
 
 def _at(a: Value, place: Value) -> Value:
-    """Linear between the samples."""
+    """The value at a place, linear between the samples."""
     x, y = a.signal()
     wanted = place.number()
     if not x[0] <= wanted <= x[-1]:
@@ -83,7 +83,7 @@ def _at(a: Value, place: Value) -> Value:
 
 
 def _shifted(a: Value, delay: Value) -> Value:
-    """The signal later by a delay; before its start it rests."""
+    """The signal shifted by a delay; before its start it keeps its first value."""
     x, y = a.signal()
     if not np.isfinite(delay.number()):
         raise BadInput(f"has a delay of {delay.number():g}, which is not finite")
@@ -125,7 +125,7 @@ def _integral(a: Value) -> Value:
 
 
 def _crossing(a: Value, level: Value) -> Value:
-    """Where the signal first passes through a level, linear between the samples; nan where it does not."""
+    """The place where the signal first crosses a level, linear between samples; nan if it never does."""
     places = _crossings(*a.finite_signal(), level.number())
     return Value(float(places[0]) if places.size else float("nan"))
 
@@ -138,7 +138,7 @@ def _crossings(x: Array, y: Array, level: float) -> Array:
 
 
 def _settled(a: Value, target: Value, band: Value) -> Value:
-    """From where on the signal stays within a band about a target; nan where it ends outside."""
+    """The place from which the signal stays within a band about a target; nan if it ends outside."""
     x, y = a.finite_signal()
     width = band.number() if np.isfinite(band.number()) else np.nan
     outside = np.flatnonzero(~(np.abs(y - target.number()) <= width))
@@ -169,7 +169,7 @@ def _growth(a: Value) -> Value:
 
 
 def _frequency(a: Value) -> Value:
-    """Mean frequency, Hz: half the passages through zero between the first and the last one."""
+    """Mean frequency, Hz: half the zero crossings per second between the first and the last crossing."""
     x, y = a.finite_signal()
     if np.isnan(y).any():
         return Value(float("nan"), unit="Hz")

@@ -1,4 +1,4 @@
-"""Inputs of a scenario from outside: numbers, expressions, tables, columns of files, and the track."""
+"""External inputs of a scenario: numbers, expressions, tables, columns of files, and the track."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -41,8 +41,10 @@ class Speeds(Table):
 
 
 class Column(Table):
-    """A column of a data file over its time column; unit: of the column, by default that which the file
-    states, else that of the input; model_unit: of the input, where its FMU states none.
+    """A column of a data file over its time column.
+
+    unit: unit of the column, by default the unit stated in the file, else the unit of the input.
+    model_unit: unit of the input, if its FMU states none.
     """
 
     data: str
@@ -54,7 +56,7 @@ class Column(Table):
 
 
 def sources(d: Declaration, fmus: Descriptions, folder: Path) -> dict[str, Source]:
-    """What each input gets, by 'fmu.variable'; what stands in [inputs] comes before the track."""
+    """The source of each input by 'fmu.variable'; an entry in [inputs] replaces the track."""
     found = _from_track(d, fmus, folder)
     for name, given in d.inputs.items():
         found[name] = _source(given, name, fmus, folder)
@@ -92,7 +94,7 @@ def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) ->
     check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row)
     fmu, _, variable = name.partition(".")
     described = fmus[fmu].variables.get(variable) if fmu in fmus else None
-    if described is None:  # the master says so, with the names there are
+    if described is None:  # the master reports it with the known names
         return times, values
     unit = model_unit(described.unit, c.model_unit, f"'{name}'", f"key '{key}':")
     if c.unit is not None:
@@ -104,7 +106,7 @@ def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) ->
 
 
 def _from_track(d: Declaration, fmus: Descriptions, folder: Path) -> dict[str, Source]:
-    """The inputs of all that ride over the track, as functions of arrays of times."""
+    """The inputs of all FMUs that run over the track, as functions of arrays of times."""
     if d.track is None or d.ride is None:
         return {}
     track, speed = read_track(d.track, folder), _speed(d.ride)

@@ -1,4 +1,4 @@
-"""A scenario and its variants, read from its file; whatever is wrong is a BadInput of one line."""
+"""Read a scenario and its variants from a file; any error is a BadInput of one line."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ RESERVED = ("sensors", "contact", "pi", "e")
 
 @dataclass(frozen=True)
 class Scenario:
-    """What is asked, and the variants to run, by name; paths in it are relative to its file's folder."""
+    """A scenario with its variants by name; its paths are relative to the folder of its file."""
 
     file: Path
     declared: Declaration
@@ -24,12 +24,12 @@ class Scenario:
 
     @property
     def id(self) -> str:
-        """Its name."""
+        """The name of the scenario."""
         return self.declared.id
 
 
 def load_scenario(path: str | Path) -> Scenario:
-    """The scenario in a file; BadInput names the file, the key and the way out."""
+    """Read the scenario in a file; a BadInput names the file, the key and the way out."""
     file = Path(path)
     with of_file(file):
         table = read_toml(file, "a scenario")
@@ -40,7 +40,7 @@ def load_scenario(path: str | Path) -> Scenario:
 
 
 def _variants(table: Mapping[str, Any], declared: Declaration) -> dict[str, Declaration]:
-    """The declaration of each variant, with the base where it says nothing."""
+    """The declaration of each variant; keys that it does not give are those of the base."""
     if not declared.variants:
         return {SINGLE: declared}
     found: dict[str, Declaration] = {}
@@ -65,12 +65,12 @@ def _name(changes: Mapping[str, Any], key: str, found: Mapping[str, Any], declar
         raise BadInput(f"key '{key}.name' = '{name}' is in use already; take another one")
     for kept in KEPT:
         if kept in changes:
-            raise BadInput(f"key '{key}.{kept}' cannot differ between variants; leave it to the scenario")
+            raise BadInput(f"key '{key}.{kept}' cannot differ between variants; move it to the scenario")
     return name
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables merged key by key; anything else takes the place of what was there."""
+    """Merge tables key by key; values that are not tables are replaced."""
     made = dict(base)
     for key, value in changes.items():
         old = made.get(key)
@@ -80,7 +80,7 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _check_variants_named(scenario: Scenario) -> None:
-    """Variants named by expectations and panels must be there."""
+    """Raise BadInput if an expectation or a panel names a variant that does not exist."""
     d = scenario.declared
     named = [(f"expect[{i}]", e.variants) for i, e in enumerate(d.expect)]
     named += [

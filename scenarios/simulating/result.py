@@ -1,4 +1,4 @@
-"""What a scenario came to: its expectations with their verdicts, its recordings and figures."""
+"""The result of a scenario: its expectations with their verdicts, its recordings and figures."""
 
 import json
 from collections.abc import Mapping
@@ -9,10 +9,10 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Finding:
-    """An expectation's answer; variant: None where it is about several at once.
+    """The verdict on an expectation; variant: None if it concerns several variants at once.
 
-    values: the numbers on the sides of its comparisons, in order, None where one is not finite.
-    problem: why it could not be judged, which counts as not come true.
+    values: the numbers on the sides of its comparisons, in order, None for one that is not finite.
+    problem: the reason why it could not be evaluated; it then counts as not met.
     """
 
     that: str
@@ -24,14 +24,14 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """For people: what was expected, and the numbers found."""
+        """The expectation and the numbers found, as a line to print."""
         where = f" [{self.variant}]" if self.variant else ""
         found = ", ".join("nothing" if v is None else f"{v:.5g}" for v in self.values)
         return f"{' '.join(self.that.split())}{where} ({self.problem or found})"
 
 
 def finite(values: tuple[float, ...]) -> tuple[float | None, ...]:
-    """Numbers for JSON, which knows no nan."""
+    """Numbers for JSON, which cannot represent nan."""
     return tuple(v if isfinite(v) else None for v in values)
 
 
@@ -53,7 +53,7 @@ class RunSummary:
 
 @dataclass(frozen=True)
 class Result:
-    """The outcome of a scenario; `folder` holds its files."""
+    """The outcome of a scenario; its files are in `folder`."""
 
     id: str
     question: str
@@ -66,12 +66,12 @@ class Result:
 
     @property
     def ok(self) -> bool:
-        """Whether it ran to its end and all that was expected came true."""
+        """Whether the scenario ran to its end and all expectations are met."""
         return self.interrupted_at is None and all(finding.holds for finding in self.expectations)
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The expectations that did not come true."""
+        """The expectations that are not met."""
         return tuple(finding for finding in self.expectations if not finding.holds)
 
     def write(self, file: Path) -> None:

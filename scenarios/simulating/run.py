@@ -1,4 +1,4 @@
-"""Run scenarios: their variants, what must come true, their figures and recordings."""
+"""Run scenarios: simulate the variants, check the expectations, write figures and recordings."""
 
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -41,11 +41,12 @@ Done = Callable[[Result], None]
 def run(
     scenario: str | Path, out: str | Path, tell: Tell = lambda _: None, builder: Builder | None = None
 ) -> Result:
-    """What `railfmi run` does with one scenario: result.json, recordings and figures in `out`.
+    """Run one scenario as `railfmi run` does; writes result.json, recordings and figures to `out`.
 
-    tell: gets a line on what is being done, with the simulated time and its speed, now and then.
-    builder: of the FMUs, where scenarios share it. Ctrl-C keeps what was recorded; the result says so, and
-    judges nothing. Raises BadInput for a wrong scenario, FmuError where an FMU refuses a call.
+    tell: called from time to time with a line on the progress, the simulated time and the speed.
+    builder: builder of the FMUs, if several scenarios share it.
+    After Ctrl-C, the recordings are kept, the result is marked as interrupted, and no expectation is checked.
+    Raises BadInput if the scenario is wrong, FmuError if an FMU refuses a call.
     """
     begun = perf_counter()
     read = load_scenario(scenario)
@@ -58,7 +59,7 @@ def run(
             cases = _all_prepared(read, questions, builder, stack, tell)
             runs, summaries = _run_all(cases, read, folder, tell)
             result = _judged(read, questions, runs, summaries, folder, begun)
-            result.write(folder / "result.json")  # now, as a figure may ask for what cannot be drawn
+            result.write(folder / "result.json")  # written before the figures, which may fail
             if result.interrupted_at is not None:
                 return result
             tell(f"{read.id}: drawing")
@@ -72,10 +73,11 @@ def run(
 def run_all(
     files: Sequence[str | Path], out: str | Path, tell: Tell = lambda _: None, done: Done = lambda _: None
 ) -> list[Result]:
-    """Run scenarios one after the other, one alone into `out`, several each into a folder of its id.
+    """Run scenarios one after the other; each of several gets a folder named by its id in `out`.
 
-    Several get a contact sheet of their figures, `out`/contact-sheet.png. done: gets each result as soon
-    as it is there. All files are read before the first one runs; after Ctrl-C no further one does.
+    Several scenarios also get a contact sheet of their figures, `out`/contact-sheet.png.
+    done: called with each result as soon as it is finished.
+    All files are read before the first scenario is run. After Ctrl-C, no further scenario is run.
     """
     if not files:
         raise BadInput("no scenario given; name at least one file")
@@ -122,7 +124,7 @@ def _all_prepared(
 def _run_all(
     cases: Mapping[str, Case], scenario: Scenario, folder: Path, tell: Tell
 ) -> tuple[dict[str, Run], dict[str, RunSummary]]:
-    """Run the variants in turn and write their recordings, until all are done or one is broken off."""
+    """Run the variants in turn and write their recordings, until all are done or one is interrupted."""
     runs: dict[str, Run] = {}
     summaries: dict[str, RunSummary] = {}
     for name, case in cases.items():
@@ -148,7 +150,7 @@ def _progress(case: Case, name: str, scenario: Scenario, tell: Tell) -> Progress
 
 
 def _written(run: Run, name: str, case: Case, scenario: Scenario, folder: Path, took: float) -> RunSummary:
-    """Write a variant's recording, and what its sensors measured."""
+    """Write a variant's recording and the readings of its sensors."""
     ending = scenario.variants[name].record.format
     target = folder / f"{name}.{ending}"
     recording, measured = run.recording, None
@@ -169,7 +171,7 @@ def _judged(
     folder: Path,
     begun: float,
 ) -> Result:
-    """The result without figures; a run that was broken off is not judged."""
+    """The result without figures; the expectations of an interrupted run are not checked."""
     stopped = next((s.interrupted_at for s in summaries.values() if s.interrupted_at is not None), None)
     findings = tuple(_findings(questions, runs)) if stopped is None else ()
     d = scenario.declared
@@ -178,7 +180,7 @@ def _judged(
 
 
 def _findings(questions: Asked, runs: Mapping[str, Run]) -> Iterator[Finding]:
-    """The answer to each expectation; what the signals do not allow to be worked out has not come true."""
+    """The verdict on each expectation; one that cannot be evaluated from the signals is not met."""
     for expectation, question in questions.expectations:
         for variant in question.asked():
             which = variant if len(runs) > 1 else None

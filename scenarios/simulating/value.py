@@ -1,4 +1,4 @@
-"""What an expression works with: numbers and signals, with their units as far as they are known."""
+"""The values in expressions: numbers and signals, with their units as far as they are known."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,24 +23,24 @@ class Value:
 
     @property
     def is_signal(self) -> bool:
-        """Whether it has an axis."""
+        """Whether the value is a signal, which has an axis."""
         return self.x is not None
 
     def signal(self) -> tuple[Array, Array]:
-        """x and y of a signal; BadInput for a number."""
+        """x and y of a signal; raises BadInput for a number."""
         if self.x is None:
             raise BadInput("takes a signal, not a number")
         if not self.x.size:
-            raise BadInput("gets a signal without samples; widen its window")
+            raise BadInput("is applied to a signal without samples; widen its window")
         return self.x, self.y
 
     def finite_signal(self) -> tuple[Array, Array]:
-        """x and y of a signal for a question that all samples answer: all nan where one is not finite."""
+        """x and y of a signal for a function of all samples: all nan if one is not finite."""
         x, y = self.signal()
         return x, y if np.isfinite(y).all() else np.full(x.shape, np.nan)
 
     def number(self) -> float:
-        """A number; BadInput for a signal."""
+        """The number; raises BadInput for a signal."""
         if self.x is not None:
             raise BadInput(
                 f"needs a number, not a signal of {self.x.size} samples; take its max, rms, last ..."
@@ -57,7 +57,9 @@ def combined(function: Callable[..., Any], values: list[Value], unit: str | None
     axes = [v.x for v in values if v.x is not None]
     for x in axes[1:]:
         if x is not axes[0] and not np.array_equal(x, axes[0]):
-            raise BadInput("joins signals with different times; bring one onto the other's with on(a, b)")
+            raise BadInput(
+                "combines signals with different times; convert one to the times of the other with on(a, b)"
+            )
     with np.errstate(all="ignore"):
         found = function(*(v.y for v in values))
         for v in values:  # tanh(inf) or nan ** 0 are numbers, but say nothing about the signal
@@ -66,7 +68,7 @@ def combined(function: Callable[..., Any], values: list[Value], unit: str | None
 
 
 def alike(values: list[Value]) -> str | None:
-    """The unit of a sum: that of its terms, unknown where they differ, for numbers have units too."""
+    """The unit of a sum: the unit of its terms, or unknown if their units differ."""
     units = {v.unit for v in values if v.unit is not None}
     return units.pop() if len(units) == 1 else None
 

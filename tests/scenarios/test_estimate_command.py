@@ -177,7 +177,7 @@ def test_friction_and_rolling_radius_of_the_rig(rig):
     assert result.estimated["mu0"]["std_error"] < 0.01
     assert result.nis["mean"] == pytest.approx(2.0, abs=0.15)
     assert result.alarms == []
-    assert "carried, not estimated: theta_w, theta_r" in result.notes
+    assert "states that are simulated, not estimated: theta_w, theta_r" in result.notes
     assert set(result.estimated) == {"omega_w", "omega_r", "mu0", "r_w"}
 
 
@@ -217,7 +217,7 @@ def test_a_parameter_that_the_data_do_not_inform_is_reported_as_such(vdp, tmp_pa
     result = estimate(write_vdp(tmp_path, vdp, text=text, n=200))
     assert result.estimated["fault"]["informed_by_data"] is False
     assert result.estimated["mu"]["informed_by_data"] is True
-    assert any("the data tell nothing of 'fault'" in note for note in result.notes)
+    assert any("the record contains no information on 'fault'" in note for note in result.notes)
 
 
 def test_smoothing_and_the_other_filters(vdp, tmp_path):

@@ -55,9 +55,7 @@ def test_a_number_that_its_own_tests_reject_says_so_everywhere(vdp, tmp_path, ca
     file.write_text(file.read_text() + options)
     assert railfmi("estimate", file, "--out", tmp_path / "out") == 1
     said = capsys.readouterr().out
-    sentence = (
-        r"not consistent with the record: NIS [\d.]+, expected [\d.]+ to [\d.]+.*; so the error is too small"
-    )
+    sentence = r"not consistent with the record: NIS [\d.]+, expected [\d.]+ to [\d.]+.*; so the standard error is too small"
     assert re.search(sentence, said)
     written = json.loads((tmp_path / "out" / "result.json").read_text())
     assert written["consistent"] is False
@@ -101,7 +99,7 @@ def test_a_value_that_the_record_pushed_to_its_bound_says_which(vdp, tmp_path, c
     written = json.loads((tmp_path / "out" / "result.json").read_text())
     assert written["estimated"]["mu"]["at_bound"] == "lower"
     (note,) = (n for n in written["notes"] if n.startswith("'mu'"))
-    assert note.startswith("'mu' is at its lower bound 1.2: the record pushes it there from 1.5,")
+    assert note.startswith("'mu' was moved from its start 1.5 to its lower bound 1.2 by the record,")
     assert not any(BELIEVED in n for n in written["notes"])
 
 
@@ -109,7 +107,7 @@ def test_what_no_data_inform_is_still_at_its_start(vdp, tmp_path):
     text = "parameters.fault = {start = 0.2, std = 0.01, bounds = [0.0, 0.5]}\n"
     result = estimate(write_vdp(tmp_path, vdp, text=text, n=200))
     assert result.estimated["fault"]["value"] == pytest.approx(0.2, abs=1e-3)
-    assert f"the data tell nothing of 'fault': {BELIEVED}" in result.notes
+    assert f"the record contains no information on 'fault': {BELIEVED}" in result.notes
     assert "at_bound" not in result.estimated["fault"]
 
 
@@ -122,7 +120,8 @@ def test_what_moved_without_being_informed_is_said_to_have_moved(vdp, tmp_path):
     assert abs(mu["value"] - 1.5) > 0.1
     (note,) = (n for n in result.notes if "'mu'" in n)
     assert re.match(
-        r"the data tell little of 'mu': \d+% of its first deviation is left, yet its value moved", note
+        r"the record contains little information on 'mu': \d+% of its start deviation is left, yet its value moved",
+        note,
     )
     assert BELIEVED not in note
 

@@ -267,7 +267,7 @@ REFUSED = [
     ("max(a.x, a.v) < 1", "is a signal"),
     ("maximum(a.x) < 1", "function 'maximum' is not known; did you mean 'max'?"),
     ("at(a.x) < 1", "'at' takes 2 arguments, not 1"),
-    ("max(a.x < 1", "is no formula"),
+    ("max(a.x < 1", "is not a formula"),
     ("1 < 2 == 2", "compares nothing"),
 ]
 

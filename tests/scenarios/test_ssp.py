@@ -218,7 +218,7 @@ def test_shipped_scenarios_come_back(file, tmp_path):
 
     scenario = load_scenario(file)
     if scenario.declared.contact or any(d.contact for d in scenario.variants.values()):
-        pytest.skip("is about a contact table, without FMUs")
+        pytest.skip("is a scenario of a contact table without FMUs")
     name = next(iter(scenario.variants))
     run(file, tmp_path / "one")
     package = export_ssp(file, tmp_path, "python", variant=name)
