@@ -13,21 +13,21 @@ from PIL import Image
 
 from estimator.record import Array, Record
 
-# apart in grey and for the colour-blind by their lightness
+# colours differ in lightness, for printing in grey and for the colour-blind
 INK, BEFORE, AFTER, LAW = "#1d2733", "#d98f3e", "#123f6b", "#a3122a"
 NOISE, CLOUD, SHADE = "#77828e", "#9fb6ca", "#eaeff4"
 
-WIDTH = 6.5  # in, with 9 pt text near the size of the page's own
+WIDTH = 6.5  # inches; 9 pt text then has about the size of the page's text
 DPI = 170
-COLOURS = 96  # of a PNG: enough for smooth lines, and a third of the size
-POINTS = 700  # of an envelope: about what the width of a figure can show
+COLOURS = 96  # dots per inch of a PNG: enough for smooth lines in a small file
+POINTS = 700  # points of an envelope: about what the width of a figure can show
 ROWS = 4  # panels above one another before a second sheet is begun
 Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure with its file name (without ending) and what is written below it."""
+    """A figure with its file name (without ending) and its caption."""
 
     name: str
     figure: Figure
@@ -75,7 +75,7 @@ def name_axes(ax: Axes, x: str = "", y: str = "", title: str = "") -> None:
 
 
 def legend(figure: Figure, ax: Axes) -> None:
-    """One legend for a figure, above its panels, of what one of them shows."""
+    """One legend above all panels of a figure, with the entries of one panel."""
     handles, labels = ax.get_legend_handles_labels()
     made = figure.legend(
         handles, labels, loc="outside upper left", ncols=len(labels), frameon=False, fontsize=8.5,
@@ -86,7 +86,7 @@ def legend(figure: Figure, ax: Axes) -> None:
 
 
 def envelope(t: Array, x: Array, points: int = POINTS) -> tuple[Array, Array]:
-    """Least and greatest value in each of `points` pieces of a channel (N,), in turn; short ones as is."""
+    """Least and greatest value in each of `points` pieces of a channel (N,); short channels unchanged."""
     if len(x) <= 2 * points:
         return t, x
     begin = np.linspace(0, len(x), points, endpoint=False).astype(int)
@@ -95,7 +95,7 @@ def envelope(t: Array, x: Array, points: int = POINTS) -> tuple[Array, Array]:
 
 
 def times(record: Record) -> list[Array]:
-    """Time of each run (N,) s on one axis: a file that starts anew is set behind the one before."""
+    """Time of each run (N,) s on one axis: each file is placed after the one before."""
     found: list[Array] = []
     for run in record.runs:
         late = found[-1][-1] - run.t[0] if found else -np.inf
@@ -104,7 +104,7 @@ def times(record: Record) -> list[Array]:
 
 
 def shade_test(ax: Axes, record: Record) -> None:
-    """Mark the test part."""
+    """Shade the test part."""
     for t, run in zip(times(record), record.runs, strict=True):
         if run.test.any():
             held_out = t[run.test]

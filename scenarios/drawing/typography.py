@@ -1,4 +1,4 @@
-"""Numbers, units and formulas as a reader expects them on a page."""
+"""Numbers, units and formulas in the form in which a page prints them."""
 
 import math
 import re
@@ -9,11 +9,11 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _FUNCTIONS = {"sin", "cos", "tan", "tanh", "atan", "exp", "hypot", "sign", "max", "min", "abs", "sqrt"}
 _TOKEN = re.compile(r"(?P<name>[^\W\d]\w*)|\^(?P<power>-?\d+)|(?P<rest>.)", re.DOTALL)
 NOTHING = "–"
-HELD = "\u00a0"  # a space at which no line is broken
+HELD = "\u00a0"  # a space without a line break
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits; 0.0447, 12 300, 4.1 × 10⁸."""
+    """A number with the given number of significant digits; 0.0447, 12 300, 4.1 × 10⁸."""
     if not math.isfinite(value):
         return NOTHING
     rounded = float(f"{value:.{digits}g}")
@@ -30,7 +30,7 @@ def short(value: float, digits: int = 4) -> str:
 
 
 def with_error(value: float, error: float) -> str:
-    """A value to the digits that its standard error leaves: 0.2998 ± 0.0002."""
+    """A value with as many digits as its standard error justifies: 0.2998 ± 0.0002."""
     if not (math.isfinite(value) and math.isfinite(error) and error > 0):
         return number(value, 4)
     exponent = math.floor(math.log10(max(abs(value), error)))
@@ -43,7 +43,7 @@ def with_error(value: float, error: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in percent; all that reaches 1 within its last digit is 100 %."""
+    """A share in percent with one decimal; a share that rounds to 1 is 100 %."""
     return f"100{HELD}%" if share >= 0.9995 else f"{_fixed(round(100 * share, 1) + 0.0, 1)}{HELD}%"
 
 
@@ -66,7 +66,7 @@ def label(text: str, of: str | None) -> str:
 
 
 def capital(text: str) -> str:
-    """A text that begins a sentence."""
+    """A text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 

@@ -1,4 +1,4 @@
-"""Is a record fit for use? What forbids its use raises BadInput, what must be known becomes a Note."""
+"""Checks of a record: faults that forbid its use raise BadInput, other oddities become a Note."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,15 +13,15 @@ from fmus.errors import BadInput
 JITTER = 0.01  # standard deviation of the time steps over their median
 LOST_SAMPLE = 1.5  # a step over the median step that must come from a lost sample
 GAP = 5.0  # a step over the median step that no simulation should bridge
-CLIPPED_SAMPLES = 8  # equal values in a row that chance and a slow turning point do not make
+CLIPPED_SAMPLES = 8  # equal values in a row; chance and slow turning points make fewer
 
 Lines = NDArray[np.integer[Any]]
 
 
 def check_time(file: str, column: str, t: Array, lines: Lines, row: str = "line") -> None:
-    """Every row needs a time after the one before it.
+    """Raise BadInput unless the times increase from row to row.
 
-    t: (N,) s; lines: (N,) where each row stands in the file; row: what such a place is called there.
+    t: (N,) s; lines: (N,) number of each row in the file; row: the word for a row in this format.
     """
     blank = ~np.isfinite(t)
     if blank.any():
@@ -39,7 +39,7 @@ def check_time(file: str, column: str, t: Array, lines: Lines, row: str = "line"
 
 
 def check_gaps(file: str, t: Array) -> None:
-    """No step of time, t: (N,) s, may exceed the median step by far."""
+    """Raise BadInput if a step of time, t: (N,) s, is much longer than the median step."""
     steps = np.diff(t)
     gaps = np.flatnonzero(steps > GAP * np.median(steps))
     if gaps.size:
@@ -52,7 +52,7 @@ def check_gaps(file: str, t: Array) -> None:
 
 
 def check_cells(file: str, column: str, t: Array, x: Array) -> None:
-    """Every cell of a used column, x: (N,), needs a number."""
+    """Raise BadInput unless every cell of a used column, x: (N,), contains a number."""
     blank = ~np.isfinite(x)
     if blank.any():
         raise BadInput(
@@ -62,7 +62,7 @@ def check_cells(file: str, column: str, t: Array, x: Array) -> None:
 
 
 def time_notes(file: str, t: Array) -> Iterator[Note]:
-    """Uneven sampling and lost samples, t: (N,) s."""
+    """Notes on uneven sampling and lost samples, t: (N,) s."""
     steps = np.diff(t)
     median = float(np.median(steps))
     spread = float(np.std(steps)) / median
@@ -77,13 +77,15 @@ def time_notes(file: str, t: Array) -> Iterator[Note]:
 
 
 def output_notes(file: str, column: str, x: Array) -> Iterator[Note]:
-    """A measured output that tells nothing, or not all, x: (N,) in any unit.
+    """A note on a measured output that is constant or clipped, x: (N,) in any unit.
 
-    Only for outputs: a command may well rest at its limits.
+    Only for outputs, because a command may well stay at its limits.
     """
     if np.ptp(x) == 0:
         yield Note(
-            "constant", column, f"{file}: column '{column}' is constant at {x[0]:.6g}; it tells nothing"
+            "constant",
+            column,
+            f"{file}: column '{column}' is constant at {x[0]:.6g}, so it contains no information",
         )
         return
     for value, places in clipped(x):
@@ -97,11 +99,11 @@ def output_notes(file: str, column: str, x: Array) -> Iterator[Note]:
 
 
 def clipped(x: Array) -> list[tuple[float, int]]:
-    """The extremes of a channel, x: (N,), at which it is cut off, and in how many places.
+    """The extremes of a channel, x: (N,), at which it is clipped, and in how many places.
 
-    Cut off is a channel that moves into its extreme without slowing down and then repeats the very same
-    value. At rest it slows down before (an encoder) or rests at 0 (a speed, a current); noise does not
-    repeat itself. A stop from full speed within some four samples looks the same.
+    A channel is clipped if it reaches its extreme without slowing down and then repeats exactly the same
+    value. A channel at rest has slowed down before (an encoder), or rests at 0 (a speed, a current), and
+    noise never repeats a value. A stop from full speed within about four samples cannot be distinguished.
     """
     found = []
     quantum, noise = _quantum(x), white_noise([x], quantised=True)
@@ -130,9 +132,9 @@ def _quantum(x: Array) -> float:
 def _unbraked(before: Array, quantum: float, noise: float) -> bool:
     """Whether a channel, before: (n,) up to its extreme, rises to it without slowing down.
 
-    Looked at over the shortest window in which the rise is visible: braking evenly to rest, the last
-    quarter rises at no more than half the rate of the others. Below two quanta per sample braking is hidden.
-    Noise can feign braking, so a noisy channel is looked at over longer windows too.
+    The shortest window in which the rise is visible is examined. If the motion brakes evenly to rest, the
+    last quarter rises at no more than half the rate of the others. Below two quanta per sample, braking is
+    not visible. Noise can look like braking, so a noisy channel is also examined over longer windows.
     """
     visible = 24 * max(quantum, noise)
     enough = 4 * visible if noise > 3 * quantum else visible

@@ -1,4 +1,4 @@
-"""Reads CSV files: names in line 1, commas, points in the decimals, UTF-8."""
+"""Reads CSV files: names in line 1, commas between columns, decimal points, UTF-8."""
 
 import csv
 import warnings
@@ -11,7 +11,7 @@ from fmus.errors import BadInput
 
 
 def read_csv(file: Path) -> pd.DataFrame:
-    """The cells of a CSV file up to the last row that is not blank; index i stands in line i + 2."""
+    """The cells of a CSV file up to the last row that is not blank; row i is line i + 2 of the file."""
     header = _header(file)
     try:
         with warnings.catch_warnings():
@@ -39,7 +39,7 @@ def read_csv(file: Path) -> pd.DataFrame:
 
 
 def _header(file: Path) -> list[str]:
-    """The column names in line 1; a nameless column gets a name of its own."""
+    """The column names in line 1; a column without a name gets a new unique name."""
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             cells = [cell.strip() for cell in next(csv.reader(stream), [])]
@@ -51,7 +51,7 @@ def _header(file: Path) -> list[str]:
     if not any(cells):
         raise BadInput(f"{file}: is empty or has no column names in line 1; write them there")
     if len(cells) == 1 and ";" in cells[0]:
-        raise BadInput(f"{file}: columns are parted by ';'; save it with commas, and points in the decimals")
+        raise BadInput(f"{file}: columns are separated by ';'; save it with commas, and with decimal points")
     twice = sorted({cell for cell in cells if cell and cells.count(cell) > 1})
     if twice:
         raise BadInput(f"{file}: column '{twice[0]}' occurs twice in line 1; rename one")

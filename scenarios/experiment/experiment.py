@@ -1,7 +1,7 @@
 """An experiment: measured data and what is declared about it, read from its experiment.toml.
 
-`load_experiment` turns a file into an Experiment, `check_names` holds it against the FMU. All that is
-wrong with a file is a BadInput of one line.
+`load_experiment` reads a file into an Experiment, `check_names` compares it with the FMU. Any error in a
+file is a BadInput of one line.
 """
 
 from collections.abc import Iterable, Iterator
@@ -39,9 +39,9 @@ class Experiment(Declaration):
 
 
 def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
-    """The experiment in a file; data are read from `data_dir`, by default the file's own folder.
+    """Read the experiment in a file; its data are in `data_dir`, by default the folder of the file.
 
-    Raises BadInput, one line that names the file, the key and the way out.
+    Raises BadInput with one line that names the file, the key and the way out.
     """
     file = Path(path)
     declared = read_file(Declaration, file, "an experiment.toml")
@@ -52,7 +52,7 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
 
 
 def _check_model(file: Path, name: str) -> None:
-    from fmus.models import model_class  # here because it loads CasADi, which a foreign FMU does without
+    from fmus.models import model_class  # imported here, because a foreign FMU does not need CasADi
 
     try:
         model_class(name)
@@ -61,7 +61,7 @@ def _check_model(file: Path, name: str) -> None:
 
 
 def check_names(experiment: Experiment, description: FmuDescription) -> None:
-    """Hold the names and values of an experiment against the FMU's own; BadInput for the first that fails."""
+    """Check the names and values of an experiment against the FMU; raises BadInput for the first error."""
     names, values = [*_wrong_names(experiment, description)], [*_wrong_values(experiment, description)]
     problems = names + values
     if problems:
@@ -69,7 +69,7 @@ def check_names(experiment: Experiment, description: FmuDescription) -> None:
 
 
 def _wrong_names(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
-    """Names that are not in the FMU or play another part there."""
+    """Errors for names that are not in the FMU, or are another kind of variable there."""
     for where, names, known, part in _parts(e, fmu):
         for name in names:
             if name in fmu.variables and name not in known:
@@ -83,7 +83,7 @@ Part = tuple[str, Iterable[str], list[str], str]
 
 
 def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
-    """Where names stand, these names, those valid there, and the part these play in the FMU."""
+    """For each table: its place, the names in it, the valid names, and the kind of variable required."""
     states = [v.name for v in fmu.variables.values() if _start_can_be_set(v)]
     yield "[parameters]", e.parameters, fmu.parameters, "a parameter"
     yield "[calibrate]", e.calibrate, fmu.parameters, "a parameter"

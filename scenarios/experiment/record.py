@@ -26,19 +26,19 @@ from scenarios.experiment.experiment import Experiment, check_names
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.units import SAME, StatedUnits
 
-CHOOSE = 0.2  # of the samples that identify: on these an answer is chosen, if no others are given
-PIECES = 5  # in which they lie
-GRID = 15  # samples: pieces begin at multiples of it, so that screening may take 3 or 5 samples as one
-MIN_SAMPLES = 50  # in each part; fewer cannot show an error beyond its own scatter
-MIN_MEASURED = 2  # of an output in each file; fewer have no motion
+CHOOSE = 0.2  # share of the identify part that becomes the part to choose, if none is declared
+PIECES = 5  # number of pieces in which these samples lie
+GRID = 15  # samples; pieces begin at multiples of it, so that screening can average 3 or 5 samples
+MIN_SAMPLES = 50  # samples in each part; with fewer, an error is within its own scatter
+MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
 
 
 def load_record(experiment: Experiment, description: FmuDescription, missing: bool = False) -> Record:
     """The measured inputs and outputs of an experiment in the FMU's units, checked.
 
-    Without [split] all samples are fitted and none is held out. missing: whether cells of outputs may
-    be empty; they become nan. Raises BadInput where names, units or data forbid the use; what is merely odd
-    stands in the notes.
+    Without [split], all samples are fitted and there is no test part. missing: whether cells of outputs may
+    be empty; they become nan. Raises BadInput if names, units or data forbid the use; other oddities are
+    listed in the notes.
     """
     check_names(experiment, description)
     scale, notes = _conversions(experiment, description)
@@ -58,7 +58,7 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
 
 
 def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]:
-    """Factor and offset of each output's column, (n_y, 2), and what was converted."""
+    """Factor and offset of each output's column, (n_y, 2), and notes on conversions."""
     scale, notes = [], []
     for name, output in e.outputs.items():
         where, variable = f"{e.file}: [outputs.{name}]", f"'{name}' of {fmu.name}"
@@ -95,7 +95,7 @@ def _run(
 
 
 def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated: StatedUnits) -> Array:
-    """An input in the FMU's unit (N,): taken as it is where neither experiment nor file says its unit."""
+    """An input in the FMU's unit (N,); unchanged if neither the experiment nor the file states its unit."""
     channel, where, variable = e.input_columns[name], f"{e.file}: [inputs] {name}", f"'{name}' of {fmu.name}"
     column, times = _source(e, channel.column)
     target = model_unit(fmu.variables[name].unit, channel.model_unit, variable, where)
@@ -110,7 +110,7 @@ def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated:
 
 
 def _check_units(e: Experiment, stated: StatedUnits) -> None:
-    """The units declared of the measured inputs and outputs against those that the file states."""
+    """Compare the units declared for the measured inputs and outputs with those stated in the file."""
     declared = {f"[outputs.{name}]": (output.column, output.unit) for name, output in e.outputs.items()}
     for name, channel in e.input_columns.items():
         if channel.unit is not None:
@@ -121,7 +121,7 @@ def _check_units(e: Experiment, stated: StatedUnits) -> None:
 
 
 def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -> list[Note]:
-    """What is odd about the columns of a file, (N,) each; BadInput for gaps and for numbers that must be."""
+    """Notes on the columns of a file, (N,) each; raises BadInput for gaps and for missing numbers."""
     t = data[e.time]
     check_gaps(str(file), t)
     measured = dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values())
@@ -130,7 +130,7 @@ def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -
         may_miss = missing and column in measured and column not in needed
         check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
         if np.isfinite(values).sum() < MIN_MEASURED:
-            raise BadInput(f"{file}: column '{column}' has no numbers to speak of; leave its output out")
+            raise BadInput(f"{file}: column '{column}' has almost no numbers; leave its output out")
     notes = list(time_notes(file.name, t))
     for column in measured:
         notes += output_notes(file.name, column, data[column][np.isfinite(data[column])])
@@ -154,7 +154,7 @@ def _source(e: Experiment, column: str) -> tuple[str, int]:
 
 
 def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray, BoolArray]:
-    """Which samples are fitted, which choose among the fits, and which test, t: (N,) s -> (N,) each."""
+    """Identify part, part to choose and test part of the samples, t: (N,) s -> (N,) each."""
     every, none = np.ones(t.size, dtype=np.bool_), np.zeros(t.size, dtype=np.bool_)
     if e.split is None:
         _check_enough(e, f"file {file}", every)
@@ -171,10 +171,10 @@ def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, B
 
 
 def spread(identify: BoolArray) -> BoolArray:
-    """The samples (N,) of the identify part that choose where none are given: the end of each of its pieces.
+    """The part to choose (N,) if none is declared: the end of each piece of the identify part.
 
-    Spread over the record, since what sets in late must be seen both to be fitted and to be chosen, and in
-    few long pieces, so that neighbours in time do not tell one part of the other (hold-out of blocks:
+    It is spread over the record, because an effect with a late onset must be visible in both parts. The
+    pieces are few and long, so that neighbouring samples do not correlate the two parts (hold-out of blocks:
     J. Racine, Journal of Econometrics 99 (2000), 39-61).
     """
     index, found = np.flatnonzero(identify), np.zeros_like(identify)
@@ -190,7 +190,7 @@ def spread(identify: BoolArray) -> BoolArray:
 def _windows(
     e: Experiment, windows: Mapping[str, tuple[float, float]], file: Path, t: Array
 ) -> dict[str, BoolArray]:
-    """The samples (N,) in each window of one file; a sample on the edge of two belongs to the first."""
+    """The samples (N,) in each window of one file; a sample on the common edge belongs to the first."""
     step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
     masks: dict[str, BoolArray] = {}
     for key, window in windows.items():

@@ -1,4 +1,4 @@
-"""Reads a declared file or table into its class; whatever is wrong with it is a BadInput of one line."""
+"""Reads a declared file or table into its class; any error is a BadInput of one line."""
 
 import tomllib
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from scenarios.experiment.declaration import Table
 
 T = TypeVar("T", bound=Table)
 
-# our words for problems by pydantic's name
+# the messages for problems, by pydantic's name
 SAID = MappingProxyType(
     {
         "dict_type": "must be a table",
@@ -29,7 +29,7 @@ SAID = MappingProxyType(
 
 
 def read_toml(file: Path, kind: str) -> dict[str, Any]:
-    """The top table of a TOML file, which the message of an error calls `kind`, as "an experiment.toml"."""
+    """The top table of a TOML file; `kind` is the word for the file in messages, "an experiment.toml"."""
     try:
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
@@ -48,7 +48,7 @@ def read_file(cls: type[T], file: Path, kind: str) -> T:
 
 @contextmanager
 def of_file(file: Path) -> Iterator[None]:
-    """Name the file in errors about what stands in it."""
+    """Add the name of the file to errors about its content."""
     try:
         yield
     except BadInput as error:
@@ -57,7 +57,7 @@ def of_file(file: Path) -> Iterator[None]:
 
 
 def read_table(cls: type[T], table: object, key: str = "") -> T:
-    """The table that stands at `key` of a file, or the whole file, as an object of its class."""
+    """The table at `key` of a file, or the whole file, as an object of its class."""
     try:
         return cls.model_validate(table)
     except ValidationError as error:
@@ -79,7 +79,7 @@ def and_more(problems: int) -> str:
 
 
 def _sentence(cls: type[Table], problem: ErrorDetails, root: str) -> str:
-    """One problem found by pydantic, in the words of the file."""
+    """One problem found by pydantic, in terms of the file."""
     loc, kind, value = problem["loc"], problem["type"], problem["input"]
     # pydantic marks the key of a table, beside its value, as [key]
     parts = [part for part in loc if part != "[key]"]

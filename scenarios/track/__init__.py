@@ -1,4 +1,4 @@
-"""Track irregularities: where they come from, and what a vehicle feels of them."""
+"""Track irregularities: their sources, and the inputs that they give to a vehicle."""
 
 from scenarios.track.figures import profile_figure, spectrum_figure
 from scenarios.track.inputs import inputs, riders

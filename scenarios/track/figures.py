@@ -32,7 +32,7 @@ TITLES: Mapping[Quantity, str] = {
     "level": "Level",
     "cross_level": "Cross level",
 }
-SEGMENTS = 8  # of the record, without overlap, in the estimate of a spectrum
+SEGMENTS = 8  # segments of the record, without overlap, in the estimate of a spectrum
 DECADES = 4.5  # shown below the greatest density
 
 
@@ -72,7 +72,7 @@ def spectrum_figure(
     requested: Mapping[Quantity, Spectrum] | None = None,
     wavelengths: Sequence[float] | None = None,
 ) -> Figure:
-    """Spectra of what is on the track, by Welch's method, with the requested ones in their band [m]."""
+    """Spectra of the track by Welch's method, with the requested spectra in their band [m]."""
     shown = [q for q in TITLES if np.ptp(getattr(track.rails, q)) > 0] or ["level"]
     columns = 2 if len(shown) > 1 else 1
     rows = [shown[i : i + columns] for i in range(0, len(shown), columns)]
@@ -93,7 +93,7 @@ def _spectrum_panel(
     requested: Spectrum | None,
     wavelengths: Sequence[float] | None,
 ) -> None:
-    """The estimate and, within the band, what was asked for."""
+    """The estimated spectrum and, within the band, the requested one."""
     step = float(np.median(np.diff(track.distance)))
     Omega, S = estimated_spectrum(track, quantity, step, (track.end - track.start) / SEGMENTS)
     ax.loglog(Omega, S, color=AFTER, lw=0.8, label="of the track (Welch)")

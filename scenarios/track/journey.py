@@ -53,7 +53,7 @@ Speed: TypeAlias = "float | tuple[ArrayLike, ArrayLike] | Journey"
 def journey(V: Speed, start: float = 0.0) -> Journey:
     """A run at a constant speed [m/s], or at speeds given as (times [s], speeds [m/s]), each (K,).
 
-    start: distance [m] at time 0. A Journey passes as it is. Raises BadInput for what is no speed over time.
+    start: distance [m] at time 0. A Journey is returned unchanged. Raises BadInput if V is not a valid speed.
     """
     if isinstance(V, Journey):
         return V

@@ -62,10 +62,10 @@ class Rails:
 
 
 def rails_of(given: Mapping[Quantity, Array], like: Array) -> Rails:
-    """Rails from some quantities of the shape of `like`; what is not given is 0.
+    """Rails from some quantities of the shape of `like`; quantities that are not given are 0.
 
-    Raises ValueError where one direction is given both by its rails and by mean and difference, or by one
-    rail alone.
+    Raises ValueError if one direction is given both by its rails and by mean and difference, or by one rail
+    alone.
     """
     sides: list[Array] = []
     for rails, means in PLANES:

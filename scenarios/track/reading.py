@@ -1,4 +1,4 @@
-"""The [track] table of a scenario: a source, and what is added to it."""
+"""The [track] table of a scenario: a source, and the defects and sources added to it."""
 
 from collections.abc import Mapping
 from functools import reduce
@@ -26,7 +26,7 @@ def read_track(table: Mapping[str, Any], folder: Path, key: str = "track") -> Tr
 
 
 def read_source(table: Mapping[str, Any], key: str = "track") -> Source:
-    """The source of a track that is not a defect, without what is added to it."""
+    """The source of a track that is not a defect, without the tables added to it."""
     return _source(_tables(table, key)[0][0], key)
 
 
@@ -62,7 +62,7 @@ def _source(table: dict[str, Any], key: str) -> Source:
 
 
 def _choice(table: dict[str, Any], name: str, known: Any, key: str) -> str:
-    """What a table says under a name that must be one of the known ones."""
+    """The value of a key, which must be one of the known names."""
     if name not in table:
         raise BadInput(f"key '{key}.{name}' is missing; known are {', '.join(sorted(known))}")
     chosen = table[name]

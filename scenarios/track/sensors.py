@@ -1,4 +1,4 @@
-"""What a sensor and its logger make of a true signal.
+"""Compute the readings of a sensor and its logger from a true signal.
 
 In this order, from the quantity to the file: clock and delay (which true time a sample shows), gain, bias,
 drift, noise, saturation, quantisation, drop-out.
@@ -30,26 +30,28 @@ SAME_TIME = 9  # decimals of a second to which the samples of one row have the s
 
 
 class Sensor(Table):
-    """A sensor; as it is made it is perfect. The reading's unit is the signal's, SI.
+    """A sensor; by default it has no error. The reading has the unit of the signal, SI.
 
     reading at the clock's time t = gain x(t') + bias + drift (t' - t0) + noise, then saturated, then rounded
     to the quantum, with t' = (t - clock_offset)/(1 + clock_skew) the true time of the sample, x(t' - delay)
     the signal and t0 the record's first time.
     """
 
-    of: str | None = None  # the signal it measures, by default that of its own name
+    of: str | None = None  # the signal it measures, by default the signal with the sensor's name
     rate: Positive | None = None  # Hz; without it a sample at each of the given times
     delay: NotNegative = 0.0  # s, from the quantity to the sample
-    clock_offset: Number = 0.0  # s, by which its clock is ahead of the true time
-    clock_skew: Annotated[float, Field(strict=True, gt=-1, lt=1)] = 0.0  # by which its clock runs too fast
+    clock_offset: Number = 0.0  # s, time by which its clock is ahead
+    clock_skew: Annotated[float, Field(strict=True, gt=-1, lt=1)] = (
+        0.0  # relative error of its clock, positive if it runs too fast
+    )
     gain: Number = 1.0
     bias: Number = 0.0
     drift: Number = 0.0  # per s
     noise: NotNegative = 0.0  # standard deviation, white
     saturation: Interval | None = None
     quantum: Positive | None = None
-    dropout: Probability = 0.0  # share of the samples that are lost, each for itself
-    gaps: tuple[Interval, ...] = ()  # s of the clock, in which all samples are lost
+    dropout: Probability = 0.0  # share of the samples that are lost, independently of each other
+    gaps: tuple[Interval, ...] = ()  # s of the clock, intervals in which all samples are lost
 
     @model_validator(mode="after")
     def _range_holds_a_code(self) -> "Sensor":
@@ -70,13 +72,13 @@ def read_sensors(table: object, key: str = "sensors") -> dict[str, Sensor]:
 def measure(
     time: ArrayLike, signals: Mapping[str, ArrayLike], sensors: Mapping[str, Sensor], seed: int
 ) -> pd.DataFrame:
-    """What the sensors record of true signals: a column `time` of the clocks and one for each sensor.
+    """The recorded data of the sensors: a column `time` of their clocks and one column for each sensor.
 
     time: (N,) s, increasing; signals: (N,) by name in SI, sampled finely enough that cubics (PCHIP) between
-    the samples are true to them. Outside the given times a signal rests at its first or last value.
-    Sensors of different rates share the rows where their samples coincide; elsewhere they hold nan, as for
-    lost samples. The draws of a sensor depend on the seed and its name alone. Raises BadInput for what does
-    not fit.
+    the samples represent them well. Outside the given times, a signal keeps its first or last value.
+    Sensors of different rates share the rows at which their samples coincide; other rows contain nan, as do
+    lost samples. The random numbers of a sensor depend only on the seed and its name. Raises BadInput for
+    invalid values.
     """
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise BadInput(f"seed must be a whole number from 0, not {seed!r}")
@@ -106,7 +108,7 @@ def _signal(signals: Mapping[str, ArrayLike], name: str, where: str, samples: in
 
 
 def _stamps(t: Array, sensor: Sensor) -> Array:
-    """When the sensor's clock has it sample, (n,) s: within the given times, at multiples of its period."""
+    """Times at which the sensor samples, (n,) s: multiples of its period within the given times."""
     if sensor.rate is None:
         return t
     first, last = np.ceil(t[0] * sensor.rate - 1e-6), np.floor(t[-1] * sensor.rate + 1e-6)

@@ -131,7 +131,7 @@ SPECTRA: Mapping[str, Spectra] = MappingProxyType(
 
 
 def spectra(name: str) -> Spectra:
-    """The spectra of alignment, gauge, level and cross level by name; BadInput with the nearest one else."""
+    """The spectra of alignment, gauge, level and cross level by name; raises BadInput if it is unknown."""
     if name not in SPECTRA:
         raise BadInput(f"spectrum '{name}' is not known; {did_you_mean(name, SPECTRA)}")
     return SPECTRA[name]

@@ -1,4 +1,4 @@
-"""Irregularities brought to given statistics: standard deviation, and the extremes where they are known."""
+"""Adjust irregularities to given statistics: standard deviation and, if known, the extremes."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -41,10 +41,11 @@ KNOWN: Mapping[str, Mapping[Quantity, Statistics]] = MappingProxyType({"chocen_d
 def fit(x: Array, wanted: Statistics) -> Array:
     """Samples x (n,) of a closed length, with mean 0 and the wanted statistics, exact to rounding.
 
-    With `sd` alone the samples are scaled. For the extremes a smooth increasing function stretches them,
-    which leaves zero and its slope in place and has one parameter for either tail. That alone would spill
-    power over the band; so in turn the amplitudes of all waves are set back to those of x, the phases
-    kept, until little stretching is left to do. Raises BadInput where that does not come to an end.
+    With `sd` alone, the samples are scaled. To reach the extremes, a smooth increasing function stretches
+    the samples. It keeps zero and the slope there, and has one parameter for each tail. Stretching alone
+    would spread power outside the band. Therefore the amplitudes of all waves are reset to those of x, with
+    the new phases, and both steps are repeated until little stretching remains. Raises BadInput if this does
+    not converge.
     """
     u = (x - x.mean()) / x.std()
     if wanted.max is None and wanted.min is None:

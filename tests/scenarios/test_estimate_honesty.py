@@ -55,7 +55,10 @@ def test_a_number_that_its_own_tests_reject_says_so_everywhere(vdp, tmp_path, ca
     file.write_text(file.read_text() + options)
     assert railfmi("estimate", file, "--out", tmp_path / "out") == 1
     said = capsys.readouterr().out
-    sentence = r"not consistent with the record: NIS [\d.]+, expected [\d.]+ to [\d.]+.*; so the standard error is too small"
+    sentence = (
+        r"not consistent with the record: NIS [\d.]+, expected [\d.]+ to [\d.]+.*; "
+        "so the standard error is too small"
+    )
     assert re.search(sentence, said)
     written = json.loads((tmp_path / "out" / "result.json").read_text())
     assert written["consistent"] is False
@@ -120,7 +123,8 @@ def test_what_moved_without_being_informed_is_said_to_have_moved(vdp, tmp_path):
     assert abs(mu["value"] - 1.5) > 0.1
     (note,) = (n for n in result.notes if "'mu'" in n)
     assert re.match(
-        r"the record contains little information on 'mu': \d+% of its start deviation is left, yet its value moved",
+        r"the record contains little information on 'mu': \d+% of its start deviation is left, "
+        "yet its value moved",
         note,
     )
     assert BELIEVED not in note

@@ -343,7 +343,7 @@ def test_a_time_that_may_be_several_is_refused(rates):
     ) as refused:
         sheet(rates, "time", "x")
     assert str(rates) in str(refused.value)
-    with pytest.raises(BadInput, match="its channels have several times; export those"):
+    with pytest.raises(BadInput, match="its channels have several times; export the channels"):
         READERS[rates.suffix](rates)
 
 

@@ -185,7 +185,7 @@ def replace_row(line: int, text: str):
 BAD_DATA = [
     (lambda lines: [], "is empty or has no column names in line 1"),
     (lambda lines: lines[:1], "has no data below line 1"),
-    (lambda lines: [line.replace(",", ";") for line in lines], "columns are parted by ';'"),
+    (lambda lines: [line.replace(",", ";") for line in lines], "columns are separated by ';'"),
     (lambda lines: [lines[0].replace("torque", "omega"), *lines[1:]], "column 'omega' occurs twice"),
     (replace_row(7, "0.05,1.5,12,9,9"), "Expected 4 fields in line 7, saw 5"),
     (lambda lines: [lines[0], *(line + ",1" for line in lines[1:])], "line 2 has more cells than line 1"),

@@ -643,7 +643,7 @@ OWN = {"A": 2e-7, "Omega_c": 0.8, "Omega_r": 0.02}
         ),
         (
             {"like": "chocen_dobrikov", "statistics": {"gauge": {"sd": 1e-3}}},
-            "'like' and 'statistics' say the same",
+            "'like' and 'statistics' both set the statistics",
         ),
         ({"statistics": {"gauge": {"sd": 0.0}}}, "key 'track.statistics.gauge.sd' must be greater than 0"),
         (

@@ -30,14 +30,14 @@ READERS = _by_suffix(classes_in(sys.modules[__name__], Reader))  # type: ignore[
 
 
 def read_sheet(file: Path, time: str | None = None, columns: Collection[str] | None = None) -> Sheet:
-    """Columns of a data file that share their rows.
+    """Read the columns of a data file that share their rows.
 
-    time: the column whose rows they are, needed where a file has several rasters; columns: those wanted, all
-    by default. What of them is not in the file is not in the cells either. Raises BadInput for a file of no
-    known kind, one that cannot be read, and names that are ambiguous in it.
+    time: the column that determines the rows, required if a file has several time rasters.
+    columns: the columns to read, by default all; columns that are not in the file are left out.
+    Raises BadInput if the file has no known format or cannot be read, or if a name in it is ambiguous.
     """
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         known = ", ".join(sorted(READERS))
-        raise BadInput(f"{file}: is of no known kind; known are {known}: convert it to one of them")
+        raise BadInput(f"{file}: has no known format; convert it to one of {known}")
     return reader.read(file, time, columns)

@@ -1,4 +1,4 @@
-"""Files of channels in groups, each with times of its own: those on the rows of one time become a sheet."""
+"""Files with groups of channels and several times: the channels of one time become a sheet."""
 
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from scenarios.experiment.readers.sheet import Sheet
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel that is loaded when it is wanted.
+    """A channel that is loaded only when it is needed.
 
-    rasters: what it shares with the channels and times that have its rows; group: empty where there is none.
+    rasters: keys that are equal for channels with the same rows; group: empty if the file has no groups.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Channel:
 
     @property
     def full_name(self) -> str:
-        """With its group, as it may be written where the name alone is ambiguous."""
+        """The name with its group, for use if the name alone is ambiguous."""
         return f"{self.group}/{self.name}" if self.group else self.name
 
 
@@ -39,7 +39,7 @@ Named = Mapping[str, Sequence[Channel]]
 def sheet_of(
     file: Path, channels: Sequence[Channel], time: str | None, columns: Collection[str] | None
 ) -> Sheet:
-    """The channels on the rows of `time`; without it all channels must have the same rows."""
+    """The channels with the same rows as `time`; without `time`, all channels must have the same rows."""
     named = _by_name(channels)
     axis = _axis(file, channels, named, time)
     if axis is None:
@@ -70,13 +70,13 @@ def _by_name(channels: Sequence[Channel]) -> Named:
 
 
 def _names(channels: Sequence[Channel]) -> list[str]:
-    """A name for each channel, with its group where the name alone is ambiguous."""
+    """A name for each channel, with its group if the name alone is ambiguous."""
     plain = [c.name for c in channels]
     return [c.name if plain.count(c.name) == 1 else c.full_name for c in channels]
 
 
 def _axis(file: Path, channels: Sequence[Channel], named: Named, time: str | None) -> Channel | None:
-    """The channel whose rows count: that of the time, if it is there and the only one."""
+    """The channel that determines the rows: the time channel, if there is exactly one of this name."""
     if time is not None:
         found = named.get(time, ())
         if found and not frozenset.intersection(*(c.rasters for c in found)):
@@ -85,20 +85,20 @@ def _axis(file: Path, channels: Sequence[Channel], named: Named, time: str | Non
     if not channels:
         raise BadInput(f"{file}: holds no channel of numbers; record some")
     if not frozenset.intersection(*(c.rasters for c in channels)):
-        raise BadInput(f"{file}: its channels have several times; export those that are needed with one time")
+        raise BadInput(
+            f"{file}: its channels have several times; export the channels that you need with one common time"
+        )
     return channels[0]
 
 
 def _ambiguous(file: Path, what: str, name: str, found: Sequence[Channel]) -> str:
     places = list(dict.fromkeys(c.full_name for c in found))
     if len(places) == 1:
-        return (
-            f"{file}: {what} '{name}' stands {len(found)} times in one group with rows that differ; keep one"
-        )
+        return f"{file}: {what} '{name}' stands {len(found)} times in one group with different rows; keep one"
     listed = ", ".join(f"'{place}'" for place in places[:6]) + (", ..." if len(places) > 6 else "")
-    return f"{file}: {what} '{name}' may be {listed}; write the one that is meant"
+    return f"{file}: {what} '{name}' may be {listed}; give the full name"
 
 
 def _cells(values: NDArray[Any]) -> NDArray[Any]:
-    """Switches as 0 and 1, all else as it is."""
+    """Logical values as 0 and 1, all other values unchanged."""
     return values.astype(np.float64) if values.dtype == np.bool_ else values

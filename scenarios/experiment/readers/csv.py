@@ -12,7 +12,7 @@ from scenarios.experiment.readers.sheet import Sheet
 
 
 class Csv(Reader):
-    """Rows are called by the lines of the file, names standing in line 1."""
+    """CSV files; a row is identified by its line in the file, and the names are in line 1."""
 
     kind: ClassVar[str] = "CSV"
     suffixes: ClassVar[tuple[str, ...]] = (".csv",)
@@ -31,7 +31,7 @@ def _units(file: Path) -> dict[str, str]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
-        raise BadInput(f"{beside}: cannot be read as JSON ({error}); mend it or take it away") from error
+        raise BadInput(f"{beside}: cannot be read as JSON ({error}); correct it or remove it") from error
     if not isinstance(units, dict):
         raise BadInput(f'{beside}: must hold units by column, as {{"F": "N"}}; mend it or take it away')
     return {column: unit for column, unit in units.items() if isinstance(unit, str) and unit}

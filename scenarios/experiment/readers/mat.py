@@ -16,16 +16,17 @@ HDF5 = (b"MATLAB 7.3", b"\x89HDF")  # how a file of version 7.3 begins, with MAT
 
 
 class Mat(Reader):
-    """Names are those of MATLAB: 't', 'M(:,2)', 'rig.torque', 'rig.Y(3).Data'; rows are shared where equal.
+    """Columns have the names of MATLAB: 't', 'M(:,2)', 'rig.torque', 'rig.Y(3).Data'.
 
-    Text, single numbers and complex ones are no columns. MAT files state no units.
+    Columns of equal length share their rows. Text, single numbers and complex numbers are not columns. MAT
+    files state no units.
     """
 
     kind: ClassVar[str] = "MAT"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
 
     def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
-        """Version 7.3 is HDF5 and read by h5py, all before by scipy."""
+        """Version 7.3 is HDF5 and is read with h5py; earlier versions are read with scipy."""
         with file.open("rb") as stream:
             begins = stream.read(16)
         if begins.startswith(HDF5):

@@ -1,4 +1,4 @@
-"""MDF files of measuring and bus-logging systems, version 4 and before: groups of channels over a master."""
+"""MDF files of measuring and bus-logging systems, up to version 4: each group has a master channel."""
 
 from collections.abc import Collection, Iterator
 from functools import partial
@@ -16,13 +16,13 @@ from scenarios.experiment.readers.sheet import Sheet
 
 
 class Mdf(Reader):
-    """Channels share their rows where their masters are equal, in one group or in several."""
+    """Channels share their rows if their master channels are equal, in one group or in several."""
 
     kind: ClassVar[str] = "MDF"
     suffixes: ClassVar[tuple[str, ...]] = (".mf4", ".mdf")
 
     def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
-        """Masters are read to be compared, of the other channels only those wanted."""
+        """All master channels are read for comparison, and only those other channels that are needed."""
         asammdf = library("asammdf", "asammdf", file)
         with file.open("rb") as stream, _opened(asammdf, stream) as source:
             groups = range(len(source.groups))

@@ -1,4 +1,4 @@
-"""What reads a format of data files."""
+"""The interface of a reader of data files."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection
@@ -14,7 +14,7 @@ from scenarios.experiment.readers.sheet import Sheet
 
 
 class Reader(ABC):
-    """A format: `kind` is what its files are called, `suffixes` what their names end in, lower case."""
+    """A data format: `kind` is the word for its files, `suffixes` are the file endings in lower case."""
 
     kind: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
@@ -43,11 +43,11 @@ class Reader(ABC):
 
     @abstractmethod
     def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
-        """Read a file that is there; what its library raises is turned into BadInput by `read`."""
+        """Read an existing file; `read` turns the errors of the format's library into BadInput."""
 
 
 def library(module: str, package: str, file: Path) -> ModuleType:
-    """A library that only this format needs, loaded when it is; BadInput where it is not installed."""
+    """Load a library that only this format needs; raises BadInput if it is not installed."""
     try:
         return import_module(module)
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""What is read from a data file, whatever its format: columns that share their rows, and their units."""
+"""The data read from a file of any format: columns that share their rows, and their units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,9 +16,11 @@ from fmus.errors import BadInput
 class Sheet:
     """Columns of a file that share their rows.
 
-    cells: those asked for that are there, (N,) each; known: the names of all columns of the file; units: by
-    column, where the file states one; apart: why a column that is in the file is not among the cells;
-    row, first: what a row is called in this format, and the number of the first one.
+    cells: the requested columns that exist, (N,) each.
+    known: the names of all columns of the file.
+    units: units by column, for columns with a unit in the file.
+    apart: for columns of the file that are not among the cells, the reason.
+    row, first: the word for a row in this format, and the number of the first row.
     """
 
     file: Path
@@ -30,7 +32,7 @@ class Sheet:
     first: int = 1
 
     def numbers(self, column: str) -> Array:
-        """The numbers of a column (N,), nan where a cell is blank; BadInput where it holds anything else."""
+        """The numbers of a column (N,), nan for a blank cell; raises BadInput for any other content."""
         cells: pd.Series[Any] = self.cells[column]
         if cells.dtype == bool or cells.dtype.kind in "mM":
             cells = cells.astype(str)
@@ -41,6 +43,6 @@ class Sheet:
             held = str(cells.iloc[i])[:40]
             raise BadInput(
                 f"{self.file} {self.row} {i + self.first}: column '{column}' holds '{held}', not a number; "
-                "write decimals with a point and leave no words"
+                "use decimal points and remove any words"
             )
         return numbers.to_numpy(dtype=np.float64)

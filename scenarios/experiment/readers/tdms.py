@@ -16,7 +16,7 @@ WAVEFORM = ("wf_increment", "wf_start_offset", "wf_start_time")  # what alike wa
 class Tdms(Reader):
     """Channels of a group with equal length share their rows, and so do waveforms with equal times.
 
-    The times of waveforms are the column 'time' of their group, s, where it has no channel of that name.
+    The times of waveforms become the column 'time' of their group, in s, unless the group already has one.
     """
 
     kind: ClassVar[str] = "TDMS"

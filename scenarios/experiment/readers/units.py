@@ -1,4 +1,4 @@
-"""Units that a file states of its columns, against those declared for them: they agree, or somebody errs."""
+"""Compare the units that a file states for its columns with the units declared for them."""
 
 from math import isclose
 from types import MappingProxyType
@@ -18,7 +18,7 @@ SAME = (1.0, 0.0)  # factor and offset
 
 
 class StatedUnits:
-    """The units that a file states; `notes` grows by what must be known of the columns asked for."""
+    """The units that a file states; notes on conversions are appended to `notes`."""
 
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
@@ -26,7 +26,7 @@ class StatedUnits:
         self.notes: list[Note] = []
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
-        """Raises BadInput where the file contradicts the unit declared, at `where`, for a measured output.
+        """Raise BadInput if the file contradicts the unit declared at `where` for a measured output.
 
         derived: how many times the column is differentiated to become the output.
         """
@@ -48,10 +48,10 @@ class StatedUnits:
             )
 
     def to(self, column: str, target: str | None, where: str, derived: int = 0) -> tuple[float, float]:
-        """Factor and offset from the file's unit to another; none where the file states none that is known.
+        """Factor and offset from the file's unit to another; identity if the file states no known unit.
 
-        derived: how many times the column is differentiated before. Raises BadInput where the units do not
-        fit, and where a unit is stated but there is none to convert it to.
+        derived: how many times the column is differentiated before. Raises BadInput if the units cannot be
+        converted, or if a unit is stated but there is no unit to convert to.
         """
         stated = self._known(column, f"it is taken as {target or 'it is'}")
         if stated is None:
@@ -78,7 +78,7 @@ class StatedUnits:
         return self._sheet.numbers(column) * factor + offset
 
     def _known(self, column: str, instead: str) -> str | None:
-        """The unit stated, in our spelling; a note where it is one that we do not know."""
+        """The unit stated in the file, in railfmi's spelling; an unknown unit causes a note."""
         unit = self._sheet.units.get(column, "").strip()
         unit = SPELLINGS.get(unit, unit)
         if not unit:

@@ -23,7 +23,7 @@ class Cusp(Defect):
 
     @property
     def reach(self) -> float:
-        """Where 1e-4 of it is left."""
+        """The distance at which 1e-4 of the peak is left."""
         return float(self.length * np.log(1e4))
 
 

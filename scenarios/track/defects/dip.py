@@ -28,7 +28,7 @@ class Dip(Defect):
 
 
 class CyclicTop(Defect):
-    """A train of `cycles` dips, one each `wavelength` [m], as dipped joints make it."""
+    """A train of `cycles` dips, one each `wavelength` [m], like a series of dipped joints."""
 
     shape: ClassVar[str] = "cyclic_top"
     on: Quantity = "level"
@@ -36,7 +36,7 @@ class CyclicTop(Defect):
     cycles: Annotated[int, Field(strict=True, ge=1)]
 
     def unit(self, x: Array) -> tuple[Array, Array]:
-        """The train about its position; between the dips the track is at its height of before."""
+        """The train about its position; between the dips, the track is at its original height."""
         return _waves(x, self.wavelength, self.cycles)
 
     @property

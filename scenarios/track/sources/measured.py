@@ -57,7 +57,7 @@ class MeasuredSource(Source):
             raise ValueError("needs either [distance] or [time], the axis of the data")
         if (self.V is not None) + (self.speed is not None) != (self.time is not None):
             raise ValueError(
-                "needs either 'V' or [speed] with [time], and only then: it makes time a distance"
+                "needs either 'V' or [speed] if [time] is given, and neither of them with [distance]"
             )
         for rails, means in PLANES:
             check_direction(self.columns.keys(), rails, means)
@@ -91,7 +91,7 @@ class MeasuredSource(Source):
         if (speed <= 0).any():
             raise BadInput(
                 f"{rows.place(speed <= 0)}: speed column '{self.speed.column}' is not greater than 0; "
-                "cut such rows out"
+                "remove these rows"
             )
         return np.asarray(cumulative_trapezoid(speed, x, initial=0), dtype=np.float64)
 
@@ -104,7 +104,7 @@ class _Rows:
         self.file = sheet.file
 
     def values(self, axis: Axis, unit: str) -> Array:
-        """A column, (N,), finite; BadInput where it is not, or where the file states another unit for it."""
+        """A finite column, (N,); raises BadInput if it is not finite or its unit in the file differs."""
         column, where = axis.column, f"{self.file}: column '{axis.column}'"
         if column not in self._sheet.cells:
             near = did_you_mean(column, self._sheet.known)

@@ -1,4 +1,4 @@
-"""What a track can come from."""
+"""The interface of a source of a track."""
 
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -15,4 +15,4 @@ class Source(Table, ABC):
 
     @abstractmethod
     def track(self, folder: Path) -> Track:
-        """The track; files are read relative to a folder. Raises BadInput for data that make none."""
+        """The track; files are read relative to a folder. Raises BadInput for unusable data."""

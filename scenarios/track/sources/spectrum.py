@@ -1,4 +1,4 @@
-"""Synthetic irregularities from the spectrum of a standard or one's own."""
+"""Synthetic irregularities from the spectrum of a standard or from the user's own spectrum."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -32,8 +32,8 @@ from scenarios.track.track import Track
 
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 Deviation = Literal["alignment", "gauge", "level", "cross_level"]
-FINE = 40  # samples in the shortest wave: cubics through them err by 0.01 % of the sd, slopes by 0.5 %
-COARSE = 8  # the fewest, with 0.3 % and 5 %
+FINE = 40  # samples in the shortest wave: cubics are exact to 0.01 % of the sd, slopes to 0.5 %
+COARSE = 8  # smallest number allowed, exact to 0.3 % and 5 %
 
 
 class OwnSpectrum(Table):
@@ -52,7 +52,7 @@ class OwnSpectrum(Table):
         return self
 
     def spectrum(self) -> Spectrum:
-        """It in SI, one-sided over rad/m."""
+        """The spectrum in SI, one-sided over rad/m."""
         return Spectrum.of(**dict(self))
 
 
@@ -82,7 +82,7 @@ class SpectrumSource(Source):
         if self.like is not None and self.like not in KNOWN:
             raise ValueError(f"'like' = '{self.like}' is no known line; {did_you_mean(self.like, KNOWN)}")
         if self.like is not None and self.statistics:
-            raise ValueError("'like' and 'statistics' say the same; leave one of the two out")
+            raise ValueError("'like' and 'statistics' both set the statistics; leave one of the two out")
         shortest, longest = self.wavelengths
         if shortest <= 0:
             raise ValueError(f"'wavelengths' must be greater than 0, not {list(self.wavelengths)}")
@@ -103,7 +103,7 @@ class SpectrumSource(Source):
         return self
 
     def _check_quantities(self) -> None:
-        """What is asked for must be in the spectrum, and what has statistics must be asked for."""
+        """Raise BadInput if a requested quantity has no spectrum, or statistics are for one not requested."""
         offered = self._offered()
         for name in self.quantities or ():
             if name not in offered:
@@ -117,7 +117,7 @@ class SpectrumSource(Source):
                     )
 
     def _realised(self) -> Spectra:
-        """Those of the offered spectra that are asked for, before any statistics."""
+        """The requested ones of the offered spectra, before any statistics."""
         wanted = self.quantities
         return {n: s for n, s in self._offered().items() if wanted is None or n in wanted}
 
@@ -147,7 +147,7 @@ class SpectrumSource(Source):
 
     @property
     def targets(self) -> Mapping[Quantity, Statistics]:
-        """The statistics that are met."""
+        """The statistics that the track has to have."""
         return self.statistics if self.like is None else KNOWN[self.like]
 
     @property
