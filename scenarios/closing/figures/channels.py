@@ -61,7 +61,7 @@ def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
         yield Plot(
             f"record{ending}",
             figure,
-            "The record. The shaded part is the test part, which neither fitting nor choosing has used.",
+            "Measured inputs and outputs. Shaded: the test part, which was used neither for fitting nor for choosing.",
         )
 
 
@@ -88,8 +88,12 @@ def residual_plots(
 
 
 def _residual_caption(zoom: bool) -> str:
-    text = "Measured minus simulated in free simulation, no measured output fed back. Shaded: the test part."
-    more = " The lower panels show what is left at the scale of the noise." if zoom else ""
+    text = "Residual: measured minus simulated output in free simulation. Shaded: the test part."
+    more = (
+        " The lower panels show the residual after the effect was added, at the scale of the noise."
+        if zoom
+        else ""
+    )
     return f"{text}{more} Dashed: ± 2 standard deviations of the noise."
 
 
