@@ -1,4 +1,4 @@
-"""Estimates of the literature, rebuilt: one module a row, found by its `ROW`."""
+"""Repeat estimates of the literature: one module for each row, found by its `ROW`."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -37,11 +37,13 @@ def run_row(
     cases: Sequence[str] | None = None,
     tell: Tell = lambda line: None,
 ) -> Outcome:
-    """Rebuild a row and write result.json, table.md and its figures to a folder.
+    """Run a row and write result.json, table.md and its figures to a folder.
 
-    records: a folder with CASE.csv for each case, or what makes them; without, the FMU itself makes them,
-    which shows less: model and truth are then the same. fmu: by default the row's model, built native.
-    cases: of the row's, all by default. BadInput where a row, a case or a record cannot be used.
+    records: a folder with CASE.csv for each case, or a function that makes the records. By default the FMU
+    simulates them, which proves less, because model and truth are then the same.
+    fmu: by default the row's model as a native build.
+    cases: the cases to run, by default all.
+    Raises BadInput if a row, a case or a record cannot be used.
     """
     if name not in ROWS:
         raise BadInput(f"row '{name}' is not known; {did_you_mean(name, ROWS)}")

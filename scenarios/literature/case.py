@@ -1,4 +1,4 @@
-"""What a row needs measured: a case says it, a record holds it, whoever makes it."""
+"""The cases of a row, each with the inputs and outputs to be measured, and the records of a case."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,19 +12,20 @@ from fmus.errors import BadInput, did_you_mean
 from scenarios.experiment.readers import read_sheet
 
 TIME = "time"
-TRUE = "_true"  # ending of a column that holds what no sensor sees
-DIGITS = 9  # significant ones of a record in a file
+TRUE = "_true"  # ending of a column with true values that no sensor measures
+DIGITS = 9  # significant digits of a record in a file
 
 
 @dataclass(frozen=True)
 class Case:
-    """A run that is to be measured. Units are SI, variables those of the model.
+    """A run to be measured, in SI units, with the variables of the model.
 
-    inputs, noise: what a record holds besides the time; noise: standard deviation of each measured output.
-    true: parameters that differ from the declared ones; later: those that jump at `when` [s], and to what;
-    further: jumps after that one. judged: outputs whose true course is to be known too, in NAME_true.
-    lead: s that the model has been running when the record begins; 0 for a start from rest.
-    speed: m/s, on the rig Hz of the supply. More than that, such as the track, is the truth's own.
+    inputs, noise: the columns of a record besides the time; noise: standard deviation of each output.
+    true: parameters that differ from the declared ones; later: new values of parameters that jump at `when`
+    in s; further: jumps after that one.
+    judged: outputs whose true values the record must also contain, as NAME_true.
+    lead: time in s for which the model has run before the record begins; 0 for a start from rest.
+    speed: m/s, or on the rig Hz of the supply. All else, such as the track, is chosen by the truth model.
     """
 
     name: str
@@ -44,7 +45,7 @@ class Case:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """What a record of it holds."""
+        """The columns of a record of this case."""
         return TIME, *self.inputs, *self.noise, *(name + TRUE for name in self.judged)
 
     @property
@@ -79,7 +80,7 @@ class Record:
         return self.columns[TIME]
 
     def table(self, names: Sequence[str]) -> Array:
-        """Columns beside one another, (N, k)."""
+        """The given columns as an array, (N, k)."""
         return np.column_stack([self.columns[n] for n in names]) if names else np.empty((len(self.t), 0))
 
     def write(self, path: Path) -> Path:
@@ -91,7 +92,7 @@ class Record:
         return path
 
 
-Source = Callable[[Case], Record]  # makes or reads what a case asks for
+Source = Callable[[Case], Record]  # makes or reads the record of a case
 
 
 def recorded(folder: Path) -> Source:

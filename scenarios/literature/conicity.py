@@ -34,18 +34,18 @@ from scenarios.literature.row import Measured, Row, Tell
 from scenarios.literature.wheelset import variances
 
 DEVIATION = 2.9e-3  # m, of the irregularity: the flanges' roots are reached, the flanges are not
-NOISE = {  # ours; the source names no sensors
+NOISE = {  # our choice; the source names no sensors
     "y": 1e-5, "psi": 1e-6, "y_dot": 1e-4, "psi_dot": 1e-5, "y_ddot": 1e-2, "psi_ddot": 0.1,
 }  # fmt: skip
-GUESS, STD = 0.15, 0.1  # conicity, what is believed of it before
+GUESS, STD = 0.15, 0.1  # conicity at the start, and its deviation
 STARTS = (1e-3, 1e-3, 1e-2, 1e-2, 1e-3, 1e-2)  # deviation of the motion at the start
-DRIVEN = (1e-7, 1e-7, 1e-3, 1e-3, 1e-8, 1e-6)  # what the motion's equations may be off by in a second^1/2
-SLIDES = 2e-2  # m, what the irregularity gains in a second^1/2
-KEPT = (1 - SLIDES**2 * DT / DEVIATION**2) ** 0.5  # of it by a sample, so that it keeps its deviation
-TAKEN_FOR_NOISE = 0.5  # of the conicity in a second^1/2, where nothing else explains the irregularity
-FREE, LED = 0.3, 0.1  # the same where the irregularity is estimated, and where a table leads it too
+DRIVEN = (1e-7, 1e-7, 1e-3, 1e-3, 1e-8, 1e-6)  # process noise of the equations of motion per second^1/2
+SLIDES = 2e-2  # m, process noise of the irregularity per second^1/2
+KEPT = (1 - SLIDES**2 * DT / DEVIATION**2) ** 0.5  # share left after a sample; keeps its deviation
+TAKEN_FOR_NOISE = 0.5  # process noise of the conicity per second^1/2, if the irregularity is not estimated
+FREE, LED = 0.3, 0.1  # the same if the irregularity is estimated, and if a table is used too
 NODES = 1e-3 * np.arange(-6.0, 6.1, 0.75)  # m, of the table
-MEMORY = 0.01  # of an estimate's information that a sample leaves in the table
+MEMORY = 0.01  # share of an estimate's information that a sample adds to the table
 START_UP = 2.0  # s
 WAYS = ("constant", "irregularity too", "table")
 FITS = ("one cubic", "piecewise cubics")
@@ -64,7 +64,7 @@ CASES = (DRAWN, replace(DRAWN, name="S1002 on 60E1", duration=20.0, true=OTHER_E
 
 @dataclass(frozen=True)
 class Tried:
-    """All ways through one case: filters by WAYS, fits by FITS, and the table that a filter taught itself."""
+    """The results of one case: filters by WAYS, fits by FITS, and the table that a filter has learnt."""
 
     case: Case
     record: Record
@@ -78,20 +78,20 @@ class Tried:
         return self.record.columns["conicity" + TRUE]
 
     def curve(self, shift: Array) -> Array:
-        """True conicity at shifts (n,), m, that the run came by."""
+        """True conicity at shifts (n,), m, that occur in the run."""
         seen = shift_of(self.record)
         order = np.argsort(seen)
         return np.interp(shift, seen[order], self.true[order])
 
     @property
     def grid(self) -> Array:
-        """Shifts (n,), m, that the run came by more than a few times."""
+        """Shifts (n,), m, that occur in the run more than a few times."""
         low, high = np.percentile(shift_of(self.record), (1, 99))
         return np.linspace(low, high, 200)
 
 
 class Taught(Ekf):
-    """A filter that corrects its table by each of its estimates, as the source has it."""
+    """A filter that corrects its table by each of its estimates, as in the source."""
 
     def __init__(self, table: Tabled, start: Estimate, Q: Array, R: Array) -> None:
         super().__init__(Wheelset(table), start, Q, R, DT)
@@ -106,7 +106,7 @@ class Taught(Ekf):
 
 
 def followed(way: str, record: Record) -> tuple[Followed, Tabled]:
-    """A filter of the outputs alone through a record, and its table, which only the last way uses."""
+    """Run a filter of the outputs alone on a record; returns it with its table, used by the last way only."""
     table = Tabled(NODES, GUESS, STD, MEMORY, KEPT)
     belief: Constant = {"constant": Constant(), "irregularity too": Along(KEPT), "table": table}[way]
     alone = way == WAYS[0]
@@ -120,7 +120,7 @@ def followed(way: str, record: Record) -> tuple[Followed, Tabled]:
 
 
 def tried(case: Case, record: Record, tell: Tell) -> Tried:
-    """Every way through a case."""
+    """Run all filters and fits on a case."""
     filters = {}
     for way in WAYS:
         tell(f"{case.name}: conicity by a filter, {way}")

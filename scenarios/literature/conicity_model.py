@@ -53,7 +53,7 @@ SEEN = slice(2, 4)  # whose rates are measured, beside the first four themselves
 
 
 class Belief(Protocol):
-    """What a filter holds beside the motion: how conicity and irregularity follow from it and move on."""
+    """The states of a filter beside the motion: how conicity and irregularity depend on them and change."""
 
     names: tuple[str, ...]
 
@@ -111,7 +111,7 @@ class Wheelset:
 
 
 class Constant:
-    """Conicity is a constant (eq. 7), and the irregularity is taken for noise."""
+    """Conicity is a constant (eq. 7), and the irregularity is treated as noise."""
 
     names: tuple[str, ...] = ("conicity",)
 

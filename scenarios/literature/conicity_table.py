@@ -1,4 +1,4 @@
-"""Conicity as a spline over the shift that a filter teaches itself while it runs (Charles et al. 2008)."""
+"""Conicity as a spline over the shift that a filter learns while it runs (Charles et al. 2008)."""
 
 import numpy as np
 from scipy.interpolate import CubicSpline

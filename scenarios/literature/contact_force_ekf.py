@@ -43,7 +43,7 @@ COURSE = ("dry", "wet", "poor", "worst", "wet")  # of the transition, its 4.5
 HELD = 2.0  # s of each
 NOISE = {"y_ddot": 1e-2, "psi_dot": 1e-4}  # m/s2, rad/s: sensors as they are sold
 
-# what is believed of the start, and what a linearised contact may be off by in a second^1/2
+# start deviations, and process noise for a linearised contact per second^1/2
 STATES = (
     UnknownState("y", 0.0, std=1e-3, noise=1e-9),
     UnknownState("psi", 0.0, std=1e-3, noise=1e-9),
@@ -75,12 +75,12 @@ CASES = (
 
 
 def declared(case: Case) -> dict[str, float]:
-    """What a filter is told: all but the friction coefficient, as it is at the beginning."""
+    """The problem of the filter: all parameters except friction are known, as they are at the beginning."""
     return {"V": V, **{name: value for name, value in case.true.items() if name != "mu0"}}
 
 
 def followed(case: Case, record: Record, fmu: Path, shape: Shaped | None) -> Followed:
-    """The filter on a record: with the alignment estimated along by a shaping, or known without one."""
+    """Run the filter on a record: with the alignment estimated by a shaping filter, or else known."""
     unknown, inputs = ((shape,), ()) if shape else ((), ALIGNMENT)
     u = record.table(inputs)
     with Joint(fmu, [*NOISE], STATES, [FRICTION], unknown, inputs, declared(case), DT) as joint:
@@ -90,7 +90,7 @@ def followed(case: Case, record: Record, fmu: Path, shape: Shaped | None) -> Fol
 
 
 def shaped(case: Case, record: Record, fmu: Path) -> Shaped:
-    """The shaping that makes the first seconds of a record likeliest."""
+    """The shaping filter for which the first seconds of a record are likeliest."""
     part = record.t < record.t[0] + LEARNT
     first = Record({name: samples[part] for name, samples in record.columns.items()})
     shapes = [Shaped("y_irr", DEVIATION, f, "y_irr_dot", d) for f, d in SHAPES]
@@ -98,7 +98,7 @@ def shaped(case: Case, record: Record, fmu: Path) -> Shaped:
 
 
 def seen(case: Case, record: Record, found: Followed, fmu: Path) -> Seen:
-    """What the estimates say of motion and wheels, as the FMU works it out from them."""
+    """Motion and wheel quantities that the FMU computes from the estimates."""
     free = UnknownParameter("mu0", FRICTION.start, FRICTION.std, Transform("free"))
     X = np.column_stack([found.value[n] for n in (*(s.name for s in STATES), "mu0")])
     rails = found.value if "y_irr" in found.value else record.columns
@@ -131,8 +131,8 @@ def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
 NOTES = (
     "The source's covariances say sensors of 0.3 mm/s2 and 0.3 urad/s; here 10 mm/s2 and 0.1 mrad/s.",
     "Contact geometry is S1002 on 60E1, equivalent conicity about 0.16; the source has a cone of 0.15.",
-    "The filter knows k_A, k_S, A and B of the first condition and is told of no transition.",
-    "The source prints no figures of its errors, only curves.",
+    "The filter knows k_A, k_S, A and B of the first condition and has no information on the transitions.",
+    "The source prints no numbers of its errors, only curves.",
 )
 
 ROW = Row(

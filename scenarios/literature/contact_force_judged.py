@@ -1,4 +1,4 @@
-"""How far off the contact forces, creepages and motions of a filter are, and its spikes at transitions."""
+"""Errors of the contact forces, creepages and motions of a filter, and its spikes at transitions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Seen = Mapping[str, Array]  # quantity -> (N,), of the wheels (N, 2)
 
 @dataclass(frozen=True)
 class Judged:
-    """A filter's way through a case, and what was true; Seen by QUANTITIES."""
+    """The estimates of a filter for a case, and the true values, by QUANTITIES."""
 
     case: Case
     way: str
@@ -38,14 +38,14 @@ class Judged:
         return self.case.truth("mu0", self.found.t)
 
     def error(self, quantity: str) -> Array:
-        """Estimate less truth over the truth's rms."""
+        """Estimate minus truth, divided by the truth's rms."""
         true = self.true[quantity]
         size = float(np.sqrt(np.mean(np.square(true))))
         off: Array = (self.seen[quantity] - true) / size
         return off
 
     def findings(self) -> list[Finding]:
-        """Errors over the run, and what happens at each transition."""
+        """Errors over the run, and the spike and delay at each transition."""
         late, note = self.found.t >= START_UP, self.found.reason
         made = []
         for quantity, words in QUANTITIES.items():

@@ -1,4 +1,4 @@
-"""A filter led through a record, and how far off it was."""
+"""Run a filter on a record, and compute its errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ class Named(Protocol):
         """Of the coordinates."""
 
     def values(self, x: Array, std: Array) -> tuple[Array, Array]:
-        """What x (N, n) and its deviations (N, n) mean, (N, n) each."""
+        """Values and deviations in the FMU's units, (N, n) each, from x (N, n) and its deviations."""
 
 
 @dataclass(frozen=True)
 class Followed:
-    """Estimates through a record, in the FMU's units; nan from where the filter gave up, and why it did."""
+    """Estimates over a record, in the FMU's units; nan after the filter diverged, with the reason."""
 
     t: Array  # (N,), s
     value: Mapping[str, Array]  # (N,)
@@ -41,7 +41,7 @@ class Followed:
 
 
 def follow(filter: Filter, joint: Named, t: Array, u: Array, y: Array) -> Followed:
-    """Lead a filter on that system through inputs u (N, k) and outputs y (N, m) at times t (N,)."""
+    """Run a filter of a system on inputs u (N, k) and outputs y (N, m) at times t (N,)."""
     x, spread = np.full((2, len(t), len(joint.names)), np.nan)
     likelihood, nis, reason = 0.0, 0.0, ""
     begun = perf_counter()

@@ -1,4 +1,4 @@
-"""An hour each on dry and wet rails, output only: does the friction estimate ever warn without a cause?"""
+"""One hour each on dry and wet rails, from outputs only: does the friction estimate give a false alarm?"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,10 +17,10 @@ from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.row import Measured, Row, Tell
 
-ALARM = Alarm(below=CRITICAL)  # as railfmi estimate warns
+ALARM = Alarm(below=CRITICAL)  # the alarm of railfmi estimate
 RAILS = ("dry", "wet")
 PARTS, LENGTH = 6, 600.0  # runs that make the hour, and their duration, s
-LEAD = 5.0  # s; the hour is one of running, not of starts from rest
+LEAD = 5.0  # s; the hour contains no starts from rest
 THIN = 50  # samples of the figure
 
 CASES = tuple(
@@ -32,7 +32,7 @@ CASES = tuple(
 
 
 def probability(found: Followed) -> Array:
-    """That mu0 is below the critical value (N,), by the filter's own deviation; 1 where it has lost it."""
+    """Probability that mu0 is below the critical value (N,), from the filter's deviation; 1 if diverged."""
     below: Array = norm.cdf((CRITICAL - found.value["mu0"]) / found.std["mu0"])
     return np.nan_to_num(below, nan=1.0)
 

@@ -35,7 +35,7 @@ START = {"dry": 0.40, "wet": 0.15, "low": 0.15, "very_low": 0.10}
 SOURCE_RMSE = {"dry": 0.0781, "wet": 0.0457, "low": 0.0367, "very_low": 0.0654}  # Table 4.2
 SOURCE_CROSSING = 25.0  # s after a step from dry rails, thesis 4.6.1; it gives none from wet ones
 LOWEST, HIGHEST = 0.01, 0.6  # eq. 4.8
-STD, WALK = 0.1, 0.005  # of mu0: what is believed of its start, and what it gains in a second^1/2
+STD, WALK = 0.1, 0.005  # of mu0: start deviation, and process noise per second^1/2
 WHEN = 20.0  # s
 START_UP = 2.0  # s, in which an estimate leaves its start
 
@@ -60,7 +60,7 @@ CASES = (
 
 
 def task(case: Case, fmu: Path) -> Task:
-    """Ours: mu0 unknown, and the other parameters those of the condition in which the run begins."""
+    """Our filter: mu0 is unknown, the other parameters are those of the condition at the beginning."""
     first = case.name.split("-")[0]
     declared = {name: value for name, value in CONDITIONS[first].items() if name != "mu0"}
     unknown = UnknownParameter("mu0", START[first], STD, bounded((LOWEST, HIGHEST)), WALK)
@@ -144,8 +144,8 @@ def alignment_error(found: Followed, record: Record) -> float:
 
 
 NOTES = (
-    "(a) knows no alignment: what the track does is taken for noise and for friction.",
-    "(a) takes the source's Q for that of a step, (a') for that of a second; the source does not say which.",
+    "(a) does not know the alignment, so it attributes the effect of the track to noise and friction.",
+    "(a) uses the source's Q per step, (a') per second; the source does not say which is meant.",
     "(b) learns frequency and damping of the alignment's shaping from the first 15 s, by likelihood.",
     "After a step all Polach parameters are others and no filter is told: its mu0 is the one that explains "
     "the motion with the old ones.",

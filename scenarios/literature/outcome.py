@@ -1,4 +1,4 @@
-"""What a row found: figures beside those of its source, and files that show them."""
+"""The result of a row: its numbers beside those of the source, and the files written."""
 
 import json
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All findings of a row, its figures, and what must be known to read them."""
+    """All findings of a row, its figures, and notes needed to understand them."""
 
     row: str
     findings: Sequence[Finding]
@@ -51,7 +51,7 @@ class Outcome:
 
     @property
     def missed(self) -> list[Finding]:
-        """What does not meet its target."""
+        """The findings that do not meet their target."""
         return [f for f in self.findings if f.met is False]
 
     @property

@@ -1,4 +1,4 @@
-"""One panel a case: a parameter over time, as it is and as filters find it."""
+"""One panel for each case: a parameter over time, with its true value and its estimates."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -26,7 +26,7 @@ BOTH = 2.0  # sides: the source gives the total
 TOTAL = BOTH * 1e-6  # from N/m of one side to the MN/m of the tables
 TRUE, START, DROPPED = 6e6 / BOTH, 4e6 / BOTH, 4e6 / BOTH  # N/m of one side
 SETTING = {**CONDITIONS["dry"], "F_n": 50e3, "patch": 1.0}  # N, virtual penetration: thesis 4.6.2
-STD, WALK = 1e6, 2e5  # N/m of one side: what is believed of the start, and gained in a second^1/2
+STD, WALK = 1e6, 2e5  # N/m of one side: start deviation, and process noise per second^1/2
 BOUNDS = (1e5, 2e7)
 WHEN = 20.0  # s
 NEAR = 0.1  # of the true value, within which a step counts as found
@@ -91,7 +91,7 @@ def _within(since: Array, k: Array, true: Array) -> float:
 
 
 NOTES = (
-    "The source draws its estimates and prints no figures of them.",
+    "The source draws its estimates but prints no numbers.",
     "Truth and filter find the patch by virtual penetration, as the source does here (its 3.2.2).",
     "The truth's contact search, patch and integration are its own code.",
 )

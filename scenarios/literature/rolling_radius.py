@@ -24,9 +24,9 @@ SOURCE = {  # mm, thesis 4.6.4
     ("30 km/h", "from 320 mm"): 0.8233,
     ("30 km/h", "from 400 mm"): 1.0139,
 }
-PATCH = 2.7e-3  # m, of the circle that the filter believes in
-STD = 0.03  # m, what is believed of the start
-SLIP_STD = 0.3  # rad/s2 in a second^1/2: what a wrong patch leaves in either equation
+PATCH = 2.7e-3  # m, circular contact patch assumed by the filter
+STD = 0.03  # m, start deviation
+SLIP_STD = 0.3  # rad/s2 per second^1/2: process noise for the error of a wrong patch
 BOUNDS = (0.2, 0.6)
 MM = 1e3
 
@@ -75,7 +75,7 @@ def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
 
 NOTES = (
     "The source's data, measured on its rig, are not public; these are a truth model's, every 1 ms.",
-    "The filter believes in a circle of 2.7 mm, as the source does; the truth's patch is an ellipse.",
+    "The filter assumes a circular patch of 2.7 mm, as the source does; the true patch is an ellipse.",
 )
 
 ROW = Row(

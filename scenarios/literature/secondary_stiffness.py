@@ -130,7 +130,7 @@ def _localised(case: Case, found: Followed) -> list[Finding]:
 NOTES = (
     "The source's rule adds the weighted sum of residuals to k1 as it is, whatever their sign means for it; "
     "here each residual counts by how k1 moves it, which is what least squares asks for.",
-    "The source gives no figures but its curves; its end values stand in the column of the source.",
+    "The source gives only curves; their end values are in the column of the source.",
 )
 
 ROW = Row(

@@ -1,4 +1,4 @@
-"""Records made by the FMU itself: for trying a row, not for judging it, since nothing in them is unknown."""
+"""Records simulated by the FMU itself: for a first try of a row only, as model and truth are the same."""
 
 from collections.abc import Callable
 from itertools import pairwise

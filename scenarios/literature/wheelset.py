@@ -1,4 +1,4 @@
-"""What the wheelset's rows share: measurements, filters with and without the alignment, its shaping."""
+"""Shared parts of the wheelset's rows: measurements, filters with and without the alignment, shaping."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ ALIGNMENT = ("y_irr", "y_irr_dot")
 NOISE = {"y": 1e-4, "psi": 1e-5, "y_dot": 1e-3, "psi_dot": 1e-3}
 MEASURED = tuple(NOISE)
 
-# what is believed of the start, and what the equations may be off by in a second^1/2; a run begins at rest
+# start deviations, and process noise per second^1/2; a run begins at rest
 STATES = (
     UnknownState("y", 0.0, std=1e-3, noise=1e-9),
     UnknownState("psi", 0.0, std=1e-3, noise=1e-9),
@@ -34,7 +34,7 @@ SHAPES = tuple((f, d) for f in (1.0, 1.5, 2.0, 2.5) for d in (0.7, 1.0, 1.5))  #
 
 @dataclass(frozen=True)
 class Task:
-    """What a filter of the wheelset is to find: one parameter, with the others as they are declared."""
+    """The problem of a wheelset filter: one unknown parameter, the others as declared."""
 
     fmu: Path
     parameter: UnknownParameter
@@ -46,12 +46,12 @@ class Task:
             return self._followed(joint, record, record.table(ALIGNMENT))
 
     def along(self, record: Record, shape: Shaped) -> Followed:
-        """From the outputs alone, with the alignment estimated along."""
+        """Run the filter on the outputs alone, with the alignment estimated as well."""
         with self._joint((shape,), ()) as joint:
             return self._followed(joint, record, record.table(()))
 
     def shaped(self, record: Record) -> Shaped:
-        """The shaping of the alignment that makes the first seconds of a record likeliest."""
+        """The shaping filter of the alignment for which the first seconds of a record are likeliest."""
         part = record.t < record.t[0] + LEARNT
         first = Record({name: samples[part] for name, samples in record.columns.items()})
         shapes = [Shaped("y_irr", DEVIATION, f, "y_irr_dot", d) for f, d in SHAPES]

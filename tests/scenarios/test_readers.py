@@ -339,7 +339,7 @@ def test_the_time_named_chooses_the_rows(rates):
 
 def test_a_time_that_may_be_several_is_refused(rates):
     with pytest.raises(
-        BadInput, match="time 'time' may be 'fast/time', 'slow/time'; write the one"
+        BadInput, match="time 'time' may be 'fast/time', 'slow/time'; give the full name"
     ) as refused:
         sheet(rates, "time", "x")
     assert str(rates) in str(refused.value)
@@ -376,7 +376,7 @@ def test_groups_of_equal_times_are_one(tmp_path):
 
 def test_a_name_in_two_groups_needs_its_group(tmp_path):
     mdf(tmp_path / "a.mf4", {"a": {"time": FAST, "y": FAST}, "b": {"time": FAST, "y": 2 * FAST}})
-    with pytest.raises(BadInput, match="column 'y' may be 'a/y', 'b/y'; write the one that is meant"):
+    with pytest.raises(BadInput, match="column 'y' may be 'a/y', 'b/y'; give the full name"):
         sheet(tmp_path / "a.mf4", "time", "y")
     assert_array_equal(sheet(tmp_path / "a.mf4", "time", "b/y").cells["b/y"], 2 * FAST)
     assert {"a/y", "b/y"} <= set(READERS[".mf4"](tmp_path / "a.mf4"))

@@ -164,7 +164,11 @@ BAD_USE = [
     ("[derived.accel]", "[derived.torque]", "[derived.torque] has the name of a column"),
     ('"data.csv"', '"nodata.csv"', "cannot be read (No such file or directory)"),
     ('"data.csv"', '"data.mf4"', "cannot be read (No such file or directory)"),
-    ('"data.csv"', '"data.xyz"', "is of no known kind; known are .csv, .mat, .mdf, .mf4, .parquet, .tdms"),
+    (
+        '"data.csv"',
+        '"data.xyz"',
+        "has no known format; convert it to one of .csv, .mat, .mdf, .mf4, .parquet, .tdms",
+    ),
 ]
 
 

@@ -76,7 +76,7 @@ REFUSED = [
     (hole("torque"), True, "column 'torque' has no number in 1 of 1001 rows, first at 0.05 s"),
     (hole("n_wheel", np.inf), True, "column 'n_wheel' has no number in 1 of 1001 rows"),
     (hole("n_wheel"), False, "column 'n_wheel' has no number in 1 of 1001 rows"),
-    ({"n_wheel": np.full(1001, np.nan)}, True, "column 'n_wheel' has no numbers to speak of"),
+    ({"n_wheel": np.full(1001, np.nan)}, True, "column 'n_wheel' has almost no numbers"),
 ]
 
 
@@ -141,7 +141,9 @@ def test_missing_measurements_are_a_lower_rate(vdp, tmp_path, smooth):
 def test_measurements_too_few_for_their_noise_or_the_rate(vdp, tmp_path):
     file = thinned(write_vdp(tmp_path, vdp), 100)
     file.write_text(file.read_text().replace("noise_std = 0.05\n", ""))
-    with pytest.raises(BadInput, match=r"\[outputs.x0\] has 4 measurements, too few to tell its noise; add"):
+    with pytest.raises(
+        BadInput, match=r"\[outputs.x0\] has 4 measurements, too few to estimate its noise; add"
+    ):
         estimate(file)
     data = tmp_path / "data.csv"
     cells = pd.read_csv(data)

@@ -564,7 +564,7 @@ def spoilt(**changes) -> dict:
     ("table", "columns", "words"),
     [
         (FILE | {"data": "no.csv"}, record(), "no.csv: data file cannot be read"),
-        (FILE | {"data": "track.xyz"}, record(), "is of no known kind; known are .csv"),
+        (FILE | {"data": "track.xyz"}, record(), "has no known format; convert it to one of .csv"),
         (FILE | {"distance": {"column": "kmm", "unit": "km"}}, record(), "column 'kmm' is not in"),
         (
             FILE | {"distance": {"column": "km", "unit": "s"}},
@@ -583,8 +583,8 @@ def spoilt(**changes) -> dict:
             "speed column 'level' is not greater than 0",
         ),
         (FILE, {k: v[:1] for k, v in record().items()}, "has one row of data; a track needs at least two"),
-        (FILE | {"V": 20.0}, record(), "[track] needs either 'V' or [speed] with [time]"),
-        (over_time(), record(), "[track] needs either 'V' or [speed] with [time], and only then"),
+        (FILE | {"V": 20.0}, record(), "[track] needs either 'V' or [speed] if [time] is given"),
+        (over_time(), record(), "[track] needs either 'V' or [speed] if [time] is given, and neither"),
         (over_time(V=-1.0), record(), "key 'track.V' must be greater than 0, not '-1.0'"),
         (FILE | {"time": {"column": "t", "unit": "s"}}, record(), "needs either [distance] or [time]"),
         (FILE | {"columns": {}}, record(), "key 'track.columns' must hold at least one entry"),

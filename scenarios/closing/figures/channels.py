@@ -61,7 +61,7 @@ def record_plots(problem: Problem, words: Glossary) -> Iterator[Plot]:
         yield Plot(
             f"record{ending}",
             figure,
-            "Measured inputs and outputs. Shaded: the test part, which was used neither for fitting nor for choosing.",
+            "Inputs and outputs. Shaded: the test part, used neither for fitting nor for choosing.",
         )
 
 
@@ -89,11 +89,7 @@ def residual_plots(
 
 def _residual_caption(zoom: bool) -> str:
     text = "Residual: measured minus simulated output in free simulation. Shaded: the test part."
-    more = (
-        " The lower panels show the residual after the effect was added, at the scale of the noise."
-        if zoom
-        else ""
-    )
+    more = " The lower panels show the residual after, at the scale of the noise." if zoom else ""
     return f"{text}{more} Dashed: ± 2 standard deviations of the noise."
 
 

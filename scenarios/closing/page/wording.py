@@ -74,8 +74,8 @@ def missed_words(case: Case) -> str:
     if not case.found.forces:
         return "The FMU gives no access to its states or has no ports, so no missing force could be inferred."
     how = (
-        "The missing force of a port is the force that would have to act there to remove the residual. No law "
-        "is assumed for it, only that the whole missing force acts at this one port. "
+        "The missing force of a port is the force that would have to act there to remove the residual. No "
+        "law is assumed for it, only that the whole missing force acts at this one port. "
     )
     if case.result.verdict == "no_discrepancy":
         return f"{how}No discrepancy was found: these forces are noise, or too small to matter."
