@@ -150,7 +150,7 @@ def test_measurements_too_few_for_their_noise_or_the_rate(vdp, tmp_path):
     cells["x"] = cells["x"].shift(1)
     cells.to_csv(data, index=False)
     file.write_text(file.read_text() + "rate = 10.0\n")
-    with pytest.raises(BadInput, match="rate leaves no measurement of output 'x0'; use a higher one"):
+    with pytest.raises(BadInput, match="rate leaves no measurement of output 'x0'; use a higher rate"):
         estimate(file)
 
 
