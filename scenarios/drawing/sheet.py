@@ -21,7 +21,7 @@ WIDTH = 6.5  # inches; 9 pt text then has about the size of the page's text
 DPI = 170
 COLOURS = 96  # dots per inch of a PNG: enough for smooth lines in a small file
 POINTS = 700  # points of an envelope: about what the width of a figure can show
-ROWS = 4  # panels above one another before a second sheet is begun
+ROWS = 4  # largest number of panels above one another on a sheet
 Item = TypeVar("Item")
 
 

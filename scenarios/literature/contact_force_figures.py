@@ -90,5 +90,5 @@ def _pair(ax: Axes, t: Array, true: Array, found: Array) -> None:
 
 
 def _left(x: Array) -> Array:
-    """The left wheel of (N, 2), or (N,) as it is."""
+    """The values of the left wheel from (N, 2); (N,) is returned unchanged."""
     return x[:, 0] if np.ndim(x) == 2 else x

@@ -86,7 +86,7 @@ class Judged:
         return [*(when for when, _ in self.case.jumps[1:]), self.case.duration]
 
     def _found(self, when: float, until: float) -> float:
-        """Time [s] from a transition to mu0's first coming near its new value; inf where it does not."""
+        """Time [s] from a transition until mu0 is first near its new value; inf if it never is."""
         part = (self.found.t >= when) & (self.found.t < until)
         near = np.abs(self.found.value["mu0"] - self.mu0)[part] <= NEAR * self.mu0[part]
         return float(self.found.t[part][int(np.argmax(near))] - when) if near.any() else np.inf

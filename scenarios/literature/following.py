@@ -29,7 +29,7 @@ class Followed:
     t: Array  # (N,), s
     value: Mapping[str, Array]  # (N,)
     std: Mapping[str, Array]  # (N,)
-    log_likelihood: float  # of all innovations; -inf where it gave up
+    log_likelihood: float  # of all innovations; -inf if the filter diverged
     nis: float  # mean over the samples
     seconds: float  # it took
     reason: str = ""
@@ -71,6 +71,6 @@ def rmse(found: Array, true: Array) -> float:
 
 
 def first_below(t: Array, x: Array, limit: float, since: float) -> float:
-    """Time [s] from `since` to the first sample below a limit; inf where none is."""
+    """Time [s] from `since` to the first sample below a limit; inf if there is none."""
     hit = (t >= since) & (x < limit)
     return float(t[int(np.argmax(hit))] - since) if hit.any() else np.inf

@@ -55,7 +55,7 @@ def friction_figure(measured: Measured, found: Found) -> Plot:
 
 
 def _mean(x: Array) -> Array:
-    """Moving mean (N,) of the last samples: what is published wanders over its whole range between two."""
+    """Moving mean (N,) of the last samples, as the published filter's estimate moves over its whole range."""
     total = np.cumsum(np.insert(np.nan_to_num(x), 0, 0.0))
     last = np.arange(1, len(x) + 1)
     first = np.maximum(last - WINDOW, 0)

@@ -13,9 +13,9 @@ Bound = Literal["<=", ">="]
 
 @dataclass(frozen=True)
 class Finding:
-    """One figure: of which case, what it is, ours, the source's where it gives one, and what was aimed at.
+    """One number of a case: its meaning, our value, the source's value if it gives one, and the target.
 
-    note: why it is as it is, where that needs words.
+    note: an explanation of the number, if it needs one.
     """
 
     case: str

@@ -16,7 +16,7 @@ EVERY = 10  # samples between two linearisations about the parameter in use
 
 @dataclass(frozen=True)
 class Weighted:
-    """weights: of the outputs' residuals (m,), beside their noise; memory: s, of what was seen."""
+    """weights: of the outputs' residuals (m,), besides their noise; memory: s, time to forget old samples."""
 
     weights: Array
     memory: float

@@ -37,7 +37,7 @@ CASES = (STATIC, replace(STATIC, name="drop", later={"k_y": DROPPED}, when=WHEN)
 
 
 def task(fmu: Path) -> Task:
-    """k_y unknown, all else as it is."""
+    """The problem of the filter: k_y is unknown, all other parameters are known."""
     unknown = UnknownParameter("k_y", START, STD, bounded(BOUNDS), WALK)
     return Task(fmu, unknown, SETTING)
 
@@ -84,7 +84,7 @@ def _judged(case: Case, way: str, found: Followed) -> list[Finding]:
 
 
 def _within(since: Array, k: Array, true: Array) -> float:
-    """Time [s] after which the estimate stays near; inf where it never does."""
+    """Time [s] after which the estimate stays near the true value; inf if it never does."""
     far = np.flatnonzero((since >= 0) & ~(np.abs(k - true) <= NEAR * true))
     last = int(far[-1]) + 1 if len(far) else int(np.argmax(since >= 0))
     return float(since[last]) if last < len(since) else np.inf

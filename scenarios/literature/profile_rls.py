@@ -33,7 +33,7 @@ ENOUGH = 100  # samples in a bin before it counts
 FLANGE = 5.5e-3  # m of shift, beyond which the flange comes into it
 COMBINATIONS = ("r_L + r_R", "r_L - r_R", "delta_L + delta_R", "delta_L - delta_R")
 SLOPES = ("r_L - r_R, slope", "delta_L - delta_R, slope")  # within a bin, where both change fastest
-KNOWN_TO = np.array([5e-3, 5e-3, 0.5, 0.5, 1.0, 100.0])  # m, m, rad, rad, 1, rad/m: what is believed before
+KNOWN_TO = np.array([5e-3, 5e-3, 0.5, 0.5, 1.0, 100.0])  # m, m, rad, rad, 1, rad/m: start deviations
 NOISE = {  # ideal sensors, as the source has them; the accelerometers' noise is ours
     **dict.fromkeys(("y", "psi", "phi", "y_dot", "psi_dot", "phi_dot", "y_m", "y_m_dot"), 0.0),
     "y_ddot": 1e-3, "psi_ddot": 1e-3,
@@ -196,7 +196,7 @@ def _figure(case: Case, true: Curves, found: Curves, low: Array, high: Array) ->
 
 NOTES = (
     "Profiles are S1002 on 60E1 1:40; the source has a worn P8 on a 113A rail, which are not public.",
-    "Alignment is known, as in the source; gauge is not, and what it does makes the region.",
+    "Alignment is known, as in the source; gauge is not, and its effect sets the region.",
     "The source's Fig. 7 has the sum of the radii within that region; it draws no other combination.",
 )
 

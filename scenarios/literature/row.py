@@ -1,4 +1,4 @@
-"""The contract of a row: what it asks to be measured, and what it makes of it."""
+"""The interface of a row: the cases to be measured, and the estimates made from their records."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

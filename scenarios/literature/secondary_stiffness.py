@@ -62,7 +62,7 @@ def stiffness() -> UnknownParameter:
 
 
 def healths() -> dict[str, UnknownParameter]:
-    """The health of each secondary spring, sound as far as is known."""
+    """The problem of localisation: the health of each secondary spring, which starts as sound."""
     names = [f"h_k1_{c}" for c in CORNERS]
     return {n: UnknownParameter(n, 1.0, HEALTH_STD, bounded((0.05, 3.0)), HEALTH_WALK) for n in names}
 
@@ -128,8 +128,8 @@ def _localised(case: Case, found: Followed) -> list[Finding]:
 
 
 NOTES = (
-    "The source's rule adds the weighted sum of residuals to k1 as it is, whatever their sign means for it; "
-    "here each residual counts by how k1 moves it, which is what least squares asks for.",
+    "The source's rule adds the weighted sum of residuals to k1, whether or not a positive one means a larger "
+    "k1; here each residual is weighted by its sensitivity to k1, as in least squares.",
     "The source gives only curves; their end values are in the column of the source.",
 )
 

@@ -29,7 +29,7 @@ REST = 5.0  # s without torque at the beginning and the end, there
 
 
 def twin(fmu: Path) -> Source:
-    """Makes a case's record by a free run of the FMU, with noise."""
+    """Makes the record of a case by a free simulation of the FMU, with noise."""
 
     def make(case: Case) -> Record:
         _check(case, fmu)

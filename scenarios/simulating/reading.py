@@ -10,7 +10,7 @@ from scenarios.experiment.validation import of_file, read_table, read_toml
 from scenarios.simulating.declaration import Declaration
 
 KEPT = ("id", "question", "expect", "figure", "variants")  # the same for all variants
-SINGLE = "run"  # name of the only variant where none is given
+SINGLE = "run"  # name of the only variant if none is declared
 RESERVED = ("sensors", "contact", "pi", "e")
 
 

@@ -19,7 +19,7 @@ DEFECT = "defect"  # the kind of a table that has a shape
 def read_track(table: Mapping[str, Any], folder: Path, key: str = "track") -> Track:
     """The track declared by a table; files are read relative to a folder.
 
-    `key` is where the table stands in its file. Raises BadInput of one line for what is wrong.
+    `key` is where the table stands in its file. Raises BadInput with one line for any error.
     """
     tables = _tables(table, key)
     return reduce(add, (_part(part, folder, place) for part, place in tables))

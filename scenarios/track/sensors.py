@@ -63,7 +63,7 @@ class Sensor(Table):
 
 
 def read_sensors(table: object, key: str = "sensors") -> dict[str, Sensor]:
-    """Sensors by name from a table of tables; BadInput of one line for what is wrong in it."""
+    """Sensors by name from a table of tables; raises BadInput with one line for any error."""
     if not isinstance(table, Mapping):
         raise BadInput(f"key '{key}' must be a table of tables [{key}.NAME], not {str(table)[:60]!r}")
     return {str(name): read_table(Sensor, entry, f"{key}.{name}") for name, entry in table.items()}

@@ -74,7 +74,7 @@ class Track:
 
         distance: (N,) m, increasing, N >= 2; given: (N,) m by name, either the rails of a direction (`y_left`
         and `y_right`, `z_left` and `z_right`) or its mean and difference (`alignment` and `gauge`, `level`
-        and `cross_level`); what is left out is 0. Raises ValueError for what makes no track.
+        and `cross_level`); quantities left out are 0. Raises ValueError for unusable data.
         """
         s = np.array(distance, dtype=np.float64)
         if s.ndim != 1 or s.size < 2 or not (np.isfinite(s).all() and (np.diff(s) > 0).all()):
