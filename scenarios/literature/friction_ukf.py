@@ -147,8 +147,8 @@ NOTES = (
     "(a) does not know the alignment, so it attributes the effect of the track to noise and friction.",
     "(a) uses the source's Q per step, (a') per second; the source does not say which is meant.",
     "(b) learns frequency and damping of the alignment's shaping from the first 15 s, by likelihood.",
-    "At a step all Polach parameters change, which no filter knows: the estimated mu0 explains the motion with "
-    "the old values of the others.",
+    "At a step all Polach parameters change, which no filter knows: the estimated mu0 explains the motion "
+    "with the old values of the others.",
 )
 
 ROW = Row(

@@ -128,8 +128,8 @@ def _localised(case: Case, found: Followed) -> list[Finding]:
 
 
 NOTES = (
-    "The source's rule adds the weighted sum of residuals to k1, whether or not a positive one means a larger "
-    "k1; here each residual is weighted by its sensitivity to k1, as in least squares.",
+    "The source's rule adds the weighted sum of residuals to k1, whether or not a positive one means a "
+    "larger k1; here each residual is weighted by its sensitivity to k1, as in least squares.",
     "The source gives only curves; their end values are in the column of the source.",
 )
 
