@@ -10,16 +10,10 @@ from scenarios.cli.console import Out, app, said
 
 @app.command("close-loop")
 def close_loop(
-    experiments: Annotated[
-        list[Path], typer.Argument(help="experiment.toml, or its folder; several are compared")
-    ],
+    experiments: Annotated[list[Path], typer.Argument(help="experiment.toml, or its folder; or several")],
     out: Out = Path("out"),
-    data: Annotated[
-        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="number of processes; by default one per core")
-    ] = None,
+    data: Annotated[Path | None, typer.Option(help="folder of the data files, if elsewhere")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="processes; one per core by default")] = None,
     seed: Annotated[int, typer.Option(help="seed of the random numbers")] = 0,
     resume: Annotated[
         bool, typer.Option("--resume", help="continue from the checkpoints of an interrupted run")
