@@ -8,6 +8,7 @@ import signal
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.challenge.ablation import table
 from benchmarks.challenge.draw import plans
 from benchmarks.challenge.match import Answer
 from benchmarks.challenge.run import Challenge, run
@@ -27,12 +28,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="leave out the others")
     parser.add_argument("--only-make", action="store_true", help="make the records, answer none")
     parser.add_argument("--so-far", action="store_true", help="the scoreboard of what is answered already")
+    parser.add_argument("--ablate", action="store_true", help="what each limit of the policy does, too")
     a = parser.parse_args(arguments)
     for stopping in (signal.SIGINT, signal.SIGTERM):  # both end the record's process too
         signal.signal(stopping, signal.default_int_handler)
     seed = secrets.randbelow(10**6) if a.seed is None else a.seed
     chosen = [p for p in plans(seed, a.count) if p.system in a.systems]
-    challenge = Challenge(a.out / f"seed-{seed}-{a.count}", seed, a.limit, a.cores)
+    challenge = Challenge(a.out / f"seed-{seed}-{a.count}", seed, a.limit, a.cores, a.ablate)
     print(f"seed {seed}: {len(chosen)} records in {challenge.folder}", flush=True)
     if a.only_make:
         for plan in chosen:
@@ -46,6 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     (challenge.folder / "all.md").write_text(every, encoding="utf-8")
     (challenge.folder / "scoreboard.md").write_text(markdown(marked, seed, a.count), encoding="utf-8")
     print(text(marked, seed, a.count))
+    answers = [(truth, kept["ablation"]) for truth, kept in found if "ablation" in kept]
+    if answers:
+        (challenge.folder / "ablation.md").write_text(table(answers, seed), encoding="utf-8")
 
 
 if __name__ == "__main__":

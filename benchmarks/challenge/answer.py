@@ -1,23 +1,40 @@
-"""One record closed in a process of its own: `python -m benchmarks.challenge.answer RECORD ANSWER CORES`."""
+"""One record closed in a process of its own: `python -m benchmarks.challenge.answer RECORD ANSWER CORES`.
+
+With a further argument `ablate` its fits are judged again by every policy of the ablation.
+"""
 
 from __future__ import annotations
 
 import json
 import resource
 import sys
+import tempfile
+import time
 from dataclasses import asdict
 from pathlib import Path
 
-from scenarios import close_loop
+from benchmarks.challenge.ablation import ablated
+from estimator.closeloop.checkpoints import Stages
+from estimator.plant import PLANTS
+from scenarios.closing.closing import Posed, builder_for, closed, experiment_of, pose
 
 
 def main() -> None:
     """Close the loop on a record and write the result with the processor time that it took."""
     record, answer, cores = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-    result = close_loop(record, jobs=cores or None)
+    begun, kept = time.monotonic(), {}
+    declared = experiment_of(record)
+    with tempfile.TemporaryDirectory() as work:
+        builder = builder_for(declared, Path(work))
+        posed = Posed(declared, builder, pose(declared, builder))
+        found, result = closed(posed, None, lambda _: None, cores or None, 0, begun, Stages())
+        if "ablate" in sys.argv[4:]:
+            kept["ablation"] = ablated(found)
+            PLANTS.close()
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     cpu = sum(u.ru_utime + u.ru_stime for u in used)
-    answer.write_text(json.dumps({"result": asdict(result), "cpu_seconds": round(cpu, 1)}), encoding="utf-8")
+    told = {"result": asdict(result), "cpu_seconds": round(cpu, 1), **kept}
+    answer.write_text(json.dumps(told), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ class Challenge:
     seed: int
     limit: float = 1800.0
     cores: int = 0  # of one record, 0: all
+    ablate: bool = False  # judge the fits of each record again by the policies of the ablation
 
     def truth(self, plan: Plan) -> Truth:
         """The record's truth; both are made where they are not there yet."""
@@ -67,7 +68,7 @@ class Challenge:
     def command(self, record: Path, answer: Path) -> list[str]:
         """What closes one record."""
         own = [sys.executable, "-m", "benchmarks.challenge.answer"]
-        return [*own, str(record), str(answer), str(self.cores)]
+        return [*own, str(record), str(answer), str(self.cores), *(["ablate"] if self.ablate else [])]
 
 
 def closed(command: Sequence[str], answer: Path, limit: float, stop: Event = STOP) -> Kept:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from benchmarks.challenge import run as running
+from benchmarks.challenge.ablation import ablated, table, variants
 from benchmarks.challenge.bench import NO_MORE, bench
 from benchmarks.challenge.draw import Plan, counts, plans
 from benchmarks.challenge.make import (
@@ -52,6 +53,9 @@ from benchmarks.challenge.truth import (
     Item,
     Truth,
 )
+from estimator.closeloop.policy import DEFAULT
+from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.carriage import coulomb, looked_at, problem, record, to_and_fro
 from tests.truth.wheelset_motion import places as wheelset_places
 
 VOCABULARY = [  # the contract's kinds
@@ -531,3 +535,27 @@ def test_the_chain_answers_a_record_from_end_to_end(tmp_path):
 def test_outputs_of_the_menu_are_those_of_the_benches():
     for system in ("rig", "wheelset"):
         assert tuple(bench(system, np.random.default_rng(1)).noise) == OUTPUTS[system]
+
+
+# ---- ablation
+
+
+def test_every_policy_of_the_ablation_has_one_other_limit():
+    versions = [policy.version for _, _, policy in variants()]
+    assert DEFAULT.version not in versions
+    assert len({(name, how) for name, how, _ in variants()}) == len(versions)
+
+
+def test_the_ablation_judges_by_the_default_as_the_chain_did(tmp_path):
+    asked = problem(ModelBuilder("drive", tmp_path), record(to_and_fro(2.0), coulomb(40.0), 1))
+    found = looked_at("one", asked, ("coulomb_friction",)).found
+    answers = ablated(found)
+    assert found.judgement.verdict == "traced"
+    assert answers["default"][""] == ("traced", [("coulomb_friction", "carriage")])
+    assert answers["detection.level"]["0"][0] == "no_discrepancy"
+    assert answers["decision.significant"]["no end"][0] == "unexplained"
+    there = truth("single", Item("coulomb_friction", "carriage"))
+    rows = {line.split("`")[1]: line for line in table([(there, answers)], 7).splitlines() if "`" in line}
+    assert rows.keys() == answers.keys() - {"default"}
+    assert "right to abstained: 1" in rows["decision.significant"]
+    assert "right" not in rows["decision.excited"]

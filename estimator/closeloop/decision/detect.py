@@ -25,13 +25,16 @@ class Detection:
     """Whether a residual is more than noise, and whether it matters.
 
     p_value: of the most telling figure, corrected for their number, which counts below `level`; figures:
-    observed over the 95 % point of noise; importance: size of the residual over the least that matters.
+    observed over the 95 % point of noise; importance: size of the residual over the least that matters;
+    likeness, sets_in: see `detect`.
     """
 
     level: float
     p_value: float
     figures: Mapping[str, float]
     importance: float
+    likeness: float = 1.0
+    sets_in: bool = False
 
     @property
     def detected(self) -> bool:
@@ -83,7 +86,7 @@ def detect(
     p_value = min(1.0, len(p_values) * float(min(p_values)))
     clear = figures.get(LIKENESS, 0.0) >= limits.clear_likeness
     size = form_of(baseline).importance(likeness, sets_in, clear)
-    return Detection(limits.level, p_value, figures, size)
+    return Detection(limits.level, p_value, figures, size, likeness, sets_in)
 
 
 def _sensitivities(baseline: Baseline) -> Array:

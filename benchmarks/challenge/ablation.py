@@ -1,0 +1,132 @@
+"""Ablation: a record's fits judged again by policies of which one limit has another value."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from unittest.mock import patch
+
+from benchmarks.challenge.match import Answer, judged
+from benchmarks.challenge.truth import Truth
+from estimator.closeloop.decision import law_form
+from estimator.closeloop.decision.allowed import allowed
+from estimator.closeloop.decision.detect import LIKENESS, Detection
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
+from estimator.closeloop.evidence import Judgement
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.outcome import Outcome
+from estimator.closeloop.policy import DEFAULT, Policy
+from estimator.closeloop.screening.missing_force import MissingForce
+
+Told = tuple[str, list[tuple[str, str]]]  # verdict, and kind and place of what is named
+Answers = dict[str, dict[str, Told]]  # by limit and change
+
+STAGES = ("detection", "decision")  # limits of the search decide what is fitted: these need new fits
+NEEDS_DRAWS = ("detection.replicates", "detection.slow_blocks")  # the noise would have to be drawn again
+REFITS = ("errors_reach", "errors_apart", "errors_laws")  # limits that move hypotheses by their errors
+FACTORS = {"0": 0.0, "half": 0.5, "double": 2.0, "no end": 1e12}
+SEARCHED = "would be searched"  # of a residual that the default leaves alone, so that there are no fits
+
+
+def variants() -> Iterator[tuple[str, str, Policy]]:
+    """Name of a limit, word for its change, and the policy with it."""
+    for name, value, _ in DEFAULT.limits():
+        stage, _, short = name.partition(".")
+        if stage not in STAGES or name in NEEDS_DRAWS:
+            continue
+        group = getattr(DEFAULT, stage)
+        for how, factor in FACTORS.items():
+            changed = round(value * factor) if isinstance(value, int) else value * factor
+            yield name, how, replace(DEFAULT, **{stage: replace(group, **{short: changed})})
+
+
+def ablated(found: Outcome) -> Answers:
+    """The answers to a record by every policy, from its fits; those of the default under "default"."""
+    again = _Again(found)
+    with patch.object(law_form, "curvature", again.curvature):
+        answers: Answers = {"default": {"": again.answer(DEFAULT)}}
+        for name, how, policy in variants():
+            answers.setdefault(name, {})[how] = again.answer(policy)
+    return answers
+
+
+@dataclass
+class _Again:
+    """What the chain found in a record, judged again; simulations are made once for all policies."""
+
+    found: Outcome
+    usual: list[Hypothesis] | None = None  # single hypotheses, moved as their errors allow
+    curves: dict[int, tuple[float, float]] = field(default_factory=dict)
+    _curvature = staticmethod(law_form.curvature)
+
+    def curvature(
+        self, baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]
+    ) -> tuple[float, float]:
+        """See law_form.curvature."""
+        if id(h) not in self.curves:
+            self.curves[id(h)] = self._curvature(baseline, h, forces)
+        return self.curves[id(h)]
+
+    def answer(self, policy: Policy) -> Told:
+        """What a policy makes of the fits."""
+        found = self.found
+        baseline = found.baseline.asked(replace(found.baseline.problem, policy=policy))
+        before, early = without_fits(baseline, self._detection(baseline))
+        if early:
+            return early.verdict, []
+        if not found.singles and not found.pairs:
+            return SEARCHED, []
+        singles = form_of(baseline).ranked(self._moved(baseline))
+        leading = judge(baseline, singles, found.pairs, found.detection.sets_in)
+        leading = leading.of([*found.singles, *found.pairs])
+        told = confirmed_on_test(baseline, law_form.confirmed(baseline, leading, found.forces))
+        return told.after(before).verdict, _named(told)
+
+    def _detection(self, baseline: Baseline) -> Detection:
+        limits, seen = baseline.policy.detection, self.found.detection
+        clear = seen.figures.get(LIKENESS, 0.0) >= limits.clear_likeness
+        size = form_of(baseline).importance(seen.likeness, seen.sets_in, clear)
+        return replace(seen, level=limits.level, importance=size)
+
+    def _moved(self, baseline: Baseline) -> list[Hypothesis]:
+        if any(getattr(baseline.policy.decision, n) != getattr(DEFAULT.decision, n) for n in REFITS):
+            return allowed(baseline, self.found.singles)
+        if self.usual is None:
+            self.usual = allowed(baseline, self.found.singles)
+        return self.usual
+
+
+def _named(judgement: Judgement) -> list[tuple[str, str]]:
+    return list(dict.fromkeys((c.kind, c.location) for h in judgement.members for c in h.candidates))
+
+
+def word(truth: Truth, told: Told) -> str:
+    """One word on an answer; see benchmarks.challenge.match.judged."""
+    verdict, names = told
+    if verdict == SEARCHED:
+        return verdict
+    return judged(truth, Answer(verdict, tuple((kind, at) for kind, at in names)))
+
+
+def table(found: Sequence[tuple[Truth, Answers]], seed: int) -> str:
+    """What each change of a limit does to the answers, as a Markdown table."""
+    usual = Counter(word(t, a["default"][""]) for t, a in found)
+    counted = ", ".join(f"{n} {w}" for w, n in sorted(usual.items()))
+    lines = [f"Seed {seed}, {len(found)} records. By the default: {counted}.", ""]
+    lines += ["| limit | " + " | ".join(FACTORS) + " |", "|---|" + "---|" * len(FACTORS)]
+    for name in (n for n in found[0][1] if n != "default"):
+        lines.append(f"| `{name}` | " + " | ".join(_moves(found, name, how) for how in FACTORS) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _moves(found: Sequence[tuple[Truth, Answers]], name: str, how: str) -> str:
+    """How many records get another word, as "right to wrong: 2"; nothing where none does."""
+    moves: Counter[str] = Counter()
+    for truth, answers in found:
+        before, after = word(truth, answers["default"][""]), word(truth, answers[name][how])
+        if before != after:
+            moves[f"{before} to {after}"] += 1
+    return "; ".join(f"{move}: {n}" for move, n in sorted(moves.items()))
