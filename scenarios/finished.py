@@ -9,8 +9,6 @@ from contextlib import contextmanager, suppress
 from platform import libc_ver
 from typing import Any
 
-from fmus.host.instance import MESSAGES
-
 ENDED = 2  # exit code if an FMU ended the process
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
 
@@ -51,7 +49,9 @@ def finished_or_said() -> Iterator[None]:
 
 def _sentence() -> str:
     """The error message, with the names of the FMUs that were open."""
-    names = ", ".join(dict.fromkeys(name.rpartition("_")[0] for name in MESSAGES))
+    host = sys.modules.get("fmus.host.instance")  # not loaded where no FMU was opened
+    instances = host.MESSAGES if host else ()
+    names = ", ".join(dict.fromkeys(name.rpartition("_")[0] for name in instances))
     opened = f"the open FMUs are {names}" if "," in names else f"the open FMU is {names}"
     who = f"an FMU ({opened})" if names else "an FMU, or a library that it loads,"
     return (

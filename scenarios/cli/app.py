@@ -1,8 +1,9 @@
 """The command `railfmi`; exit codes: 0 done, 1 a check failed, 2 wrong input, with one error line."""
 
+import ast
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from pathlib import Path
@@ -11,13 +12,16 @@ from pkgutil import iter_modules
 import typer
 
 from fmus.errors import BadInput
-from fmus.host.fmu import FmuError
 from scenarios.cli.console import app, said
 from scenarios.finished import finished_or_said
 
-for module in iter_modules([str(Path(__file__).parent)]):
-    if module.name not in ("__main__", "app"):
-        import_module(f"scenarios.cli.{module.name}")  # each module adds its command to the application
+FOLDER = Path(__file__).parent
+NO_COMMANDS = ("__main__", "app", "console", "build_options")
+COMMANDS = {  # module by the name of its command
+    module.name.replace("_", "-"): module.name
+    for module in iter_modules([str(FOLDER)])
+    if module.name not in NO_COMMANDS
+}
 
 # libraries' worker processes would each use every core for small matrices
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -28,16 +32,44 @@ def main() -> None:
     for name in THREADS:
         os.environ.setdefault(name, "1")
     with finished_or_said():
-        code = run_safely(lambda: app(standalone_mode=False))
+        code = run_safely(sys.argv[1:])
     sys.exit(code)
 
 
-def run_safely(command: Callable[[], object]) -> int:
+def loaded(arguments: Sequence[str] = tuple(COMMANDS)) -> typer.Typer:
+    """The application with the commands that are named in a command line.
+
+    Where none is named, all are listed by what their modules say of themselves, without loading these: that
+    would take seconds for nothing but a list.
+    """
+    named = [name for name in COMMANDS if name in arguments]
+    for name in named:
+        import_module(f"scenarios.cli.{COMMANDS[name]}")  # adds its command to the application
+    if not named:
+        for name, module in COMMANDS.items():
+            if f"scenarios.cli.{module}" not in sys.modules:
+                app.command(name, help=_told(name))(_listed)
+    return app
+
+
+def _told(name: str) -> str:
+    """What the docstring of a command's module says after the command's name."""
+    text = (FOLDER / f"{COMMANDS[name]}.py").read_text(encoding="utf-8")
+    docstring = ast.get_docstring(ast.parse(text)) or ""
+    said_of = docstring.splitlines()[0].partition(": ")[2]
+    return said_of[:1].upper() + said_of[1:]
+
+
+def _listed() -> None:
+    """Stands for a command in the list of all."""
+
+
+def run_safely(arguments: Sequence[str]) -> int:
     """Run a command line; errors in the input become one line and exit code 2."""
     try:
-        code = command()
+        code = loaded(arguments)(list(arguments), standalone_mode=False)
         return code if isinstance(code, int) else 0
-    except (BadInput, FmuError) as error:
+    except BadInput as error:
         said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
         return 2
     except BrokenProcessPool:
@@ -52,6 +84,10 @@ def run_safely(command: Callable[[], object]) -> int:
     except KeyboardInterrupt:
         return _interrupted()
     except Exception as error:
+        host = sys.modules.get("fmus.host.fmu")  # loads NumPy, which help does without
+        if host and isinstance(error, host.FmuError):
+            said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
+            return 2
         shown = getattr(error, "format_message", None)  # click's own errors of usage
         if shown is None:
             raise

@@ -1,5 +1,6 @@
 """Parts shared by all commands: the application, the console for progress, common options."""
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,21 @@ app = typer.Typer(
     name="railfmi", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
     help="FMI models for railway dynamics, and the tracing of model error in measured data.",
 )  # fmt: skip
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"railfmi {version('railfmi')}")
+        raise typer.Exit
+
+
+@app.callback()
+def railfmi(
+    _: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="show the version and exit")
+    ] = False,
+) -> None:
+    """Keeps one command that is loaded alone a command."""
 
 
 said = Console(stderr=True, highlight=False)

@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from typer.testing import CliRunner
 
 from estimator.filters import filters
-from scenarios.cli.app import app
+from scenarios.cli.app import loaded
 from scenarios.experiment.declaration import Options
 from tests.helpers.paths import ROOT
 
@@ -66,7 +66,9 @@ def test_the_readmes_package_for_other_tools_is_written(tmp_path: Path, monkeypa
     [line] = re.findall(r"^    railfmi (export-ssp .*?) +#", (ROOT / "README.md").read_text(), re.M)
     command, scenario, *options = shlex.split(line)
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, [command, str(ROOT / scenario), *options, "--kind", "python"])
+    done = CliRunner().invoke(
+        loaded([command]), [command, str(ROOT / scenario), *options, "--kind", "python"]
+    )
     assert done.exit_code == 0, done.output
     assert [f.suffix for f in tmp_path.iterdir()] == [".ssp"]
 

@@ -148,10 +148,10 @@ def test_what_a_model_offers_to_choose_is_in_the_help_and_in_python(mine):
     said = """
         from typer.testing import CliRunner
         from fmus.models import model_with
-        from scenarios.cli.app import app
+        from scenarios.cli.app import loaded
         for given in ({}, {"length": "3/2"}, {"length": 4}):
             print(model_with("pendulum", options=given).options["length"])
-        print(CliRunner().invoke(app, ["build", "--help"]).output)
+        print(CliRunner().invoke(loaded(["build"]), ["build", "--help"]).output)
     """
     words = mine.says(said).split()
     assert words[:3] == ["2.0", "1.5", "4.0"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.cli.app import app, run_safely
+from scenarios.cli.app import COMMANDS, _told, run_safely
 from tests.helpers.paths import SHIPPED
 
 DEMO = SHIPPED / "demo" / "rig-drag"
@@ -16,7 +16,7 @@ DEMO = SHIPPED / "demo" / "rig-drag"
 
 def railfmi(*arguments: str | Path) -> int:
     """Exit code of a command line, run in this process."""
-    return run_safely(lambda: app([str(a) for a in arguments], standalone_mode=False))
+    return run_safely([str(a) for a in arguments])
 
 
 @pytest.fixture
@@ -184,3 +184,34 @@ def test_the_installed_command_answers_with_its_exit_code(tmp_path: Path) -> Non
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "nowhere" in done.stderr
+
+
+HEAVY = ("casadi", "numpy", "scipy", "pandas", "matplotlib", "fmpy", "fmus.models")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["--help"], ["build", "close-loop", "Grade an FMU."]), (["--version"], ["railfmi "]), ([], ["Usage"])],
+    ids=["help", "version", "nothing"],
+)
+def test_help_loads_nothing_that_simulates(arguments, words):
+    script = (
+        "import sys\n"
+        "from scenarios.cli.app import COMMANDS, _told, run_safely\n"
+        f"run_safely({arguments!r})\n"
+        f"print(*(name for name in {HEAVY!r} if name in sys.modules), file=sys.stderr, end='')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert all(word in done.stdout for word in words)
+    assert done.stderr == ""
+
+
+def test_all_commands_are_listed_with_what_they_do():
+    for name in COMMANDS:
+        assert len(_told(name).split()) > 2, name
+
+
+def test_a_command_stays_a_command_where_it_is_loaded_alone(capsys):
+    assert railfmi("check", "--help") == 0
+    assert " check [OPTIONS] {fmu}" in capsys.readouterr().out
