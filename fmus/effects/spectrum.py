@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 Array = NDArray[np.float64]
 LINES = 2  # that are tried
@@ -38,7 +37,7 @@ def splits(t: Array, force: Array) -> list[float]:
     gain = left**2 / n + right**2 / n[::-1]  # fall of the sum of squares, but for a constant
     edge = max(2, len(force) // 50)  # a mean of a few samples is no mean
     gain[:edge] = gain[-edge:] = gain.min()
-    peaks, _ = find_peaks(np.concatenate([[-np.inf], gain, [-np.inf]]), distance=edge)
+    peaks = _peaks(np.concatenate([[-np.inf], gain, [-np.inf]]), distance=edge)
     best = (peaks - 1)[np.argsort(gain[peaks - 1])[::-1][: LINES + 1]]
     return [float((t[k] + t[k + 1]) / 2) for k in best]
 
@@ -61,5 +60,12 @@ def _lines(place: Array, rest: Array, low: float, high: float) -> list[float]:
     power = np.abs(np.fft.rfft(gathered, FINE * len(gathered)))
     grid = 2 * np.pi * np.fft.rfftfreq(FINE * len(gathered), cell)
     power[(grid < low) | (grid > high)] = 0.0
-    peaks, _ = find_peaks(power, distance=2 * FINE)
+    peaks = _peaks(power, distance=2 * FINE)
     return [float(grid[i]) for i in peaks[np.argsort(power[peaks])[::-1][:LINES]]]
+
+
+def _peaks(x: Array, distance: float) -> NDArray[np.intp]:
+    """Places of the peaks of x (N,), so many samples apart at least."""
+    from scipy.signal import find_peaks  # here because it takes longer to load than all effects
+
+    return np.asarray(find_peaks(x, distance=distance)[0])
