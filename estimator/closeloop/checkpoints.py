@@ -1,6 +1,6 @@
-"""Checkpoints: results of stages kept on disk, so that an interrupted run goes on where it stopped.
+"""Checkpoints: the results of steps on disk, from which an interrupted close-loop can be continued.
 
-They are read by a codec that runs nothing, and only from a file and a folder that are real.
+The codec that reads them executes nothing. Files and folders that are links are not read.
 """
 
 import os
@@ -34,7 +34,7 @@ KEPT = (
     Unknown, Candidate, Fit, Hypothesis, Promise, PortNames, MissingForce, Detection, BlackBox, Visible,
     Diagnostics, Check, Judgement, Noise,
 )  # fmt: skip
-# a link is not followed, and a pipe is not waited for, even where one takes the file's place at this moment
+# do not follow a link or wait for a pipe, even if it replaces the file just before it is opened
 SAFELY = (
     os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 )
@@ -42,24 +42,24 @@ SAFELY = (
 
 @dataclass(frozen=True)
 class Stages:
-    """Keeps what stages return in a folder, under a key that says what they were worked out from.
+    """Keeps the results of steps in a folder, under a key that identifies the inputs they depend on.
 
-    Without a folder nothing is kept. A checkpoint with another key, or one that cannot be read, is made
-    again; links are not followed but replaced.
+    Without a folder nothing is kept. A checkpoint with another key, or one that cannot be read, is computed
+    again. Links are not followed but replaced.
     """
 
     folder: Path | None = None
     key: str = ""
 
     def done(self, name: str, work: Callable[[], Result]) -> Result:
-        """What the stage returned before, or returns now."""
+        """The result of a step: from its checkpoint if there is one, else from calling `work`."""
         if self.folder is None:
             return work()
         file = self.folder / f"{name}{SUFFIX}"
         try:
             return cast(Result, self._kept(file))
         except (OSError, codec.Unreadable):
-            pass  # it is made again below, so that an error of the stage does not seem to come from here
+            pass  # computed below, so that an error of the step is not reported as one of this except block
         found = work()
         if self.folder.is_symlink() or not self.folder.is_dir():
             _remove(self.folder)
@@ -76,7 +76,7 @@ class Stages:
             return codec.read(stream, self.key, KEPT)
 
     def _keep(self, found: object, file: Path) -> None:
-        """Write beside and rename, so that an interruption leaves no half checkpoint."""
+        """Write to a temporary file and rename it, so that an interruption leaves no partial checkpoint."""
         handle, name = tempfile.mkstemp(dir=file.parent, suffix=".part")
         part = Path(name)
         try:
@@ -89,13 +89,13 @@ class Stages:
             part.unlink(missing_ok=True)
 
     def forget(self) -> None:
-        """Delete all that was kept; of a link the link, not what it leads to."""
+        """Delete the folder with all checkpoints; if it is a link, only the link."""
         if self.folder is not None:
             _remove(self.folder)
 
 
 def _remove(path: Path) -> None:
-    """Delete a folder with all that it holds, a file, or a link, if there is one."""
+    """Delete a folder with its contents, a file or a link, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:

@@ -1,4 +1,4 @@
-"""What a verdict rests on: checks with their numbers and limits, from which alone it follows."""
+"""Checks with their values and limits, and the verdict that follows from them alone."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Name = Literal[
     "faults of sensors among them",
 ]
 
-# an answer that fails one of these is none
+# an answer must pass all of these
 ANSWER: tuple[Name, ...] = (
     "the size is clear of zero",
     "better than without it on the part to choose",
@@ -50,7 +50,7 @@ ANSWER: tuple[Name, ...] = (
 
 @dataclass(frozen=True)
 class Check:
-    """A question with its number, the limit that it was held against, and whether it was passed."""
+    """A named check: its value, the limit for that value, and whether it was passed."""
 
     name: Name
     value: float
@@ -59,25 +59,25 @@ class Check:
 
     @classmethod
     def least(cls, name: Name, value: float, limit: float) -> Check:
-        """Passed where the value reaches the limit."""
+        """A check that is passed if the value is at least the limit."""
         return cls(name, float(value), float(limit), bool(value >= limit))
 
     @classmethod
     def most(cls, name: Name, value: float, limit: float) -> Check:
-        """Passed where the value does not exceed the limit."""
+        """A check that is passed if the value is at most the limit."""
         return cls(name, float(value), float(limit), bool(value <= limit))
 
 
 def verdict_of(checks: Sequence[Check]) -> Verdict:
-    """The verdict that follows from checks; of two with the same name the later one counts.
+    """The verdict that follows from the checks; if two have the same name, the later one counts.
 
-    Raises ValueError where a check that it needs was not made.
+    Raises ValueError if a check that the verdict needs is missing.
     """
     passed = {c.name: c.passed for c in checks}
 
     def holds(name: Name) -> bool:
         if name not in passed:
-            raise ValueError(f"no check says whether {name!r} holds")
+            raise ValueError(f"the check {name!r} is missing, the verdict needs it")
         return passed[name]
 
     if not holds("the residual is more than noise"):
@@ -98,7 +98,11 @@ def verdict_of(checks: Sequence[Check]) -> Verdict:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The checks, the hypotheses that they speak for (the class, best first), and the way to split them."""
+    """The checks and the hypotheses that passed them.
+
+    members: hypotheses that the record cannot tell apart, best first; reason: one sentence for the report;
+    next_experiment: the experiment that would tell the members apart.
+    """
 
     checks: tuple[Check, ...]
     members: tuple[Hypothesis, ...]
@@ -107,14 +111,14 @@ class Judgement:
 
     @property
     def verdict(self) -> Verdict:
-        """What follows from the checks."""
+        """The verdict that follows from the checks."""
         return verdict_of(self.checks)
 
     def of(self, found: Sequence[Hypothesis]) -> Judgement:
-        """The same of hypotheses as they were fitted."""
+        """The same judgement, its members replaced by the hypotheses of `found` with the same key."""
         fitted = {h.key: h for h in found}
         return replace(self, members=tuple(fitted[m.key] for m in self.members))
 
     def after(self, checks: Sequence[Check]) -> Judgement:
-        """The same, after checks that were made before."""
+        """The same judgement with earlier checks put before its own."""
         return replace(self, checks=(*checks, *self.checks))

@@ -1,4 +1,4 @@
-"""What the chain found, stage by stage."""
+"""The results of all steps of close-loop."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,9 +15,9 @@ from estimator.record import Array
 
 @dataclass(frozen=True)
 class Outcome:
-    """All that the chain found; hypotheses and promises best first.
+    """The results of all steps; hypotheses and promises (screened candidates) are sorted, best first.
 
-    free_form: a force of free form, where no effect explains; seconds: of wall time that each stage took.
+    free_form: a fitted force of free form, if no effect explains the residual; seconds: wall time per step.
     """
 
     declared: Hypothesis
@@ -44,10 +44,10 @@ class Outcome:
 
     @property
     def chosen(self) -> Hypothesis | None:
-        """The best member of the verdict's class."""
+        """The best hypothesis of the answer; None if there is no answer."""
         return self.judgement.members[0] if self.judgement.members else None
 
     @property
     def built_in(self) -> Hypothesis | None:
-        """What the augmented FMU has more than the calibrated one: an effect, or a force of free form."""
+        """What is added in the augmented FMU: the chosen effects, or else a force of free form."""
         return self.chosen or self.free_form

@@ -1,4 +1,4 @@
-"""The chain: calibrate, detect, nominate, fit jointly, choose, judge, hold the answer against the test."""
+"""The steps of close-loop in order: calibration, detection, screening, joint fits, verdict, test part."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -39,9 +39,9 @@ def trace(
     stages: Stages = Stages(),  # noqa: B008 - immutable, keeps nothing
     fitter: Callable[[Baseline, int], Fitter] = Fitter,
 ) -> Outcome:
-    """Run the whole chain on a problem; `tell` hears what is being done, `stages` keeps what was found.
+    """Run all steps on a problem; `tell` is called with progress lines, `stages` keeps the checkpoints.
 
-    fitter: makes what fits hypotheses beside a baseline in so many processes.
+    fitter: makes the Fitter of a baseline that works in the given number of processes.
     """
     progress = Progress(tell)
     found = Chain(problem, progress, jobs, seed, stages, fitter).run()
@@ -51,7 +51,7 @@ def trace(
 
 @dataclass(frozen=True)
 class Chain:
-    """One run of the chain; see `trace`."""
+    """One call of `trace` with its arguments."""
 
     problem: Problem
     tell: Progress
@@ -61,12 +61,12 @@ class Chain:
     fitter: Callable[[Baseline, int], Fitter]
 
     def run(self) -> Outcome:
-        """Calibrate, detect, search, judge, and hold the answer against the test part."""
+        """Calibrate, detect, search, decide, and check the answer on the test part."""
         tell, done = self.tell, self.stages.done
         tell("calibrate", "calibrating the declared parameters")
         declared, base, noise = done("calibrated", lambda: calibrate(self.problem))
         baseline = Baseline(self.problem, base, noise)
-        tell("missing force", "inferring the missing force at each port")
+        tell("missing force", "estimating the missing force at each port")
         forces = done("forces", lambda: missing_forces(self.problem, base.fit.theta, noise.std))
         shown = screened(baseline, forces, tell, self.stages)
         detection = self._detected(shown)
@@ -79,7 +79,7 @@ class Chain:
         return found if early else self._searched(found, shown, before)
 
     def _detected(self, shown: Screened) -> Detection:
-        self.tell("detect", "testing for a discrepancy against simulated records without one")
+        self.tell("detect", "testing whether the residual is more than noise")
         noise, seen = shown.baseline.noise, shown.screening.fit
         in_noise = (seen.residual.reshape(-1, len(noise.std)) * noise.scale / noise.std).ravel()
         regressors = [g for _, g in shown.change]
@@ -92,21 +92,21 @@ class Chain:
         )  # fmt: skip
 
     def _diagnosed(self, shown: Screened, detection: Detection) -> Diagnostics:
-        self.tell("diagnostics", "working out what else would explain, and what could have been seen")
+        self.tell("diagnostics", "fitting a black-box model and computing the smallest detectable effects")
         level, rng = detection.level / len(detection.figures), np.random.default_rng(self.seed)
         return self.stages.done(
             "diagnostics", lambda: diagnose(shown.baseline, shown.fit, shown.change, level, rng)
         )
 
     def _searched(self, found: Outcome, shown: Screened, before: Sequence[Check]) -> Outcome:
-        """The outcome where a discrepancy is to be explained; before: the checks that said so."""
+        """The outcome of the search for a detected discrepancy; before: the checks of the detection."""
         singles, pairs = self._search(shown).run()
         if not shown.baseline.noise.known and (singles or pairs):
-            self.tell("weights", "weighting the residuals by what the best fit leaves")
+            self.tell("weights", "weighting the residuals by the noise that the best fit leaves")
             shown, singles, pairs = self._weighted_anew(shown, singles, pairs)
         baseline = shown.baseline
         singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
-        self.tell("test", "holding the answer against the test part")
+        self.tell("test", "checking the answer on the test part")
         judgement = confirmed_on_test(baseline, judgement).after(before)
         found = replace(
             found, baseline=baseline, singles=tuple(singles), pairs=tuple(pairs), judgement=judgement
@@ -126,7 +126,7 @@ class Chain:
     def _weighted_anew(
         self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]
     ) -> tuple[Screened, list[Hypothesis], list[Hypothesis]]:
-        """What was screened, singles and pairs, best first, by the noise that the best fit leaves."""
+        """Screening, single hypotheses and pairs (best first), weighted by the noise left by the best fit."""
         base, noise, (ones, twos) = self.stages.done(
             "weights", lambda: reweighted(self.fitter(shown.baseline, self.jobs), [singles, pairs])
         )
@@ -138,16 +138,17 @@ class Chain:
         self, shown: Screened, forces: Sequence[MissingForce],
         singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
     ) -> tuple[list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
-        """Single hypotheses and pairs, best first, and their judgement, whose members are as it saw them.
+        """Single hypotheses and pairs, best first, and the judgement with its members as they were judged.
 
-        What is named has its errors taken from the sum of squares, which may also move it. It is judged again
-        with these, until nothing is named that was not judged so: each is asked once, so that this ends.
+        The standard errors of every member are taken from its likelihood profile, which may also move its
+        fit. The hypotheses are then judged again, until every member has been judged with its profiled
+        values. Each hypothesis is profiled once at most, so that the loop ends.
         """
         form, fitter = form_of(shown.baseline), self.fitter(shown.baseline, self.jobs)
         asked: set[tuple[str, ...]] = set()
         denied: Hypothesis | None = None
         for turn in count():
-            self.tell("verdict", "asking whether it is the law's curve")
+            self.tell("verdict", "testing whether the force follows the curve of the law")
             leading, judgement = self._judged(shown, forces, singles, pairs, f"verdict {turn}")
             alone = leading.members and not judgement.members and len(leading.members[0].candidates) == 1
             if alone and denied is None:
@@ -157,7 +158,7 @@ class Chain:
             members = [h for h in judgement.members if h.key not in asked]
             if not members:
                 break
-            self.tell("intervals", "asking how far its parameters may be from there")
+            self.tell("intervals", "computing standard errors from the likelihood profile")
             found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, members))
             asked |= {h.key for h in members}
             final = {h.key: h for h in found}
@@ -168,7 +169,7 @@ class Chain:
         self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
         pairs: Sequence[Hypothesis], stage: str,
     ) -> tuple[Judgement, Judgement]:  # fmt: skip
-        """What the comparison says, and what is left of it where each law must be the force's curve."""
+        """The judgement by comparison of the fits, and the same after the test of the law's curve."""
         baseline, done = shown.baseline, self.stages.done
         judged = done(f"allowed {stage}", lambda: allowed(baseline, singles))
         leading = judge(baseline, judged, pairs, shown.began).of([*singles, *pairs])
@@ -176,6 +177,6 @@ class Chain:
 
 
 def _profiled(fitter: Fitter, members: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Hypotheses with their errors as the sum of squares says."""
+    """Hypotheses with their standard errors taken from the likelihood profile."""
     tasks = (delayed(profiled)(fitter.alone, h) for h in members)
     return list(Parallel(min(fitter.jobs, len(members)))(tasks))

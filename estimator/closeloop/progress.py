@@ -1,4 +1,4 @@
-"""What is being done, said as it begins, and how long each stage took."""
+"""Progress lines at the start of each step, and the wall time of each step."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -7,20 +7,20 @@ Tell = Callable[[str], None]
 
 
 class Progress:
-    """Says what begins and counts the seconds of wall time of each stage, by its name, in their order."""
+    """Passes a progress line to `tell` when a step begins, and sums the wall time of each step in seconds."""
 
     def __init__(self, tell: Tell) -> None:
         self._tell, self._now, self._since = tell, "", monotonic()
         self.seconds: dict[str, float] = {}
 
     def __call__(self, stage: str, sentence: str) -> None:
-        """A stage begins, so that the one before has ended."""
+        """Begin a step, which ends the one before."""
         self.end()
         self._now = stage
         self._tell(sentence)
 
     def end(self) -> None:
-        """The last stage has ended."""
+        """End the current step."""
         now = monotonic()
         if self._now:
             self.seconds[self._now] = self.seconds.get(self._now, 0.0) + now - self._since

@@ -102,7 +102,7 @@ def test_a_law_that_is_near_is_not_named(builder, resistance, kind, over, seed):
     told = confirmed(o.baseline, o.judgement, o.forces)
     assert (told.verdict, told.members) == ("unexplained", ())
     assert f"over the {over} at carriage" in told.reason
-    assert f"nearest was {kind}@carriage" in told.reason
+    assert f"best fit: {kind}@carriage" in told.reason
 
 
 def test_it_is_not_asked_where_what_is_left_is_no_measure(builder):

@@ -178,8 +178,8 @@ def test_several_effects_account_for_more_of_what_could_be_form(before, after, f
     [
         (1.0, 5.0, "begins after it"),
         (5.0, 1.0, "ends before"),
-        (1.2, 5.0, "nearest was"),
-        (5.0, 1.2, "nearest was"),
+        (1.2, 5.0, "best fit:"),
+        (5.0, 1.2, "best fit:"),
     ],
 )
 def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
@@ -187,7 +187,7 @@ def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
     told = judge(baseline(asked(), base, NOISE), [base], []).after(DETECTED)
     assert told.verdict == "unexplained"
     assert said in told.reason
-    assert bool(told.next_experiment) == (said != "nearest was")
+    assert bool(told.next_experiment) == (said != "best fit:")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
-"""Laws that the part to identify cannot tell apart, on the part to choose: as near as their errors allow.
+"""Adjustment of fitted laws within their standard errors to the part to choose, before they are compared.
 
-A parameter that the part to identify hardly shows, as friction that saturates in the part to choose alone,
-would else decide between them by where each fit came to rest.
+It applies to laws that leave only noise in the part to identify. Without it, a parameter that hardly shows in
+that part (friction that saturates only in the part to choose) would decide between laws by chance.
 """
 
 from collections.abc import Sequence
@@ -22,9 +22,10 @@ ALLOWED_STEPS, ALLOWED_NUDGE = 5, 0.1  # of the search, and of its differences i
 
 
 def allowed(baseline: Baseline, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Ranked single hypotheses, those that leave noise alone in the part to identify as their errors allow.
+    """Ranked single hypotheses; those that leave only noise in the part to identify are adjusted.
 
-    Only their residuals differ, and only where the part to choose sets them apart or from noise.
+    Only their residuals change, and only if the part to choose separates them clearly from each other or
+    from noise.
     """
     if not baseline.noise.known:
         return list(found)
@@ -44,7 +45,7 @@ def _set_apart(baseline: Baseline, alike: Sequence[Hypothesis]) -> bool:
 
 
 def _as_errors_allow(baseline: Baseline, h: Hypothesis) -> Hypothesis:
-    """The hypothesis with the residuals of values near its own, by their covariance, that fit the rest."""
+    """The hypothesis with its values fitted to the part to choose, their covariance serving as a prior."""
     problem, size = baseline.problem, baseline.noise.scale
     here, unknowns, best = built(problem, h.candidates), h.fit.unknowns, h.fit.values
     error = np.sqrt(np.diag(h.fit.covariance))

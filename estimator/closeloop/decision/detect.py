@@ -1,9 +1,10 @@
-"""Is there a discrepancy, and does it matter? Tested against records simulated without any effect.
+"""Test whether the residual of the calibrated FMU is more than noise and large enough to matter.
 
-The reference distribution is a parametric bootstrap to first order: white noise of the record's size is
-drawn for all parts, what calibration to the noise of the identify part changes in the parts that no fit has
-seen follows from the FMU's sensitivities, and the same figures are computed. The FMU itself is not simulated
-again, so the reference is as good as the FMU is linear in its unknowns within their standard errors.
+The residual is taken from the parts to choose and to test, which no fit has used. The reference distribution
+is a parametric bootstrap to first order: white noise is drawn for all parts of the record, the response of
+the calibration to the noise in the part to identify is computed from the sensitivities of the FMU, and the
+same statistics are evaluated. The FMU is not simulated again, so the reference assumes that the FMU is linear
+in its unknowns within their standard errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,11 +23,11 @@ LIKENESS = "likeness to an effect"
 
 @dataclass(frozen=True)
 class Detection:
-    """Whether a residual is more than noise, and whether it matters.
+    """Whether the residual is more than noise, and whether it matters.
 
-    p_value: of the most telling figure, corrected for their number, which counts below `level`; figures:
-    observed over the 95 % point of noise; importance: size of the residual over the least that matters;
-    likeness, sets_in: see `detect`.
+    p_value: the smallest of all statistics, Bonferroni corrected; the residual is more than noise if it is
+    below `level`. figures: each observed statistic over the 95 % quantile of its reference distribution.
+    importance: size of the residual over the smallest size that matters; likeness, sets_in: see `detect`.
     """
 
     level: float
@@ -38,12 +39,12 @@ class Detection:
 
     @property
     def detected(self) -> bool:
-        """More than noise."""
+        """Whether the residual is more than noise."""
         return self.p_value < self.level
 
     @property
     def material(self) -> bool:
-        """Large enough to matter."""
+        """Whether the residual is large enough to matter."""
         return self.importance >= 1.0
 
 
@@ -53,11 +54,11 @@ def detect(
 ) -> Detection:  # fmt: skip
     """Test the residual of the calibrated FMU.
 
-    screened: its fit as it was screened, residual in units of the noise; regressors: changes (m, k) of that
-    residual; likeness: share of what is beyond noise that one effect could explain, by linear regression;
-    sets_in: whether the residual sets in during the record. A residual matters by what it has beyond noise,
-    and beyond what chance makes of that, in any output and either part of the record, compared with the
-    signal and with the noise.
+    screened: its fit as used in the screening, residual in units of the noise; regressors: changes (m, k) of
+    that residual, one array per candidate; likeness: share of the sum of squares beyond noise that one
+    effect could explain by linear regression; sets_in: whether the residual sets in during the record.
+    Whether the residual matters is decided by its size beyond noise, with an allowance for chance, compared
+    with the signal and with the noise.
     """
     limits, runs = baseline.policy.detection, baseline.problem.record.runs
     fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
@@ -66,7 +67,7 @@ def detect(
     g = _directions(screened.jacobian, regressors) if regressors else None
     observed = _figures(left, limits.slow_blocks)
     n = slopes.shape[2]
-    # noise in the part to identify moves the unknowns by root @ white noise
+    # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(slopes[fitted].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
     late, copies = slopes[unseen], []
     for _ in range(limits.replicates):
@@ -90,7 +91,7 @@ def detect(
 
 
 def _sensitivities(baseline: Baseline) -> Array:
-    """Derivatives of the whole residual, in units of the noise, by the unknowns, (N, n_y, n)."""
+    """Derivatives of the whole residual, in units of the noise, with respect to the unknowns, (N, n_y, n)."""
     base, problem = baseline.hypothesis, baseline.problem
     here, columns = np.concatenate(base.residuals), []
     for u in base.fit.unknowns:
@@ -101,7 +102,7 @@ def _sensitivities(baseline: Baseline) -> Array:
 
 
 def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
-    """Changes of the residual that the calibration cannot take over, of length 1, (m, k)."""
+    """Regressors projected orthogonal to the columns of the calibration, of length 1, (m, k)."""
     g = np.hstack(regressors)
     if jacobian.shape[1]:
         q = np.linalg.qr(jacobian)[0]
@@ -111,7 +112,7 @@ def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
 
 
 def _likeness_of_noise(g: Array, replicates: int, rng: np.random.Generator) -> Array:
-    """The largest squared projection of white noise on any direction of g (m, k), (replicates,)."""
+    """The largest squared projection of white noise onto the columns of g (m, k), (replicates,)."""
     values, vectors = np.linalg.eigh(g.T @ g)
     root = vectors * np.sqrt(np.maximum(values, 0))
     drawn = rng.standard_normal((replicates, g.shape[1])) @ root.T

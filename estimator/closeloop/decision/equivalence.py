@@ -1,4 +1,4 @@
-"""Classes of hypotheses that a record does not tell apart, and what would split them."""
+"""The class of hypotheses that a record cannot tell apart, and the experiment that would."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from fmus.effects import EFFECTS
 
 
 def equivalent(baseline: Baseline, best: Hypothesis, others: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The class of the best hypothesis: those that the record does not tell from it, nor the others.
+    """The best hypothesis and all others that the record cannot tell from it.
 
-    A simpler law that it becomes at a limit of its shape is told from it only where every further unknown is
-    worth its price. Of two such laws in the class (free play wider than the motion: a loss of stiffness) the
-    simpler one stays; of a group of parameters and one of them the group.
+    A simpler law that is a limit of the best one is rejected only if every further unknown of the best one
+    gains enough log score. If the class holds a law and its limit (free play wider than the motion, which is
+    a loss of stiffness), only the simpler one stays. If it holds a group of parameters and one parameter of
+    that group, only the group stays.
     """
     form, unknown = form_of(baseline), baseline.policy.decision.unknown
     members = [best]
@@ -31,10 +32,11 @@ def equivalent(baseline: Baseline, best: Hypothesis, others: Sequence[Hypothesis
 
 
 def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
-    """Whether a simpler law of the class that h becomes takes its place.
+    """Whether `other`, a simpler law of the class that is a limit of h, replaces h.
 
-    Not where a law does as well that h alone is in a motion which keeps its sign: at one speed constant force
-    and viscous damping are alike, and Coulomb friction, which becomes viscous damping, lies between them.
+    It does not if the class also holds a law that equals h, but not `other`, while the velocity keeps its
+    sign. At one speed, constant force and viscous damping are alike, and Coulomb friction, which has viscous
+    damping as a limit, equals both.
     """
     lost = one_way(h) - one_way(other)
     alike = {(c.kind, c.location) for m in members for c in m.candidates}
@@ -42,18 +44,18 @@ def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -
 
 
 def splitting(members: Sequence[Hypothesis]) -> str:
-    """The experiment that would tell the members of a class apart, from what their laws say of themselves."""
+    """The experiment that would tell the members of a class apart, by what their laws declare."""
     kinds = {c.kind for m in members for c in m.candidates}
     where = " and ".join(places := sorted({c.location for m in members for c in m.candidates}))
     advice = []
     if any(reversal(a, b) for a, b in permutations(kinds, 2)):
-        advice.append(f"a run in which the velocity at {where} changes its sign")
+        advice.append(f"a record in which the velocity at {where} changes its sign")
     curves = {kind for kind in kinds & set(EFFECTS) if EFFECTS[kind].over == "velocity"}
     if any(b != a and not reversal(a, b) for a in curves for b in kinds):
-        advice.append(f"runs at two or more clearly different speeds of {where}")
+        advice.append(f"records at two or more clearly different speeds at {where}")
     advice += dict.fromkeys(fault.splitting for kind, fault in FAULTS.items() if kind in kinds)
     if len(places) > 1:
         advice.append(
-            f"a run that excites {where} by different amounts, for example at another load or torque"
+            f"a record that excites {where} by different amounts, for example at another load or torque"
         )
-    return "; ".join(advice) or f"a run with a wider range of speed and displacement at {where}"
+    return "; ".join(advice) or f"a record with a wider range of speed and displacement at {where}"

@@ -1,4 +1,4 @@
-"""Is it the law's curve? What a free curve over the same motion could explain of what a law leaves."""
+"""Test of a law: how much of the residual that it leaves a free curve over the same motion explains."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,11 +23,11 @@ FOLLOWS: Name = "the force follows the law"
 
 
 def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[MissingForce]) -> Judgement:
-    """The judgement, without its best member where a law of that is not the curve that the force follows.
+    """The judgement after the test that the force follows the law of the best member.
 
-    Then those of its class stay that are not denied so; for a single law only if one of them is a curve over
-    the same motion; else it is `unexplained`.
-    Asked where noise is declared: else what is left is no measure.
+    If the best member fails, the members that pass stay in the answer. For a single law they stay only if
+    one of them is a law over the same motion; otherwise the verdict is `unexplained`. The test is made only
+    if noise is declared, since the residual has no reference otherwise.
     """
     if not judgement.members or not baseline.noise.known:
         return judgement
@@ -45,7 +45,7 @@ def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[Missing
 
 
 def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> Check:
-    """Whether the laws of a hypothesis are what their names say, and a single one the curve of its force."""
+    """The check that all laws are true to their names and that a single law is the curve of its force."""
     wrong = doubted(baseline, h, forces)
     if wrong or len(h.candidates) > 1:
         return Check.most(FOLLOWS, len(wrong), 0)
@@ -54,7 +54,7 @@ def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) 
 
 
 def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
-    """Laws of a hypothesis that with its values are not what their names say, as far as the record tells."""
+    """Laws of a hypothesis that are not true to their names with the fitted values, as the record shows."""
     wrong = misnamed(h, forces)
     if not form_of(baseline).exact or not wrong:
         return wrong
@@ -63,9 +63,9 @@ def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -
 
 
 def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0) -> list[Candidate]:
-    """Laws that with its values, in the motion at their port, are not what their names say.
+    """Laws that are not true to their names with the fitted values and the motion at their port.
 
-    fastest: share of the motion in which that is asked, the one with the highest velocities.
+    fastest: share of the samples that is examined, those with the highest velocities.
     """
     at, found = {missing.port.name: missing for missing in forces}, []
     for c in h.candidates:
@@ -80,7 +80,7 @@ def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0
 
 
 def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate) -> bool:
-    """Whether a curve that passes for one of its laws would show in what is left, and noise alone is left."""
+    """Whether h leaves only noise, in which a smooth curve in place of its law c would be visible."""
     limits = baseline.policy.decision
     if not over_what(c) or not baseline.leaves_noise(h):
         return False
@@ -91,21 +91,22 @@ def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate) -> bool:
 
 
 def motion(h: Hypothesis) -> tuple[str, str]:
-    """Where a single law acts, and over what: velocity or displacement."""
+    """Location of a single law, and the motion that it depends on: velocity or displacement."""
     [c] = h.candidates
     return c.location, over_what(c)
 
 
 def over_what(c: Candidate) -> str:
-    """What a law is a curve over, velocity or displacement; nothing for what is no such law."""
+    """The motion that a law depends on, velocity or displacement; empty for any other candidate."""
     return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
 def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> tuple[float, float]:
-    """Fall of the sum of squares that a free curve beside a hypothesis' law would bring, by regression.
+    """Reduction of the sum of squares by a free curve beside a single law, by linear regression.
 
-    Of a curve over the law's own motion; and, where the FMU's form leaves something open, the most of one
-    over another velocity or displacement, at this port or another. Zero for an effect that is no such curve.
+    The first value is for a curve over the law's own motion. The second is the largest for a curve over any
+    other velocity or displacement, at this port or another; it is computed only if the model form is open.
+    Both are zero for an effect that is no law over a motion.
     """
     location, over = motion(h)
     mine = [(kind, location) for kind, law in FREE_FORMS.items() if law.against == over]

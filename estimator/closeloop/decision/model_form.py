@@ -1,8 +1,8 @@
-"""What a decision takes for granted of the FMU's form: that it is right but for effects, or that it is open.
+"""Rules of the decision for a model whose form is right (Closed) or uncertain by a declared share (Open).
 
-Of an open form a share of each output is left: another law of contact, say, as good as the one that the FMU
-has. Such a difference is no effect, it differs from one part of a record to the next, and right answers leave
-some of it too.
+With an open form, a share of each output stays unexplained, for instance because another contact law is as
+plausible as the one in the FMU. Such a difference is not an effect, it changes from one part of the record to
+the next, and some of it is left by correct answers too.
 """
 
 from __future__ import annotations
@@ -26,67 +26,67 @@ TINY = 1e-300  # of a signal, a noise or a sum of squares that is zero
 
 @dataclass(frozen=True)
 class ModelForm(ABC):
-    """What differs between a form that is right and one that leaves something open."""
+    """The rules that differ between a model form that is right and one that is open."""
 
-    exact: ClassVar[bool]  # whether the FMU with the right effects leaves noise alone
+    exact: ClassVar[bool]  # whether only noise is left once the FMU has the right effects
 
     baseline: Baseline
 
     def ranked(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Best first, by log score on what tells of the record."""
+        """Hypotheses sorted by their misfit, best first."""
         return sorted(found, key=self._misfit)
 
     @abstractmethod
     def _misfit(self, h: Hypothesis) -> float:
-        """What hypotheses are ranked by, the least first."""
+        """The figure by which hypotheses are ranked; smaller is better."""
 
     @abstractmethod
     def importance(self, likeness: float, sets_in: bool, clear: bool) -> float:
-        """Size of the calibrated FMU's residual over the least that matters; see `detect`."""
+        """Size of the residual of the calibrated FMU over the smallest size that matters; see `detect`."""
 
     @abstractmethod
     def reached(self, h: Hypothesis) -> BoolArray:
-        """Whether a hypothesis brings each output (n_y,) down to its noise, or to what the form leaves."""
+        """Whether the residual of each output (n_y,) comes down to its noise or to the open share."""
 
     @abstractmethod
     def told(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
-        """Whether the record tells the best hypothesis from another; price: of its further unknowns."""
+        """Whether the record rejects h against the best one; price: log score for unknowns that h lacks."""
 
     @abstractmethod
     def whole(self, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-        """Whether a pair leaves so little in the part to identify that it may be right."""
+        """Whether the residual of a pair in the part to identify is small enough for the pair to be right."""
 
     @abstractmethod
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
-        """Whether a richer hypothesis explains more of the part to identify than a right h would leave it."""
+        """Whether a richer hypothesis fits the part to identify better than it could if h were right."""
 
     @abstractmethod
     def another(self, began: bool) -> Check | None:
-        """Whether the residual is more than another form leaves; None where there is no other."""
+        """The check that the residual exceeds the open share; None if the form is not open."""
 
     @abstractmethod
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """Fall of the sum of squares by a curve beside a law, above which it is not the law's.
+        """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected.
 
-        elsewhere: the same of a curve over another motion.
+        elsewhere: the reduction by a free curve over another motion.
         """
 
     @abstractmethod
     def could_be(self, likeness: float) -> bool:
-        """Whether a residual could be another form; likeness: share of it that one effect could explain."""
+        """Whether the residual may come from the open form; likeness: share that one effect could explain."""
 
     def noticed(self, h: Hypothesis) -> float:
-        """Fall of the sum of squares by something more from which on a hypothesis is not the whole of it."""
+        """Reduction of the sum of squares by a richer hypothesis, from which on h is incomplete."""
         limits = self.baseline.policy.decision
         return max(limits.noticed, limits.missed * (cost(self.baseline.hypothesis) - cost(h)))
 
     def _plain(self, h: Hypothesis) -> float:
-        """Fall of the sum of squares by a curve that noise alone does not bring about."""
+        """Reduction of the sum of squares by a free curve that noise alone does not cause."""
         limits = self.baseline.policy.decision
         return max(limits.noticed, limits.curve_of_noise * len(h.fit.residual))
 
     def _at_noise(self, h: Hypothesis) -> BoolArray:
-        """Outputs (n_y,) that a hypothesis brings down to their noise, or nearly so."""
+        """Outputs (n_y,) whose residual comes down to the noise, or nearly so, with a hypothesis."""
         b, limits = self.baseline, self.baseline.policy.decision
         before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
         scatter = limits.scatter / np.sqrt(2 * len(h.of(b.problem, "choose")))
@@ -94,7 +94,7 @@ class ModelForm(ABC):
         return down | (gap_closed(before, after, b.noise.std) >= limits.gap)
 
     def _beyond(self, part: Part) -> Array:
-        """Root mean square (n_y,) of what a part has beyond noise and what chance makes of that."""
+        """Rms (n_y,) of the calibrated FMU's residual on a part, beyond noise and its chance scatter."""
         b = self.baseline
         residual = b.hypothesis.of(b.problem, part)
         chance = 1 + b.policy.detection.chance * np.sqrt(2 / max(len(residual), 1))
@@ -102,14 +102,14 @@ class ModelForm(ABC):
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
     def _material(self, beyond: Array, least: float) -> float:
-        """What is beyond noise over the least that matters; least: of the noise."""
+        """Size beyond noise over the smallest size that matters; least: that size in units of the noise."""
         b, share = self.baseline, self.baseline.policy.detection.signal_share
         lowest = np.minimum(share * signal_size(b.problem), least * b.noise.std)
         return float(np.max(beyond / np.maximum(lowest, TINY)))
 
 
 class Closed(ModelForm):
-    """The form is right: with the right effects noise alone is left, in every part of the record."""
+    """The form is right: with the right effects only noise is left, in every part of the record."""
 
     exact = True
 
@@ -117,7 +117,7 @@ class Closed(ModelForm):
         return -float(self.baseline.scores(h).sum())
 
     def importance(self, likeness: float, sets_in: bool, clear: bool) -> float:
-        """Of the worse part of the record; what is clearly like an effect matters earlier."""
+        """See ModelForm; the worst part counts. The limit is lower for a residual clearly like an effect."""
         limits = self.baseline.policy.detection
         beyond = np.maximum(self._beyond("unseen"), self._beyond("fit"))
         return self._material(beyond, limits.noise_share_of_effects if clear else limits.noise_share)
@@ -127,7 +127,7 @@ class Closed(ModelForm):
         return self._at_noise(h)
 
     def told(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
-        """By either part, where it is more than a small difference of form could bring about."""
+        """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
         b, limits = self.baseline, self.baseline.policy.decision
         alike = limits.alike * -float(b.scores(best).sum())
         worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
@@ -135,9 +135,9 @@ class Closed(ModelForm):
         return (h.fit.converged and worse) or better
 
     def whole(self, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-        """Noise, or little of what the best single effect leaves.
+        """See ModelForm; only noise, or a small share of what the best single effect leaves, may remain.
 
-        What is neither of two effects may be brought near to noise by both, one after the other.
+        Two wrong effects together may also come near to the noise, therefore the limit is strict.
         """
         if not self.baseline.noise.known or self.baseline.leaves_noise(pair):
             return True
@@ -145,9 +145,9 @@ class Closed(ModelForm):
         return bool(pair.fit.beyond_noise < self.baseline.policy.decision.pair_leaves * gained)
 
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
-        """See ModelForm; richer: a law that becomes h, or h and one more effect.
+        """See ModelForm; richer: a law with h as its limit, or h and one more effect.
 
-        A right law gains alike on both parts; where the richer one gains on one alone, both are wrong.
+        A right law gains on both parts alike; if the richer one gains on one part only, both are wrong.
         """
         more = becomes(richer, h) or set(h.key) < set(richer.key)
         return more and cost(h) - cost(richer) > self.noticed(h)
@@ -161,28 +161,28 @@ class Closed(ModelForm):
         return False
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """Most of what the law leaves, and plain; or much of what the law explains."""
+        """See ModelForm; half of what the law leaves beyond noise, or much compared with what it explains."""
         share = self.baseline.policy.decision.second_share
         return min(max(self._plain(h), share * h.fit.beyond_noise), self.noticed(h))
 
 
 @dataclass(frozen=True)
 class Open(ModelForm):
-    """The form leaves a share of each output open; by the whole record more is told of it than by a part."""
+    """The form is uncertain by a share of each output; hypotheses are compared over both parts together."""
 
     share: float  # of an output's rms
 
     exact = False
 
     def _misfit(self, h: Hypothesis) -> float:
-        # what acts in one part alone would lose to what makes up for form in the other
+        # on one part alone, an effect that acts in the other part would lose to one that imitates the form
         return 0.5 * cost(h) - float(self.baseline.scores(h).sum())
 
     def importance(self, likeness: float, sets_in: bool, clear: bool) -> float:
-        """Of what no fit has seen.
+        """See ModelForm; computed on the parts to choose and to test.
 
-        Less than the form leaves matters only if one effect could explain much of it, or if it sets in during
-        the record, as no form does.
+        A residual below the open share matters only if one effect could explain much of it, or if it sets in
+        during the record, which an error of the model's form does not.
         """
         b, limits = self.baseline, self.baseline.policy.detection
         beyond, rms = self._beyond("unseen"), b.hypothesis.rms(b.problem, "unseen")
@@ -193,14 +193,14 @@ class Open(ModelForm):
         return large
 
     def reached(self, h: Hypothesis) -> BoolArray:
-        """Down to noise, or to what the form leaves.
+        """Whether each output (n_y,) comes down to its noise or to the open share.
 
-        One effect explains at least half of what was beyond noise in all outputs together; several, which
-        could come near to any form, more. So it is with the whole record, and with the part to choose unless
-        hardly anything is left in all: an effect may act in one part alone. What was large beyond noise comes
-        within the share, what was small does not grow; where all was small, so that it could be form too,
-        several explain nearly all. A fault of a sensor may also leave the others as they are, if nearly all
-        goes from its own.
+        All outputs together: one effect must explain at least half of the variance beyond noise, several
+        effects more, because they can imitate an error of form; if every output was small, several effects
+        must explain nearly all. This must hold over both parts, and on the part to choose as well unless
+        hardly anything is left over both: an effect may act in one part only.
+        Each output: a large residual must come below the open share, a small one must not grow. A sensor
+        fault may leave the other outputs unchanged if it explains nearly all of its own output.
         """
         b, limits = self.baseline, self.baseline.policy
         noise, down = b.noise.std, self._at_noise(h)
@@ -224,18 +224,18 @@ class Open(ModelForm):
         )
 
     def told(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
-        """By both parts together: what the best one leaves is no measure of a small difference."""
+        """See ModelForm; by both parts together, because the open form adds to what the best one leaves."""
         b, limits = self.baseline, self.baseline.policy.decision
         alike = limits.alike * -float(b.scores(best).sum())
         alike = max(alike, limits.open_alike * b.beyond_noise_of_all(best) / 2)
         return b.lead(best, h)[0] + (cost(h) - cost(best)) / 2 >= max(price, alike)
 
     def whole(self, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-        """See ModelForm; what is left says nothing."""
+        """See ModelForm; always, because what is left may come from the open form."""
         return True
 
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
-        """See ModelForm; what is gained may be form."""
+        """See ModelForm; never, because the gain may come from the open form."""
         return False
 
     def another(self, began: bool) -> Check | None:
@@ -244,9 +244,9 @@ class Open(ModelForm):
         return Check.least("more than another form of the model leaves", size, 1.0)
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """Much of what the law leaves and of what it explains, and no less than a curve over another motion.
+        """See ModelForm; much of what the law leaves or explains, and most of the gain over another motion.
 
-        Right laws leave some curve too, as another form looks like one everywhere.
+        The open form looks like a curve over every motion, so that correct laws leave some curve too.
         """
         limits = self.baseline.policy.decision
         explained = cost(self.baseline.hypothesis) - cost(h)
@@ -259,24 +259,24 @@ class Open(ModelForm):
 
 
 def form_of(baseline: Baseline) -> ModelForm:
-    """What is taken for granted of the form of a question's FMU."""
+    """The rules for the model of a baseline: Open if a share of its form is declared open, else Closed."""
     share = baseline.problem.form_error
     return Open(baseline, share) if share > 0 else Closed(baseline)
 
 
 def signal_size(problem: Problem) -> Array:
-    """Root mean square of each output on the parts that no fit has seen, (n_y,)."""
+    """Root mean square of each measured output on the parts to choose and to test, (n_y,)."""
     measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
 def gap_closed(before: Array, after: Array, noise: Array) -> Array:
-    """Share of the distance from an error to the noise floor that an effect closes, per output (n_y,)."""
+    """Share of the gap between the error before and the noise floor that is closed, per output (n_y,)."""
     gap = before - noise
     return np.where(gap > 0, (before - after) / np.where(gap > 0, gap, 1.0), 1.0)
 
 
 def _faulty(problem: Problem, h: Hypothesis) -> BoolArray:
-    """The output (n_y,) whose sensor's fault a hypothesis is, if it is one and nothing else."""
+    """Mask (n_y,) of the faulty sensor's output if the hypothesis is one sensor fault, else all False."""
     faults = [c.location for c in h.candidates if c.is_fault and len(h.candidates) == 1]
     return np.array([y in faults for y in problem.record.outputs])

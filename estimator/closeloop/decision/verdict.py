@@ -1,4 +1,4 @@
-"""From fitted hypotheses to a verdict: what may be said, and what would tell the rest apart."""
+"""The verdict from fitted hypotheses: the checks, the hypotheses that pass, and the reason as a sentence."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def explains(baseline: Baseline, h: Hypothesis) -> bool:
 def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     """The checks of a hypothesis on the part to choose.
 
-    Every effect must be clear of zero, and the whole better than without it over the blocks of that part.
-    Outputs with declared noise must come down to it, or nearly so; the others must lose most of their
-    variance.
+    Every effect must differ clearly from zero, and the hypothesis must be better than the calibrated FMU over
+    the blocks of that part. Outputs with declared noise must come down to that noise, or nearly so; the
+    residual of the others must lose most of its variance.
     """
     limits, base = baseline.policy.decision, baseline.hypothesis
     declared = baseline.noise.declared
@@ -52,7 +52,7 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
 
 
 def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
-    """Whether h is better than the FMU without it on a part, in standard errors of the log score."""
+    """The check that h is better than the calibrated FMU on a part, in standard errors of the log score."""
     limit = baseline.policy.decision.telling
     mean, error = baseline.lead(h, baseline.hypothesis, part)
     z = mean / error if error > 0 else 0.0
@@ -60,7 +60,7 @@ def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
 
 
 def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check], Judgement | None]:
-    """The checks of a residual before any effect is looked for, and the verdict where none needs to be."""
+    """The checks before any effect is fitted, and the judgement if no search is needed, else None."""
     problem, noise = baseline.problem, baseline.noise.std
     measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
     moves = float(np.max(np.std(measured, axis=0) / noise))
@@ -72,10 +72,10 @@ def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check],
         Check.most("every sensor moves", len(dead), 0),
     ]
     if not detection.detected and not checks[1].passed:
-        reason = "no output moves out of its noise, so that no effect could have been seen"
+        reason = "no output moves out of its noise, so that no effect could have been detected"
         return checks, Judgement(tuple(checks), (), reason, "a record in which the outputs move")
     if not detection.detected:
-        reason = f"the residual is what noise would leave (p = {detection.p_value:.2g})"
+        reason = f"the residual is no larger than noise alone would leave (p = {detection.p_value:.2g})"
         return checks, Judgement(tuple(checks), (), reason)
     if not detection.material:
         size = ", ".join(f"{r:.2f}" for r in baseline.hypothesis.rms(problem, "unseen") / noise)
@@ -85,10 +85,10 @@ def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check],
 
 
 def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
-    """The judgement, held once against the part that neither fitting nor choosing has used.
+    """The judgement after one check on the test part, which neither fitting nor choosing has used.
 
-    The best member must be better than the FMU without it there too; else nothing is claimed. The others of
-    its class are not asked, for that would choose among them.
+    The best member must be better than the calibrated FMU there too; otherwise there is no answer. The other
+    members are not checked, since that would be a choice among them on the test part.
     """
     if not found.members:
         return found
@@ -98,10 +98,10 @@ def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
         return replace(found, checks=(*found.checks, check))
     gained, error = baseline.lead(best, baseline.hypothesis, "test")
     reason = (
-        f"{best.label} accounts for the part to choose, but the test part does not confirm it: "
-        f"its log score changes by {gained:.3g} with a standard error of {error:.2g} there"
+        f"{best.label} accounts for the residual on the part to choose, but the test part does not confirm "
+        f"it: the log score changes by {gained:.3g} there, with a standard error of {error:.2g}"
     )
-    advice = "a record in which what was seen appears in all three parts"
+    advice = "a record in which the discrepancy appears in all three parts"
     return Judgement((*found.checks, check), (), reason, advice)
 
 
@@ -110,7 +110,7 @@ def judge(
 ) -> Judgement:
     """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy.
 
-    began: whether it sets in during the record.
+    began: whether the discrepancy sets in during the record.
     """
     form = form_of(baseline)
     good = [h for h in singles if explains(baseline, h)]
@@ -135,47 +135,49 @@ def judge(
 
 
 def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
-    """The verdict where no hypothesis accounts for the residual."""
+    """The judgement if no hypothesis accounts for the residual."""
     another = form_of(baseline).another(began)
     checks = () if another is None else (another,)
     if another is not None and not another.passed:
         reason = (
-            "the residual is within what another form of the FMU leaves, and no effect explains most of it"
+            "the residual is within the share that the form of the FMU leaves open, and no effect explains "
+            "most of it"
         )
         return Judgement(checks, (), reason)
     if _noise_alone(baseline, "fit"):
-        reason = "the part to identify shows no more than noise: what there is begins after it"
-        return Judgement(checks, (), reason, "a split with some of it in the part to identify")
+        reason = "the part to identify shows only noise: the discrepancy begins after it"
+        return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")
     if _noise_alone(baseline, "choose"):
-        reason = "the part to choose shows no more than noise: what there is ends before, unconfirmed"
-        return Judgement(checks, (), reason, "a split with some of it in the part to choose")
+        reason = "the part to choose shows only noise: the discrepancy ends before it and cannot be confirmed"
+        return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to choose")
     label = nearest.label if nearest.candidates else "none"
-    return Judgement(checks, (), f"no effect of the library accounts for the residual; nearest was {label}")
+    reason = f"no effect of the library accounts for the residual; best fit: {label}"
+    return Judgement(checks, (), reason)
 
 
 def needed(baseline: Baseline, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-    """Whether a pair is better than the best single hypothesis, so that neither member is idle."""
+    """Whether a pair is better than the best single hypothesis, so that both members are needed."""
     return not singles or baseline.beats(pair, singles[0])
 
 
 def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis) -> bool:
-    """Whether a pair is better than a single hypothesis that explains, and accounts for what that one leaves.
+    """Whether a pair is better than a single hypothesis, and explains enough of what that one leaves.
 
-    Where most of that stays, it is neither effect, and the second one no finding.
+    If most of that stays, its cause is neither effect, and the second effect is not a finding.
     """
     least = baseline.policy.decision.second_share * baseline.beyond_noise(single)
     return baseline.beats(pair, single) and 2 * baseline.lead(pair, single)[0] >= least
 
 
 def _noise_alone(baseline: Baseline, part: Part) -> bool:
-    """Whether a part of the record is matched as well as noise lets it be."""
+    """Whether the residual of the calibrated FMU on a part of the record is only noise."""
     residual = baseline.hypothesis.of(baseline.problem, part)
     scatter = baseline.policy.decision.scatter / np.sqrt(2 * len(residual))
     return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * baseline.noise.std))
 
 
 def one_curve(h: Hypothesis) -> bool:
-    """Whether it has two laws over the same motion at one place from the start: any curve is such a sum."""
+    """Whether two laws over the same motion act at one place from the start; any curve could be their sum."""
     always = [c for c in h.candidates if c.kind in EFFECTS and moment(c) is None]
     kinds = [(c.location, EFFECTS[c.kind].over) for c in always]
     laws = [(at, over) for at, over in kinds if over]
@@ -183,28 +185,26 @@ def one_curve(h: Hypothesis) -> bool:
 
 
 def no_law(h: Hypothesis, law: Candidate | None = None, check: Check | None = None) -> Judgement:
-    """The verdict where a force keeps to a curve, but not to that of the law which comes nearest.
+    """The judgement if the force is a curve over the motion, but not the curve of any law of the library.
 
-    law: of those of the hypothesis, where it is not the first; check: what says so.
+    law: the law of the hypothesis that failed, by default the first; check: the check that it failed.
     """
     c = law or next(c for c in h.candidates if c.kind in EFFECTS)
     over = EFFECTS[c.kind].over or "motion"
-    reason = (
-        f"a force over the {over} at {c.location} that follows no law of the library; nearest was {h.label}"
-    )
+    reason = f"the force over the {over} at {c.location} follows no law of the library; best fit: {h.label}"
     return Judgement((check or Check.most("the force follows the law", 1, 0),), (), reason)
 
 
 def _not_all(m: Hypothesis, richer: Hypothesis) -> Judgement:
     reason = (
-        f"{m.label} accounts for the part to choose, but not for the part to identify, where {richer.label} "
-        "would"
+        f"{m.label} accounts for the residual on the part to choose, but not on the part to identify, where "
+        f"{richer.label} fits better"
     )
     return Judgement((), (), reason)
 
 
 def named(members: Sequence[Hypothesis]) -> Judgement:
-    """The verdict where one hypothesis accounts for the residual, or several do."""
+    """The judgement if one hypothesis accounts for the residual, or several that cannot be told apart."""
     best = members[0]
     faults = sum(c.is_fault for c in best.candidates)
     checks = (
