@@ -1,10 +1,10 @@
-"""Every limit that can change an answer: its value, unit, meaning and source, in one object.
+"""Every limit that can change an answer, with its value, unit, meaning and source, in one object.
 
-A limit stands here if another value of it could lead to another verdict, another class or another effect.
-What only changes how long a number takes to find, or its last digits, stands beside the code that uses it.
+A limit is listed here if another value could lead to another verdict or another effect. Constants that only
+change the computing time or the last digits of a result are kept beside the code that uses them.
 
-Three kinds of source are told apart: a paper; a derivation, given in words; and a calibration, which names
-the frozen challenge whose records it was found on. A calibrated limit is no law of nature.
+The source is a paper, a derivation given in words, a convention, or a calibration. A calibration names the
+challenge on whose records the value was found; such a limit is empirical.
 """
 
 from __future__ import annotations
@@ -19,305 +19,409 @@ CHALLENGE = "calibrated on the challenges up to seed 591988, frozen at 9217a2d"
 
 
 def limit(value: Any, unit: str, meaning: str, source: str) -> Any:
-    """A field of the policy with its default, and what a reader has to know of it."""
+    """A field of the policy with its default value, unit, meaning and source."""
     return field(default=value, metadata={"unit": unit, "meaning": meaning, "source": source})
 
 
 @dataclass(frozen=True)
 class DetectionPolicy:
-    """When a residual is more than noise, and when it matters."""
+    """Limits of the detection: when a residual is more than noise, and when it is large enough to matter."""
 
     level: float = limit(
         0.01,
         "probability",
-        "of calling noise a discrepancy, for all figures together",
-        "convention: 2 false finds in 100 records are allowed, and half of that is left to the search",
+        "probability of reporting a discrepancy if the residual is pure noise, over all statistics together",
+        "convention: 2 false reports in 100 records are allowed, and half of that is left to the search",
     )
     replicates: int = limit(
         499,
         "draws",
-        "of noise that the figures are held against",
-        "derivation: the least probability that they can show, 1 in 500, is a fifth of the level",
+        "draws of white noise that form the reference distribution of each statistic",
+        "derivation: the smallest p-value that they can give, 1 in 500, is a fifth of the level",
     )
     slow_blocks: int = limit(
         40,
-        "pieces",
-        "of what no fit has seen, whose means show a residual that is slower than the noise",
+        "blocks",
+        "blocks of the parts to choose and to test whose means show a residual that is slower than the noise",
         CHALLENGE,
     )
     signal_share: float = limit(
         0.02,
-        "of an output's rms",
-        "beyond the noise, below which a residual does not matter if it is small beside the noise too",
-        "the agreed default: under 2 % of the signal a difference of form of the model is to be expected",
+        "share of an output's rms",
+        "a residual beyond noise is too small to matter if it is below this and below `noise_share`",
+        "agreed default: differences below 2 % of the signal are expected from the form of any model",
     )
     noise_share: float = limit(
         0.5,
-        "of the noise",
-        "beyond the noise, below which a residual does not matter if it is small beside the signal too",
+        "times the noise",
+        "a residual beyond noise is too small to matter if it is below this and below `signal_share`",
         "derivation: half of the noise adds 12 % to an output's rms, which no user of the model would notice",
     )
     noise_share_of_effects: float = limit(
-        0.2, "of the noise", "the same for a residual that is clearly like an effect", CHALLENGE
+        0.2, "times the noise", "replaces `noise_share` if the residual is clearly like an effect", CHALLENGE
     )
     clear_likeness: float = limit(
         20.0,
-        "of what noise reaches in 1 of 20 records",
-        "likeness to an effect from which a residual is clearly like one",
-        f"{CHALLENGE}: records without an effect come to 6",
+        "times the 95 % quantile of noise",
+        "likeness to an effect from which on the residual is clearly like that effect",
+        f"{CHALLENGE}: records without an effect reach 6",
     )
     chance: float = limit(
         3.0,
         "standard deviations",
-        "of the mean square of white noise, that a residual may exceed the noise by chance",
+        "allowance for chance: how far the mean square of pure noise may exceed its expectation",
         "derivation: 1 in 700 by the normal distribution",
     )
     open_form_noises: float = limit(
-        2.0, "of the noise", "below which a residual is left alone where the model's form is open", CHALLENGE
+        2.0,
+        "times the noise",
+        "a residual with a smaller rms does not matter if the model form is open",
+        CHALLENGE,
     )
     open_form_likeness: float = limit(
         0.2,
-        "of what is beyond noise",
-        "that one effect could explain, from which a residual is no other form of the model",
+        "share of the sum of squares beyond noise",
+        "if one effect could explain this share, the residual is not attributed to the open model form",
         CHALLENGE,
     )
 
 
 @dataclass(frozen=True)
 class SearchPolicy:
-    """What is fitted, how far, and what gives way: the more, the longer it takes."""
+    """Limits of the search: which hypotheses are fitted and how far. More fits take more time."""
 
     nominees: int = limit(
-        16, "effects", "of the screening that are fitted; half as many around a foreign FMU", CHALLENGE
-    )
-    nominees_in_shapes: int = limit(
-        6, "effects", "the leading ones, that are fitted in more shapes", CHALLENGE
-    )
-    shapes_of_nominee: int = limit(2, "shapes", "of each of these", CHALLENGE)
-    nominated_faults: int = limit(4, "faults", "of sensors that are fitted", CHALLENGE)
-    overlooked_share: float = limit(
-        0.2,
-        "of what is beyond noise",
-        "that all leave where the form is open, from which more effects are tried",
+        16,
+        "effects",
+        "effects of the screening that are fitted, best first; half as many with a foreign FMU",
         CHALLENGE,
     )
-    overlooked_more: int = limit(6, "effects", "that are tried then, beside constant changes", CHALLENGE)
+    nominees_in_shapes: int = limit(
+        6,
+        "effects",
+        "leading effects that are fitted from several start values of their shape parameters",
+        CHALLENGE,
+    )
+    shapes_of_nominee: int = limit(
+        2,
+        "shapes",
+        "start values of the shape parameters that are tried for each of these effects",
+        CHALLENGE,
+    )
+    nominated_faults: int = limit(
+        4, "faults", "sensor faults of the screening that are fitted, best first", CHALLENGE
+    )
+    overlooked_share: float = limit(
+        0.2,
+        "share of the sum of squares beyond noise",
+        "with an open model form, more effects are fitted if the best fit leaves more than this",
+        CHALLENGE,
+    )
+    overlooked_more: int = limit(
+        6,
+        "effects",
+        "effects that are fitted then, beside all constant changes of parameters and inputs",
+        CHALLENGE,
+    )
     likely_fault: float = limit(
         0.5,
-        "of what is beyond noise",
-        "that a sensor's fault could explain, from which it is fitted before all else",
+        "share of the sum of squares beyond noise",
+        "a sensor fault that could explain more than this is fitted before the effects",
         CHALLENGE,
     )
     rival_of_fault: float = limit(
         0.7,
-        "of what a fault that explains could gain",
-        "below which an effect is no rival of it",
+        "share of the fault's expected gain",
+        "after a sensor fault that explains the residual, effects that could gain less are not fitted",
         CHALLENGE,
     )
-    placebos: int = limit(3, "effects", "that are fitted beside such a fault all the same", CHALLENGE)
-    sudden: int = limit(4, "effects", "fitted that may have set in at a time that shows", CHALLENGE)
+    placebos: int = limit(
+        3,
+        "effects",
+        "effects that are fitted after such a sensor fault in any case, for comparison",
+        CHALLENGE,
+    )
+    sudden: int = limit(
+        4,
+        "effects",
+        "effects with a detected onset that are fitted jointly with the calibrated parameters",
+        CHALLENGE,
+    )
     sets_in_times: float = limit(
-        9.0, "of the mean square before", "of a residual from which something has set in", CHALLENGE
+        9.0,
+        "times the mean square before",
+        "mean square of the residual after an onset, above which the onset is detected",
+        CHALLENGE,
     )
     sets_in_times_open: float = limit(
-        2.0, "of the mean square before", "the same where the form is open and all is small", CHALLENGE
+        2.0,
+        "times the mean square before",
+        "replaces `sets_in_times` if the residual could come from the open model form",
+        CHALLENGE,
     )
     sets_in_chance: float = limit(
         1e-5,
         "probability",
-        "by chance, of the ranks of the blocks after an onset against those before (Mann and Whitney's test)",
+        "p-value of the Mann-Whitney test of the blocks after an onset against those before, to detect it",
         CHALLENGE,
     )
-    sudden_fits: int = limit(12, "effects", "that get a short fit from the onset on", CHALLENGE)
-    finalists: int = limit(5, "hypotheses", "of the brief fits that are fitted to the end", CHALLENGE)
-    finalist_pairs: int = limit(2, "pairs", "of the brief fits that are fitted to the end", CHALLENGE)
+    sudden_fits: int = limit(
+        12,
+        "effects",
+        "effects with a detected onset that are first fitted to a short part of the record after it",
+        CHALLENGE,
+    )
+    finalists: int = limit(
+        5, "hypotheses", "hypotheses that are fitted to convergence after the brief fits", CHALLENGE
+    )
+    finalist_pairs: int = limit(
+        2, "pairs", "pairs that are fitted to convergence after the brief fits", CHALLENGE
+    )
     first_finalists: int = limit(
-        2, "hypotheses", "of the finalists that are fitted before the others", CHALLENGE
+        2,
+        "hypotheses",
+        "hypotheses that are fitted to convergence before the remaining ones are compared with them",
+        CHALLENGE,
     )
     rival: float = limit(
-        4.0, "of the best sum of squares", "above which a finalist is not fitted to the end", CHALLENGE
+        4.0,
+        "times the best sum of squares",
+        "a hypothesis above this is not fitted to convergence",
+        CHALLENGE,
     )
     hopeless: float = limit(
-        10.0, "of the best sum of squares", "after the brief fits, above which none is a finalist", CHALLENGE
+        10.0, "times the best sum of squares", "a brief fit above this is not continued", CHALLENGE
     )
     worth_a_fit: float = limit(
-        0.95, "of the base's sum of squares", "above which none is a finalist", CHALLENGE
+        0.95,
+        "times the calibrated FMU's sum of squares",
+        "a brief fit above this is not continued",
+        CHALLENGE,
     )
     reweighted: int = limit(
-        6, "hypotheses", "fitted again once the best fit has told the noise that was not declared", CHALLENGE
+        6,
+        "hypotheses",
+        "hypotheses that are fitted again with the noise of the best fit, if noise is not declared",
+        CHALLENGE,
     )
-    dated: int = limit(3, "hypotheses", "whose onset times are tried one after the other", CHALLENGE)
-    dated_rival: float = limit(2.0, "of the best sum of squares", "above which none is dated", CHALLENGE)
+    dated: int = limit(
+        3, "hypotheses", "leading hypotheses whose onset time is searched on a grid", CHALLENGE
+    )
+    dated_rival: float = limit(
+        2.0, "times the best sum of squares", "above this no onset time is searched", CHALLENGE
+    )
     grown: int = limit(
-        4, "effects", "of the best and of the most promising, fitted to a growing part", CHALLENGE
+        4,
+        "effects",
+        "leading effects of the fits, and as many of the screening, that are fitted to a growing part",
+        CHALLENGE,
     )
-    grown_survivors: int = limit(4, "hypotheses", "of these that go on after the first parts", CHALLENGE)
-    grown_rival: float = limit(4.0, "of the best mean square", "above which none goes on", CHALLENGE)
-    grown_refined: int = limit(2, "hypotheses", "that are fitted by finer differences in the end", CHALLENGE)
-    paired: int = limit(8, "single effects", "that partners are looked for", CHALLENGE)
-    partners: int = limit(12, "candidates", "leading ones among which pairs are screened", CHALLENGE)
-    pairs: int = limit(4, "pairs", "from each of the two screenings that are fitted", CHALLENGE)
+    grown_survivors: int = limit(
+        4, "hypotheses", "hypotheses that are continued after the first growing parts", CHALLENGE
+    )
+    grown_rival: float = limit(
+        4.0,
+        "times the best mean square",
+        "above this a hypothesis is not continued on a growing part",
+        CHALLENGE,
+    )
+    grown_refined: int = limit(
+        2, "hypotheses", "hypotheses that are finally fitted with smaller finite differences", CHALLENGE
+    )
+    paired: int = limit(
+        8, "effects", "leading single effects for which a second effect is searched", CHALLENGE
+    )
+    partners: int = limit(12, "candidates", "leading candidates whose pairs are all screened", CHALLENGE)
+    pairs: int = limit(
+        4, "pairs", "pairs that are fitted from each of the two screenings of pairs", CHALLENGE
+    )
     second_effect: float = limit(
         0.25,
-        "of an output's noise",
-        "rms that a second effect beside one that explains must promise",
+        "times an output's noise",
+        "rms that a second effect must be expected to explain, if one effect accounts for the residual",
         CHALLENGE,
     )
     lookalike: float = limit(
-        0.05, "of what a law does", "that another one misses of it at most, to look like it", CHALLENGE
+        0.05,
+        "share of the rms of a law's response",
+        "a law that reproduces this response with a smaller error is similar to it",
+        CHALLENGE,
     )
     lookalike_squares: float = limit(
         20.0,
-        "of the sum of squares",
-        "that another law may miss in any case, as noise could hide it",
+        "sum of squares, in units of the noise",
+        "a law with a smaller error is similar in any case, because noise could hide the difference",
         CHALLENGE,
     )
     lookalike_worse: float = limit(
-        1.5, "of the best sum of squares", "from which on a fit may have ended elsewhere", CHALLENGE
+        1.5,
+        "times the best sum of squares",
+        "a similar law whose fit is worse than this is fitted again from the best law's values",
+        CHALLENGE,
     )
-    lookalikes: int = limit(3, "laws", "that look like the best one and are fitted in its place", CHALLENGE)
+    lookalikes: int = limit(3, "laws", "laws similar to the best one that are fitted in its place", CHALLENGE)
 
 
 @dataclass(frozen=True)
 class DecisionPolicy:
-    """From fitted hypotheses to a verdict."""
+    """Limits of the decision: from fitted hypotheses to a verdict."""
 
     telling: float = limit(
         2.0,
         "standard errors over blocks",
-        "of a difference in log score, from which one hypothesis is better than another",
+        "difference in log score from which on one hypothesis is better than another",
         "F. X. Diebold, R. S. Mariano, J. Business and Economic Statistics 13 (1995), 253-263: 1 in 44",
     )
     significant: float = limit(
         4.0,
         "standard errors",
-        "of an effect's size from zero, below which it is idle",
+        "distance of an effect's size from zero, below which the effect is not needed",
         "derivation: 1 in 16000 by the normal distribution, so 1 in 100 for the 150 candidates of a record",
     )
     excited: float = limit(
         3.0,
-        "of the noise",
-        "standard deviation of an output, below which it shows nothing",
+        "times the noise",
+        "standard deviation of an output, below which the output shows nothing but noise",
         "derivation: as `chance`",
     )
     clean: float = limit(
-        1.05, "of the noise", "rms of a residual that counts as noise, beside its scatter", CHALLENGE
+        1.05, "times the noise", "rms of a residual that counts as noise; `scatter` is added to it", CHALLENGE
     )
     scatter: float = limit(
         3.0,
         "standard errors",
-        "of an rms, that it may be larger by chance",
+        "allowance for chance in the rms of a residual",
         "derivation: 1 in 700, as `chance`",
     )
     gap: float = limit(
         0.95,
-        "of the gap to the noise",
-        "that an answer must close where it does not come down to it",
+        "share of the gap to the noise",
+        "share of the gap that an answer must close if it does not come down to the noise",
         CHALLENGE,
     )
     explained: float = limit(
         0.75,
-        "of the residual's variance",
-        "that an answer must take away where the noise is not declared, so that the floor is unknown",
+        "share of the residual's variance",
+        "share that an answer must explain if noise is not declared, so that the noise floor is unknown",
         CHALLENGE,
     )
     open_explained: float = limit(
         0.9,
-        "of the variance beyond noise",
-        "that must go where the model's form is open and all is small",
+        "share of the variance beyond noise",
+        "share that several effects must explain if the model form is open and all residuals are small",
         CHALLENGE,
     )
     open_single: float = limit(
         0.5,
-        "of the variance beyond noise",
-        "that one effect must explain of all outputs together where the model's form is open",
+        "share of the variance beyond noise",
+        "share that one effect must explain of all outputs together if the model form is open",
         CHALLENGE,
     )
     open_alike: float = limit(
         0.25,
-        "of what the best leaves beyond noise",
-        "by which another may be worse and still not be told from it, where the form is open",
+        "share of what the best one leaves beyond noise",
+        "a hypothesis that is worse by less cannot be told from the best one if the model form is open",
         CHALLENGE,
     )
     alike: float = limit(
         0.01,
-        "of the sum of squares",
-        "by which another may be worse, as a small difference of the model's form could decide between them",
-        "the agreed assumption that the model's form is right to within small differences",
+        "share of the sum of squares",
+        "a hypothesis that is worse by less cannot be told from the best one: the form may be slightly wrong",
+        "agreed assumption: the model's form is right to within small differences",
     )
     unknown: float = limit(
         2.0,
         "log score",
-        "that a further unknown must be worth beside the simpler law that it becomes",
-        "H. Akaike, IEEE Trans. Automatic Control 19 (1974), 716-723, asks for 1; laws are many",
+        "gain that each further unknown of a law must bring over the simpler law that is its limit",
+        "H. Akaike, IEEE Trans. Automatic Control 19 (1974), 716-723, asks for 1; 2 because laws are many",
     )
     noticed: float = limit(
         40.0,
-        "of the sum of squares",
-        "fall by something more, that noise alone does not bring about",
-        "derivation: the largest of 150 chi-squares is below 17 in 99 of 100 records; twice that and more",
+        "sum of squares, in units of the noise",
+        "reduction by a further term that noise alone does not cause",
+        "derivation: the largest of 150 chi-squares is below 17 in 99 of 100 records; more than twice that",
     )
     missed: float = limit(
         1e-3,
-        "of what a law explains",
-        "that more may gain in the part to identify, if the law is right",
+        "share of what a law explains",
+        "further reduction that is possible in the part to identify although the law is right",
         CHALLENGE,
     )
     second_share: float = limit(
-        0.5, "of what one effect leaves beyond noise", "that a second one beside it must explain", CHALLENGE
+        0.5,
+        "share of what one effect leaves beyond noise",
+        "share that a second effect, or a free curve beside a law, must explain",
+        CHALLENGE,
     )
     pair_leaves: float = limit(
-        0.1, "of what the second effect explains", "that a right pair leaves beyond noise at most", CHALLENGE
+        0.1,
+        "share of what the second effect explains",
+        "largest remainder beyond noise that a correct pair may leave",
+        CHALLENGE,
     )
     curve_of_noise: float = limit(
         0.05,
-        "of the sum of squares of noise",
-        "that a free curve must gain beside a law, to deny it",
+        "share of the sum of squares of noise",
+        "reduction by a free curve beside a law, from which on the law may be rejected",
         CHALLENGE,
     )
     open_curve_left: float = limit(
-        0.05, "of what the law leaves", "the same where the model's form is open", CHALLENGE
+        0.05,
+        "share of what the law leaves",
+        "reduction by a free curve, from which on a law may be rejected if the model form is open",
+        CHALLENGE,
     )
     open_curve_explained: float = limit(
-        2.5e-3, "of what the law explains", "the same where the model's form is open", CHALLENGE
+        2.5e-3,
+        "share of what the law explains",
+        "reduction by a free curve, from which on a law may be rejected if the model form is open",
+        CHALLENGE,
     )
     open_curve_elsewhere: float = limit(
         0.99,
-        "of what a curve over another motion gains",
-        "below which the law is not denied, form open",
+        "share of the reduction by a curve over another motion",
+        "a law is not rejected by a free curve that gains less, if the model form is open",
         CHALLENGE,
     )
     rounded: float = limit(
-        1e-4, "of what a law explains", "that a smooth curve which passes for it misses at least", CHALLENGE
+        1e-4,
+        "share of what a law explains",
+        "smallest misfit of a smooth curve that imitates a law with a corner",
+        CHALLENGE,
     )
     plain_law: int = limit(
         2,
         "unknowns",
-        "above which a law is as rounded as any, so that `open_curve_explained` holds",
+        "a law with no more unknowns is imitated less closely: `open_curve_explained` replaces `rounded`",
         CHALLENGE,
     )
     fastest: float = limit(
-        0.1, "of the motion", "the fastest, in which friction that is rounded there too is none", CHALLENGE
+        0.1,
+        "share of the samples",
+        "fastest samples; friction whose rounded part includes even these is not named friction",
+        CHALLENGE,
     )
     different: float = limit(
         0.01,
         "probability",
-        "below which the estimates of two records differ, or one value does not serve several",
+        "p-value below which the estimates of several records differ, so that no common value is given",
         "convention, as the level of detection",
     )
     errors_reach: float = limit(
         3.0,
         "standard errors",
-        "that values may move by where laws are compared as their errors allow",
+        "how far values may move when laws are adjusted to the part to choose within their errors",
         CHALLENGE,
     )
-    errors_apart: float = limit(20.0, "log score", "between laws, from which they are compared so", CHALLENGE)
-    errors_laws: int = limit(8, "laws", "that are compared so", CHALLENGE)
+    errors_apart: float = limit(
+        20.0, "log score", "difference between laws from which on they are adjusted in this way", CHALLENGE
+    )
+    errors_laws: int = limit(8, "laws", "laws that are adjusted in this way, best first", CHALLENGE)
 
 
 @dataclass(frozen=True)
 class Policy:
-    """All limits, by the stage that they belong to."""
+    """All limits, grouped by detection, search and decision."""
 
     detection: DetectionPolicy = DetectionPolicy()
     search: SearchPolicy = SearchPolicy()
@@ -325,12 +429,12 @@ class Policy:
 
     @property
     def version(self) -> str:
-        """A short hash of all values: two results with the same version were decided by the same limits."""
+        """A short hash of all values: results with the same version were decided with the same limits."""
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def limits(self) -> Iterator[tuple[str, Any, Field[Any]]]:
-        """Name (stage.limit), value and field of each."""
+        """Name (group.limit), value and field of each limit."""
         for stage in fields(self):
             group = getattr(self, stage.name)
             if is_dataclass(group):
@@ -338,7 +442,7 @@ class Policy:
                     yield f"{stage.name}.{f.name}", getattr(group, f.name), f
 
     def table(self) -> str:
-        """All limits as a Markdown table a stage; docs/policy.md holds that of the default."""
+        """One Markdown table per group; docs/policy.md holds the tables of the default policy."""
         lines: list[str] = []
         stage = ""
         for name, value, about in self.limits():
