@@ -1,4 +1,4 @@
-"""The FMU as declared, and calibrated within the declared bounds."""
+"""Calibration of the declared parameters within their bounds, by least squares of the simulation error."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.noise import Noise, noise_floor, weights
 
-ROUGH = 1e-3  # gain of a step that is enough where much is left unexplained
-ROUGHLY_MATCHED = 2.0  # mean square, in units of a residual that counts as one, from which down it is not
-SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is left alone
+ROUGH = 1e-3  # tolerance of the first fit, which is enough while the residual is large
+ROUGHLY_MATCHED = 2.0  # mean square of the weighted residual, below which the fit is continued accurately
+SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is not fitted
 
 
 def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
-    """Hypotheses without effects, declared and calibrated, and the noise of the record.
+    """The FMU with declared values, the calibrated FMU (both without effects), and the noise of the record.
 
-    Where noise is not declared its scale depends on the residual, so the calibration is repeated with it.
+    If noise is not declared, the weights depend on the residual, so the calibration is repeated with them.
     """
     record = problem.record
     states = _start_unknowns(problem)
@@ -38,7 +38,7 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
 
 
 def _start_unknowns(problem: Problem) -> list[Unknown]:
-    """Start states to be found: those that are free, and whose error could be seen in the residual."""
+    """The free start states whose error would be visible in the residual, as unknowns."""
     guess = problem.start_states(problem.record.runs[0])
     if not guess:
         return []

@@ -1,4 +1,4 @@
-"""Fit unknowns by simulation error on the identify part, with bounds and standard errors."""
+"""Bounded least squares of the simulation error on the part to identify, with standard errors."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
-GAIN = 1e-6  # of the sum of squares: a step that gains less is the last one
+GAIN = 1e-6  # relative reduction of the sum of squares, below which the fit ends
 
 
-NEAR_NOISE = 5.0  # mean square, in units of noise, from which down derivatives are carried along
+NEAR_NOISE = 5.0  # mean square, in units of noise, below which derivatives are updated by secants
 
 
-LITTLE = 1e-4  # of the sum of squares: with fresh derivatives no more to be gained, so that the old ones did
+LITTLE = 1e-4  # relative reduction with new derivatives, below which the secants were accurate enough
 
 
-SLIGHT = 0.1  # standard errors: a shift that makes no difference
+SLIGHT = 0.1  # standard errors: smaller shifts are ignored
 
 
-REFUSED = 1e6  # size of a residual where the FMU could not be run
+REFUSED = 1e6  # weighted residual that is assigned if the FMU cannot be simulated
 
 
-Named = Callable[[Sequence[float]], dict[str, float]]  # values by name, of a place
+Named = Callable[[Sequence[float]], dict[str, float]]  # values by name for a vector of unknowns
 
 
 def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
-    """Residual on the identify part over `size` (n_y,), sample after sample, (m,)."""
+    """Residual on the part to identify divided by `size` (n_y,), sample after sample, (m,)."""
     try:
         flat = (problem.identify_residual(theta) / size).ravel()
     except FmuError:
@@ -60,10 +60,11 @@ def fit(
 ) -> Fit:
     """Least squares of the simulation error over the unknowns, from `start` or their own start values.
 
-    evaluations: simulations at most, the first one of each leg counted and those for differences not; gain:
-    share of the sum of squares; a step that gains less is the last one. known: derivatives (m,) of the
-    weighted residual by some of the unknowns, taken as they are; guess: such as are good enough to begin;
-    step: of differences, in scales; a moment, which a model meets only at its own steps, has the usual one.
+    evaluations: largest number of simulations, not counting those for finite differences; gain: relative
+    reduction of the sum of squares by a step, below which the fit ends. known: derivatives (m,) of the
+    weighted residual with respect to some unknowns, which are kept; guess: derivatives for the first step
+    only. step: step of the finite differences, in scales; onset times always use the default step, because
+    a model realises an onset only at its own time steps.
     """
     low, high, scale = (np.array([getattr(u, key) for u in unknowns]) for key in ("low", "high", "scale"))
     x0 = np.array([(start or {}).get(u.name, u.start) for u in unknowns])
@@ -92,7 +93,7 @@ def fit(
 
 
 def _residual(problem: Problem, theta: Named, size: Array, places: int) -> Callable[[Array], Array]:
-    """The weighted residual (m,) as a function of x; that of the last places is kept."""
+    """The weighted residual (m,) as a function of x; the last results are cached."""
 
     @lru_cache(places)
     def simulated(x: tuple[float, ...]) -> Array:
@@ -102,7 +103,7 @@ def _residual(problem: Problem, theta: Named, size: Array, places: int) -> Calla
 
 
 def _begun(problem: Problem, theta: Named, size: Array) -> Callable[[Array, float], Array] | None:
-    """The first share of the weighted residual as a function of x; None of several runs."""
+    """The weighted residual on a first share of the part, as a function of x; None for several runs."""
     if sum(run.fit.any() for run in problem.record.runs) > 1:
         return None
     part = lru_cache(problem.beginning)
@@ -113,10 +114,10 @@ def _descended(
     residual: Callable[[Array], Array], slopes: Slopes, x: Array, bounds: tuple[Array, Array], scale: Array,
     evaluations: int, gain: float, secants: bool,
 ) -> tuple[Array, bool]:  # fmt: skip
-    """Where steps from x end, and whether not broken off.
+    """The optimum from start x, and whether the fit converged.
 
-    With derivatives by differences throughout while the way is far; near the end along secants, and there by
-    differences again, until these gain little from the start.
+    Far from the optimum, derivatives are computed by finite differences at every step. Near it they are
+    updated by secants, then computed by finite differences again, until these gain little.
     """
     left = evaluations
     while True:
@@ -137,10 +138,10 @@ def _descended(
 
 
 def _middle(x: Array, jacobian: Array, scale: Array, low: Array, high: Array) -> Array:
-    """The mean of what data and bounds leave, (n,); x: where the sum of squares is least.
+    """The posterior mean (n,) of the linearised fit with a uniform prior between the bounds; x: the optimum.
 
-    What the data tell stays where it is; where they tell only the sum of two, each goes as far from its
-    bounds as the other lets it. Small shifts, which make no difference, are none.
+    Unknowns that the data determine stay at the optimum. If the data determine only the sum of two unknowns,
+    both move towards the middle of their bounds along that sum. Small shifts are ignored.
     """
     bounded = high - low < WIDE * scale
     away = np.zeros(len(x))

@@ -1,4 +1,4 @@
-"""Joint fits of hypotheses by simulation: brief ones to all that is promised, long ones to what leads."""
+"""Joint fits of hypotheses by simulation: brief fits of all promises, then full fits of the leading ones."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-BRIEF, LONG = 4, 20  # steps of a fit to rank it, and to finish it
-GAINS = 0.98  # of the sum of squares that a further round must come below to be followed by another
-FURTHER_ROUNDS, LAST = 4, 2  # of LONG fits of the leading finalists, where they have not converged
-ABOARD = 6  # effects in one FMU
+BRIEF, LONG = 4, 20  # evaluations of a brief fit, which only ranks, and of a full fit
+GAINS = 0.98  # ratio of the sums of squares after and before a round, above which no other round follows
+FURTHER_ROUNDS, LAST = 4, 2  # rounds of further LONG fits, and leading hypotheses that they continue
+ABOARD = 6  # effects that are built into one FMU
 
-Columns = Mapping[str, Array]  # derivatives (m,) of the weighted residual by the name of an unknown
+Columns = Mapping[str, Array]  # derivatives (m,) of the weighted residual, by the name of the unknown
 
 
 @dataclass(frozen=True)
 class Fitter:
-    """Fits hypotheses to the record of a baseline; jobs: processes that work at it."""
+    """Fits hypotheses to the record of a baseline; jobs: number of processes."""
 
     baseline: Baseline
     jobs: int = 1
 
     @property
     def alone(self) -> Fitter:
-        """The same in one process."""
+        """The same fitter with one process."""
         return replace(self, jobs=1)
 
     def asked(self, problem: Problem) -> Fitter:
-        """The same for another form of the question."""
+        """The same fitter with another problem."""
         return replace(self, baseline=self.baseline.asked(problem))
 
     def hypotheses(self, promises: Sequence[Promise], finalists: int) -> list[Hypothesis]:
-        """Fit each promise briefly, and to the end the best of those that better the base; best first."""
+        """Brief fits of all promises, then full fits of the best ones that improve the calibrated FMU."""
         return self.to_the_end(self.briefly(promises), finalists)
 
     def briefly(self, promises: Sequence[Promise], known: bool = True) -> list[Hypothesis]:
-        """A fit of few evaluations to each promise, best first on the identify part; one a label.
+        """Fits of few evaluations, one per label, sorted by sum of squares, best first.
 
-        Start states, which hardly matter for the ranking, stay where the base has them, with the derivatives
-        that the base has. known: what the base's other unknowns do is taken from the base too.
+        Start states hardly matter for the ranking and keep the values and derivatives of the calibrated FMU.
+        known: whether the derivatives of the other unknowns are taken from the calibrated FMU too.
         """
         problem, base = self.baseline.problem, self.baseline.hypothesis.fit
         states = {n: v for n, v in base.theta.items() if n in problem.free_states}
@@ -60,7 +60,7 @@ class Fitter:
         return [replace(h, fit=h.fit.extended(base, states)) for h in found]
 
     def to_the_end(self, brief: Sequence[Hypothesis], finalists: int | None = None) -> list[Hypothesis]:
-        """The finalists of brief fits fitted to the end, and all others as they are; best first."""
+        """Full fits of the finalists among brief fits, and all other brief fits unchanged; best first."""
         limits, base = self.baseline.policy.search, self.baseline.hypothesis
         limit = min([limits.worth_a_fit * cost(base), *(limits.hopeless * cost(h) for h in brief)])
         hopeful = [h for h in brief if cost(h) < limit][: finalists or limits.finalists]
@@ -79,9 +79,10 @@ class Fitter:
         self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
         guess: Columns | None = None, step: float = STEP,
     ) -> list[Hypothesis]:  # fmt: skip
-        """Fit each promise to the end; the leading ones, best first, until they converge or hardly gain.
+        """Full fits of all promises, best first; the leading ones are continued until they hardly gain.
 
-        unknowns: beside those of the candidates, by default those of the base; guess, step: see `fit`.
+        unknowns: those that are fitted with the candidates' own, by default those of the calibrated FMU;
+        guess, step: see `fit`.
         """
         rival = self.baseline.policy.search.rival
         found = self.fitted(promises, LONG, unknowns, guess=guess, step=step)
@@ -101,9 +102,9 @@ class Fitter:
         self, promises: Sequence[Promise], evaluations: int, unknowns: Sequence[Unknown] | None = None,
         known: Columns | None = None, guess: Columns | None = None, step: float = STEP,
     ) -> list[Hypothesis]:  # fmt: skip
-        """Fit each promise with so many evaluations; one hypothesis a label, best first.
+        """Fits of all promises with a number of evaluations; one hypothesis per label, best first.
 
-        unknowns: as of `finished`; known, guess, step: see `fit`.
+        unknowns: see `finished`; known, guess, step: see `fit`.
         """
         problem, size = self.baseline.problem, self.baseline.noise.scale
         others = self.baseline.hypothesis.fit.unknowns if unknowns is None else unknowns
@@ -125,10 +126,10 @@ def hypothesis(
     guess: Columns | None = None,
     step: float = STEP,
 ) -> Hypothesis | None:
-    """Fit a set of candidates jointly with the base unknowns, from where the screening left them.
+    """Fit the candidates of a promise jointly with other unknowns, from the start values of the promise.
 
-    known, guess, step: see `fit`. None where the FMU does not run with them, or runs away: a residual that is
-    not finite, or of the size that stands for a refusal, is no answer.
+    known, guess, step: see `fit`. Returns None if the FMU cannot be simulated with the fitted values or its
+    simulation diverges.
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
@@ -143,9 +144,10 @@ def hypothesis(
 
 
 def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
-    """For each promise the problem with an FMU that has its effects and those of some others, all off.
+    """For each promise a problem with an FMU that holds its effects and those of some other promises.
 
-    To build an FMU may take longer than the fits with it. Effects with a memory would cost steps.
+    Effects share an FMU because building one may take longer than fitting with it. Effects with states of
+    their own get separate FMUs, because they would slow down the simulation.
     """
     labels = sorted({(c.kind, c.location) for p in promises for c in p.candidates if not c.is_fault})
     light = [(kind, at) for kind, at in labels if not EFFECTS[kind].states("translation")]
@@ -160,5 +162,5 @@ def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
 
 
 def from_there(found: Sequence[Hypothesis]) -> list[Promise]:
-    """Promises that begin where hypotheses are."""
+    """Promises whose start values are the fitted values of hypotheses."""
     return [Promise(h.candidates, 0.0, h.fit.theta) for h in found]

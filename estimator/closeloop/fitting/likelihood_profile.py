@@ -1,7 +1,7 @@
-"""How far a law's parameters may be from where they were found: by the sum of squares itself.
+"""Standard errors of a law's parameters from the likelihood profile.
 
-Where amplitude and shape make up for each other (the stiffness of a spring and its play, over a motion much
-wider than that), the sum of squares is a bent valley, which the covariance at its lowest point cuts short.
+If amplitude and shape can compensate each other (the stiffness of a spring and its play, over a much wider
+motion), the sum of squares has a curved valley, and the covariance at its minimum underestimates the errors.
 Source: D. J. Venzon, S. H. Moolgavkar, Applied Statistics 37 (1988), 87-94.
 """
 
@@ -21,20 +21,20 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 
 WIDTH = 1.96  # standard errors: 95 %
-PROFILE_PLACES = 3  # places on each side
-FURTHER = 2.0  # times as far at most, from one to the next
-PROFILE_EVALUATIONS = 6  # of the fit of all others at each
-DEEPER = 4.0  # by how much the sum of squares has to be lower somewhere, to go there
-DEEPER_ROUNDS = 2  # of going on from a lower place
+PROFILE_PLACES = 3  # points of the profile on each side
+FURTHER = 2.0  # largest ratio of the distances of successive points
+PROFILE_EVALUATIONS = 6  # evaluations of the fit of all other unknowns at each point
+DEEPER = 4.0  # reduction of the sum of squares at a point, above which the fit is restarted there
+DEEPER_ROUNDS = 2  # largest number of such restarts
 
 
 def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
-    """The hypothesis with the standard errors of its laws widened to where the sum of squares says no.
+    """The hypothesis with the standard errors of its laws widened to those of the likelihood profile.
 
-    Of each parameter the wider side counts. Where the valley turns out to be deeper elsewhere, the hypothesis
-    is fitted again from there, and where it was before counts as a place like those that are tried. Laws that
-    are linear in their parameters stay as they are. Moments are tried one after the other, as the sum of
-    squares is rugged in them.
+    The wider side of each parameter counts. If the profile finds a lower sum of squares, the hypothesis is
+    fitted again from there, and its former values count as a point of the profile. Laws that are linear in
+    their parameters keep their errors. Onset times are evaluated on a grid, because the sum of squares has
+    many local minima over them.
     """
     problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     before: list[Hypothesis] = []
@@ -56,7 +56,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
 
 
 def reached(h: Hypothesis, b: Hypothesis) -> Array:
-    """Standard errors (n,) of the laws' parameters that reach a place which the sum of squares allows."""
+    """Standard errors (n,) of the laws' parameters that include b, if the sum of squares at b allows it."""
     own, found = h.own, np.zeros(len(h.fit.unknowns))
     for i, u in enumerate(h.fit.unknowns):
         if u.name in own and cost(b) - cost(h) < WIDTH**2 * _usual(h, i):
@@ -65,13 +65,13 @@ def reached(h: Hypothesis, b: Hypothesis) -> Array:
 
 
 def bends(c: Candidate) -> bool:
-    """Whether a candidate has an amplitude and a shape that may make up for each other."""
+    """Whether a candidate has an amplitude and a shape parameter, which may compensate each other."""
     free = {u.name for u in c.unknowns}
     return any(u.name in free for u in c.amplitudes) and any(not u.is_moment for u in c.shape)
 
 
 def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, float], dict[str, float]]:
-    """Standard errors by name; and values where the sum of squares is lower, where it is found to be."""
+    """Standard errors by name, and values with a lower sum of squares, if some were found."""
     wider: dict[str, float] = {}
     for name in begins(h):
         half, deeper = _when(problem, h, name, size)
@@ -90,9 +90,9 @@ def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, f
 def _half(
     problem: Problem, h: Hypothesis, u: Unknown, size: Array, side: float
 ) -> tuple[float, dict[str, float]]:
-    """How far on a side of its value the parameter may be in 95 of 100 cases, as far as is looked.
+    """Half width of the 95 % interval of u on one side, as far as the points of the profile reach.
 
-    And the values of a lower place, where one is met.
+    The second result holds values with a lower sum of squares, if a point had one.
     """
     i = [x.name for x in h.fit.unknowns].index(u.name)
     best, error = float(h.fit.values[i]), h.fit.std[u.name]
@@ -116,9 +116,10 @@ def _half(
 
 
 def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[float, dict[str, float]]:
-    """How far from its value a moment may be in 95 of 100 cases, of those that are tried.
+    """Half width of the 95 % interval of an onset time, over the times of the grid.
 
-    And the values of a lower place, where one is met. All others follow as far as the jacobian tells.
+    The second result holds the onset time with a lower sum of squares, if there is one. All other unknowns
+    follow linearly by the Jacobian.
     """
     names = [x.name for x in h.fit.unknowns]
     if name not in names or h.fit.std[name] == 0:
@@ -139,12 +140,12 @@ def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[floa
 
 
 def _usual(h: Hypothesis, i: int) -> float:
-    """What a rise of the sum of squares is divided by for the i-th unknown, as residuals are not white."""
+    """Divisor of a rise of the sum of squares for the i-th unknown, which allows for correlated residuals."""
     return float(h.fit.inflation[i])
 
 
 def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> Fit:
-    """All others fitted again with one parameter held at a value."""
+    """The fit of all other unknowns with the i-th one held at a value."""
     held = h.fit.unknowns[i].name
     here = built(problem, h.candidates)
     rest = [u for u in h.fit.unknowns if u.name != held]

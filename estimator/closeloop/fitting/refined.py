@@ -1,7 +1,7 @@
-"""The last steps of a fit whose sum of squares is rugged.
+"""Refinement of a fit whose sum of squares has many local minima, by smaller finite differences.
 
-Where a law has a corner, as play has, the sum of squares has many low places. Differences of the usual step
-look past them, and the fit comes to rest beside the lowest; finer ones lead on from there.
+A law with a corner, such as free play, causes many narrow minima. Finite differences of the default step do
+not resolve them, and the fit stops beside the lowest one; smaller differences lead on from there.
 """
 
 from collections.abc import Sequence
@@ -11,17 +11,17 @@ from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost, mean_square
 
-RUGGED = 1.05  # mean square of a residual, in units of noise, from which finer differences are tried
+RUGGED = 1.05  # mean square of the residual, in units of noise, above which smaller differences are tried
 
 
 def refined(fitter: Fitter, h: Hypothesis) -> Hypothesis:
-    """The hypothesis where finer differences lead it, if more than noise is left and that is lower."""
+    """The hypothesis fitted with smaller differences, if it leaves more than noise and this fits better."""
     if fitter.baseline.leaves_noise(h) or mean_square(h) < RUGGED:
         return h
     return lower(h, fitter.alone.finished(from_there([h]), h.others, step=FINE_STEP))
 
 
 def lower(h: Hypothesis, again: Sequence[Hypothesis]) -> Hypothesis:
-    """What was fitted again, with the worth of the hypothesis, if it fits better; else the hypothesis."""
+    """The first of `again` that fits better, with the worth of h; h itself if there is none."""
     better = [a for a in again if cost(a) < cost(h)]
     return replace(better[0], worth=h.worth) if better else h

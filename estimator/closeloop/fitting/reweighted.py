@@ -1,7 +1,7 @@
-"""Weights of residuals whose noise is not declared, from what the best fit leaves instead of the base.
+"""Weights for records without declared noise, from the residual of the best fit.
 
-The base's residual holds the effect, so weights from it make every score, and every limit on one, too small
-to reach, and every standard error too large. Quasi-likelihood takes the scale from the best-fitting model of
+The residual of the calibrated FMU contains the effect. Weights from that residual would make every log score
+too small and every standard error too large. Quasi-likelihood takes the scale from the best-fitting model of
 the set instead (K. P. Burnham, D. R. Anderson, Model Selection and Multimodel Inference, 2002, section 2.5).
 """
 
@@ -20,7 +20,7 @@ from estimator.record import Array
 def reweighted(
     fitter: Fitter, found: Sequence[Sequence[Hypothesis]]
 ) -> tuple[Hypothesis, Noise, list[list[Hypothesis]]]:
-    """The base, the noise that the best of all hypotheses leaves, and each list in units of that."""
+    """The calibrated FMU, the noise that the best hypothesis leaves, and all lists weighted by that noise."""
     baseline = fitter.baseline
     best = min((h for some in found for h in some), key=cost)
     before, noise = baseline.noise.scale, Noise.of(baseline.problem.record, best.residuals)
@@ -30,7 +30,7 @@ def reweighted(
 
 
 def rescaled(h: Hypothesis, before: Array, size: Array) -> Hypothesis:
-    """The hypothesis as it was fitted, with residuals and errors in units of another size (n_y,)."""
+    """The hypothesis with the same values, its residual and errors in units of another size (n_y,)."""
     fit, ratio = h.fit, np.tile(before / size, len(h.fit.residual) // len(size))
     residual, jacobian = fit.residual * ratio, fit.jacobian * ratio[:, None]
     return replace(
@@ -39,7 +39,7 @@ def rescaled(h: Hypothesis, before: Array, size: Array) -> Hypothesis:
 
 
 def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Array) -> list[Hypothesis]:
-    """All hypotheses in the fitter's units, best first on the identify part; leading ones fitted anew."""
+    """All hypotheses in the fitter's units, sorted by sum of squares; the leading ones are fitted again."""
     moved = best_by_label(rescaled(h, before, fitter.baseline.noise.scale) for h in found)
     leading = [h for h in moved if h.candidates][: fitter.baseline.policy.search.reweighted]
     if not leading:

@@ -1,6 +1,7 @@
-"""Derivatives of a residual: by differences, a simulation each, then along the steps by secants.
+"""Jacobian of the residual by finite differences, updated between steps by Broyden's secant method.
 
-What another start state does fades: once that is seen, its differences are simulated no longer than so far.
+The influence of a start state decays. Once the decay has been observed, the difference for that state is
+simulated only as long as the influence lasts.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -9,22 +10,22 @@ import numpy as np
 
 from estimator.record import Array
 
-STEP = 1e-2  # of an unknown's scale, for differences: further than what a solver leaves open
-FINE_STEP = 1e-6  # the same in a valley that is rugged
-SHORT = 1e-3  # scales: a step too short to tell derivatives from what the FMU's solver leaves open
-FADED = 1e-6  # of a column's sum of squares: what may come after its end
-PARTS = 24  # of the residual, in which ends are counted
+STEP = 1e-2  # scales: step of finite differences, large against the tolerance of the FMU's solver
+FINE_STEP = 1e-6  # scales: step of finite differences if the sum of squares has narrow minima
+SHORT = 1e-3  # scales: shorter steps do not update the Jacobian, for the solver's tolerance would dominate
+FADED = 1e-6  # share of a column's sum of squares that may be neglected after its end
+PARTS = 24  # pieces of the residual, in which the end of a column is counted
 
 Begun = Callable[[Array, float], Array]
 
 
 class Slopes:
-    """Jacobian (m, n) of a residual function, carried from place to place by Broyden's update.
+    """Jacobian (m, n) of a residual function, updated from step to step by Broyden's method.
 
-    residual: (m,) of x (n,); scale, high: (n,) of the unknowns; known: for each its column where that is
-    given and stays as it is, or None; fading: those whose columns may fade; begun: the first share of the
-    residual at x; step: of differences, in scales. Source: C. G. Broyden, Mathematics of Computation 19
-    (1965), 577-593.
+    residual: function of x (n,) that returns (m,); scale, high: (n,) scales and upper bounds of the unknowns;
+    known: for each unknown its column if that is given and kept, else None; fading: indices of unknowns whose
+    influence may decay; begun: function that returns the first share of the residual at x; step: step of the
+    finite differences, in scales. Source: C. G. Broyden, Mathematics of Computation 19 (1965), 577-593.
     """
 
     def __init__(
@@ -33,11 +34,11 @@ class Slopes:
     ) -> None:  # fmt: skip
         self._residual, self._scale, self._high, self._known = residual, scale, high, list(known)
         self._step, self._begun, self._parts = step * scale, begun, dict.fromkeys(fading, PARTS)
-        self._last: tuple[Array, Array, Array] | None = None  # place, residual and Jacobian there
-        self.exact = False  # at the last place by differences alone
+        self._last: tuple[Array, Array, Array] | None = None  # last x, with its residual and Jacobian
+        self.exact = False  # whether the last Jacobian comes from finite differences only
 
     def by_differences(self, x: Array, guess: Sequence[Array | None] | None = None) -> Array:
-        """The Jacobian at x; columns that are guessed or known are taken as they are."""
+        """The Jacobian at x by finite differences; columns that are known or guessed are used unchanged."""
         r, columns = self._residual(x), []
         self.exact = not any(column is not None for column in guess or ())
         for i, known in enumerate(self._known):
@@ -52,7 +53,7 @@ class Slopes:
     def _column(self, i: int, x: Array, r: Array) -> Array:
         h = self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i]
         aside = x + h * np.eye(len(x))[i]
-        parts = self._parts.get(i, PARTS) + 1  # one in which nothing is to be seen
+        parts = self._parts.get(i, PARTS) + 1  # one more, in which no influence should be left
         if self._begun and parts < PARTS:
             begun = self._begun(aside, parts / PARTS)
             column = np.append((begun - r[: len(begun)]) / h, np.zeros(len(r) - len(begun)))
@@ -61,7 +62,7 @@ class Slopes:
         return np.asarray((self._residual(aside) - r) / h)
 
     def at(self, x: Array) -> Array:
-        """The Jacobian at x, from the last place on."""
+        """The Jacobian at x, updated from the last one by Broyden's method."""
         if self._last is None:
             return self.by_differences(x)
         before, r_before, jacobian = self._last
@@ -75,7 +76,7 @@ class Slopes:
 
 
 def faded(column: Array) -> int:
-    """How many of its PARTS a column (m,) takes until nothing is left of it."""
+    """Number of the PARTS of a column (m,) after which it is negligible."""
     squares = np.array([float(part @ part) for part in np.array_split(column, PARTS)])
     left = np.cumsum(squares[::-1])[::-1]
     return int(np.sum(left > FADED * left[0]))

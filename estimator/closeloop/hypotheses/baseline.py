@@ -1,4 +1,4 @@
-"""The calibrated FMU with the noise of its record: what every hypothesis is compared with."""
+"""The baseline: the calibrated FMU and the noise of the record, with which every hypothesis is compared."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from estimator.record import Array
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """A question, its FMU without effects calibrated, and the noise that residuals are measured by."""
+    """A problem, the fit of the calibrated FMU without effects, and the noise that weights the residuals."""
 
     problem: Problem
     hypothesis: Hypothesis
@@ -24,11 +24,11 @@ class Baseline:
 
     @property
     def policy(self) -> Policy:
-        """The limits that the question is answered by."""
+        """The limits of the problem."""
         return self.problem.policy
 
     def asked(self, problem: Problem) -> Baseline:
-        """The same fit and noise for another form of the question."""
+        """The same fit and noise with another problem."""
         return replace(self, problem=problem)
 
     def scores(self, h: Hypothesis, part: Part = "choose") -> Array:
@@ -36,30 +36,30 @@ class Baseline:
         return h.scores(self.problem, self.noise.scale, part)
 
     def lead(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> tuple[float, float]:
-        """Sum over blocks of the log score of a over b on a part of the record, and its standard error."""
+        """Log score of a minus that of b on a part of the record, and its standard error over blocks."""
         difference = self.scores(a, part) - self.scores(b, part)
         return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(len(difference)))
 
     def beats(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> bool:
-        """Whether a is better than b by more standard errors than chance gives, over blocks of a part."""
+        """Whether the log score of a exceeds that of b on a part by enough standard errors."""
         mean, error = self.lead(a, b, part)
         return mean > self.policy.decision.telling * error
 
     def leaves_noise(self, h: Hypothesis) -> bool:
-        """Whether nothing but noise is left in the part to identify."""
+        """Whether the residual of h on the part to identify is only noise."""
         chance = self.policy.detection.chance
         return bool(h.fit.beyond_noise < chance * np.sqrt(2 * len(h.fit.residual)))
 
     def beyond_noise(self, h: Hypothesis) -> float:
-        """What the sum of squares of the part to choose has more than noise would."""
+        """Sum of squares on the part to choose minus its expectation for pure noise."""
         return float(np.sum((h.of(self.problem, "choose") / self.noise.scale) ** 2 - 1))
 
     def beyond_noise_of_all(self, h: Hypothesis) -> float:
-        """The same of both parts."""
+        """Sum of squares on the parts to identify and to choose minus its expectation for pure noise."""
         return h.fit.beyond_noise + self.beyond_noise(h)
 
     def idle(self, h: Hypothesis) -> list[Candidate]:
-        """Members of a hypothesis whose amplitude is not clear of zero."""
+        """Candidates of a hypothesis whose size does not differ significantly from zero."""
         least = self.policy.decision.significant
         sizes = zip(h.candidates, h.significance(self.hypothesis), strict=True)
         return [c for c, z in sizes if z < least]

@@ -1,4 +1,4 @@
-"""A candidate: what could explain a residual, with its unknowns and a first size to try."""
+"""A candidate effect that could explain a residual, with its unknowns and their start values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,9 +11,9 @@ from estimator.sensor_faults import FAULTS
 class Candidate:
     """An effect at a location, or a fault of a sensor.
 
-    amplitudes: the unknowns it is proportional to, with a realistic size as scale; shape: further
-    unknowns, with their start values; fixed: values that no fit has to find. An amplitude with a fixed
-    value is one that a true effect of this kind has: it serves the screening alone.
+    amplitudes: unknowns to which the effect is proportional, with a realistic size as scale; shape: further
+    unknowns, with their start values; fixed: values that are not fitted. An amplitude with a fixed value is
+    used in the screening only; its value holds for every true effect of this kind.
     """
 
     kind: str
@@ -24,19 +24,19 @@ class Candidate:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """What a fit has to find."""
+        """The unknowns that are fitted."""
         return (*(u for u in self.amplitudes if u.name not in self.fixed), *self.shape)
 
     @property
     def given(self) -> dict[str, float]:
-        """Shape and fixed values, amplitudes left out."""
+        """Shape and fixed values by name, without the amplitudes."""
         own = {u.name for u in self.amplitudes}
         shape = {u.name: u.start for u in self.shape}
         return shape | {n: v for n, v in self.fixed.items() if n not in own}
 
     @property
     def is_fault(self) -> bool:
-        """A fault of a sensor, not physics."""
+        """Whether it is a fault of a sensor."""
         return self.kind in FAULTS
 
     @property
@@ -46,5 +46,5 @@ class Candidate:
 
     @property
     def prefix(self) -> str:
-        """How the names of its unknowns begin; of a sensor's fault they do not."""
+        """Prefix of the names of its unknowns; sensor faults do not use it."""
         return f"{self.kind}_{self.location}_"

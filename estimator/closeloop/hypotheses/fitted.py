@@ -1,4 +1,4 @@
-"""What a fit found: values, their covariance, and the local picture around them."""
+"""The result of a fit: values, their covariance, and the residual with its Jacobian at the optimum."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from scipy.linalg import block_diag, pinvh
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array
 
-WIDE = 1e3  # scales within which an unknown without bounds lies
+WIDE = 1e3  # scales: width of the prior of an unknown without bounds
 
 
-HELD = 1e-2  # of an unknown's scale: one that comes so near to a bound is held by it
+HELD = 1e-2  # scales: an unknown that is closer to a bound than this counts as held by it
 
 
-BLOCKS = 30  # pieces of the record between which residuals count as independent
+BLOCKS = 30  # blocks of the record between which residuals are taken as independent
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Values found, their standard errors, and the local picture around them.
+    """Estimated values, their covariance, and the residual with its Jacobian at these values.
 
-    residual: (m,) weighted, on the identify part; jacobian: (m, n) its derivatives by the unknowns;
-    covariance: (n, n), from blocks of the record where residuals are not white; converged: not broken off.
+    residual: (m,) weighted, on the part to identify; jacobian: (m, n) its derivatives with respect to the
+    unknowns; covariance: (n, n), which allows for residuals that are not white by their scatter over blocks;
+    converged: whether the fit ended by its tolerance and not by its number of evaluations.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -42,16 +43,16 @@ class Fit:
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Derivatives (m,) of the residual by each unknown."""
+        """Derivatives (m,) of the residual with respect to each unknown, by name."""
         return {u.name: column for u, column in zip(self.unknowns, self.jacobian.T, strict=True)}
 
     @property
     def beyond_noise(self) -> float:
-        """What its sum of squares has more than noise would."""
+        """Sum of squares minus its expectation for pure noise."""
         return float(self.residual @ self.residual) - len(self.residual)
 
     def extended(self, other: Fit, names: Collection[str]) -> Fit:
-        """The same with some unknowns of another fit as they are there."""
+        """This fit, extended by the named unknowns of another fit with their values and covariance."""
         i = [k for k, u in enumerate(other.unknowns) if u.name in names]
         return Fit(
             (*self.unknowns, *(other.unknowns[k] for k in i)),
@@ -64,7 +65,7 @@ class Fit:
 
     @property
     def inflation(self) -> Array:
-        """Variance of each value over that in white noise, (n,), at least 1: what correlated residuals do."""
+        """Variance of each value over its variance for white residuals, (n,), at least 1."""
         scale = np.array([u.scale for u in self.unknowns])
         width = np.array([u.high - u.low for u in self.unknowns])
         white, as_they_are = (
@@ -81,7 +82,7 @@ class Fit:
 
 
 def loose(fit: Fit) -> Fit:
-    """The fit without the unknowns that a bound holds back: what they could take over they have taken."""
+    """The fit without the unknowns that are held by a bound, since they cannot explain more."""
     low, high, scale = (np.array([getattr(u, key) for u in fit.unknowns]) for key in ("low", "high", "scale"))
     free = np.flatnonzero(np.minimum(fit.values - low, high - fit.values) > HELD * scale)
     return replace(
@@ -94,7 +95,7 @@ def loose(fit: Fit) -> Fit:
 
 
 def _inverse(j: Array, scale: Array, width: Array) -> tuple[Array, Array]:
-    """Covariance (n, n) of the unknowns in scales for white residuals, and what bounds alone say, (n,)."""
+    """Covariance (n, n) for white residuals, in scales, and the information that the bounds add, (n,)."""
     prior = 12 * (scale / np.minimum(width, WIDE * scale)) ** 2
     return np.asarray(pinvh(j.T @ j + np.diag(prior))), prior
 
@@ -102,10 +103,10 @@ def _inverse(j: Array, scale: Array, width: Array) -> tuple[Array, Array]:
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:
     """Covariance of least-squares estimates (n, n), from the scatter of the score between blocks.
 
-    Never below the covariance for white residuals of variance 1. Where the score of the whole does not
-    vanish, as at a bound that holds an unknown back, the step that it asks for counts as an error too.
-    width: (n,) between the bounds, which say as much as a uniform distribution between them; without bounds
-    that is WIDE scales, so that what has no influence is not taken for certain.
+    It is never below the covariance for white residuals of variance 1. If the total score does not vanish,
+    as at a bound that holds an unknown back, the corresponding Newton step is added to the error.
+    width: (n,) distance between the bounds. The bounds act as a uniform prior; without bounds its width is
+    WIDE scales, so that an unknown without influence gets a large standard error.
     """
     j = jacobian * scale
     inverse, _ = _inverse(j, scale, width)

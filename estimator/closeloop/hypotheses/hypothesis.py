@@ -1,4 +1,4 @@
-"""A hypothesis: candidates fitted jointly with the calibrated parameters."""
+"""A hypothesis: candidate effects fitted jointly with the calibrated parameters."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,15 +12,15 @@ from estimator.closeloop.hypotheses.promise import key, label
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 
-Part = Literal["fit", "choose", "test", "unseen"]  # of a record, as the masks of a Run
+Part = Literal["fit", "choose", "test", "unseen"]  # parts of a record, named as the masks of a Run
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A set of candidates fitted jointly with the calibrated parameters.
+    """A set of candidate effects fitted jointly with the calibrated parameters.
 
-    residuals: measured minus simulated of each run (N, n_y), whole record, free run. worth: of a candidate,
-    by its label, what the sum of squares grows by without it, all else fitted again; where it was tried.
+    residuals: measured minus simulated outputs of each run (N, n_y), over the whole record. worth: increase
+    of the sum of squares without a candidate, all others fitted again, by its label; only if it was tried.
     """
 
     candidates: tuple[Candidate, ...]
@@ -30,18 +30,18 @@ class Hypothesis:
 
     @property
     def theta(self) -> dict[str, float]:
-        """All values by name, the fixed ones too."""
+        """All values by name, including the fixed ones."""
         fixed = {n: v for c in self.candidates for n, v in c.fixed.items()}
         return {**fixed, **self.fit.theta}
 
     @property
     def label(self) -> str:
-        """Its candidates' labels joined; "none" for the base."""
+        """The labels of its candidates, joined; "none" for the calibrated FMU."""
         return label(self.candidates) or "none"
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The same whatever the order of its candidates."""
+        """The labels of its candidates in sorted order, so that their order does not matter."""
         return key(self.candidates)
 
     @property
@@ -51,7 +51,7 @@ class Hypothesis:
 
     @property
     def others(self) -> list[Unknown]:
-        """The unknowns beside those of its candidates."""
+        """The unknowns that do not belong to its candidates."""
         own = self.own
         return [u for u in self.fit.unknowns if u.name not in own]
 
@@ -70,12 +70,12 @@ class Hypothesis:
         return np.array([-0.5 * b.sum() for b in np.array_split(squares, BLOCKS)])
 
     def significance(self, base: "Hypothesis | None" = None) -> list[float]:
-        """Size of each candidate's amplitudes over their standard error; infinite where they are fixed.
+        """Amplitudes of each candidate over their standard error; infinite if they are fixed.
 
-        Where more is known, the root of its worth: the stiffness of a stop so hard that nothing enters it has
-        no upper bound, and a standard error as large as itself, but without the stop nothing fits. base: the
-        fit without effects, which tells what a single one is worth. The worth counts for less where residuals
-        are correlated, by as much as the variance of the amplitudes is larger than in white noise.
+        If the root of a candidate's worth is larger, it is used instead. A very stiff bump stop has no upper
+        bound of its stiffness, and a standard error as large as the stiffness, but without the stop the fit
+        is much worse. base: the fit without effects, which gives the worth of a single candidate. The worth
+        is divided by the variance inflation of the amplitudes, to allow for correlated residuals.
         """
         names = [u.name for u in self.fit.unknowns]
         worth = dict(self.worth)
@@ -95,17 +95,17 @@ class Hypothesis:
 
 
 def cost(h: Hypothesis) -> float:
-    """Sum of squares on the identify part."""
+    """Weighted sum of squares on the part to identify."""
     return float(h.fit.residual @ h.fit.residual)
 
 
 def mean_square(h: Hypothesis) -> float:
-    """Of the residual on the part that was fitted."""
+    """Mean square of the weighted residual on the part that was fitted."""
     return cost(h) / len(h.fit.residual)
 
 
 def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
-    """Of several hypotheses with the same labels the one that fits better; best first."""
+    """The best hypothesis for each set of labels, sorted by sum of squares, best first."""
     best: dict[tuple[str, ...], Hypothesis] = {}
     for h in found:
         if h.key not in best or cost(h) < cost(best[h.key]):

@@ -1,4 +1,4 @@
-"""What candidates promise to explain, and the question to the FMU that has them built in."""
+"""The expected gain of candidate effects, and the problem with their effects built into the FMU."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,9 +9,9 @@ from estimator.closeloop.question.problem import Problem
 
 @dataclass(frozen=True)
 class Promise:
-    """What a set of candidates (one, or a pair) could explain, by linear regression.
+    """A set of candidates (one, or a pair) with the gain that linear regression predicts for it.
 
-    gain: fall of the sum of squares on the identify part; start: values to start the joint fit from.
+    gain: reduction of the sum of squares on the part to identify; start: start values of the joint fit.
     """
 
     candidates: tuple[Candidate, ...]
@@ -20,22 +20,22 @@ class Promise:
 
     @property
     def label(self) -> str:
-        """Its candidates' labels joined."""
+        """The labels of its candidates, joined."""
         return label(self.candidates)
 
 
 def label(candidates: Sequence[Candidate]) -> str:
-    """kind@location of each, joined."""
+    """kind@location of each candidate, joined."""
     return " + ".join(c.label for c in candidates)
 
 
 def key(candidates: Sequence[Candidate]) -> tuple[str, ...]:
-    """Their labels, the same whatever their order."""
+    """The labels of the candidates in sorted order."""
     return tuple(sorted(c.label for c in candidates))
 
 
 def distinct(promises: Sequence[Promise]) -> list[Promise]:
-    """The first promise of each set of kinds and places."""
+    """The first promise of each set of kinds and locations."""
     first: dict[tuple[str, ...], Promise] = {}
     for p in promises:
         first.setdefault(key(p.candidates), p)
@@ -43,7 +43,7 @@ def distinct(promises: Sequence[Promise]) -> list[Promise]:
 
 
 def built(problem: Problem, candidates: Sequence[Candidate]) -> Problem:
-    """The problem with the FMU that has these candidates' effects, their fixed values declared."""
+    """The problem for the FMU with the effects of these candidates, their fixed values declared."""
     extra = [(c.kind, c.location) for c in candidates if not c.is_fault]
     fixed = {n: v for c in candidates for n, v in c.fixed.items()}
     here = problem.with_effects(sorted({*problem.effects, *extra}))

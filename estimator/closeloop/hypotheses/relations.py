@@ -1,7 +1,7 @@
-"""How effects are related whatever the record: exact twins, a law at a limit of another, parts of a group.
+"""Relations between effects that hold for every record: twins, limits of laws, and groups of parameters.
 
-Twins act on the FMU in the same way, so that no record can tell them apart and one is fitted for all. What a
-record does not tell apart is found in decision/equivalence.py.
+Twins act on the FMU in exactly the same way, so that no record can tell them apart and only one of them is
+fitted. Effects that one particular record cannot tell apart are found in decision/equivalence.py.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,11 +14,11 @@ from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array
 from fmus.effects import EFFECTS
 
-Twins = Mapping[str, tuple[str, ...]]  # labels by the label that stands for them
+Twins = Mapping[str, tuple[str, ...]]  # labels of twins by the label of the one that is fitted
 
 
 def twins(change: Sequence[tuple[Candidate, Array]]) -> dict[str, tuple[str, ...]]:
-    """Labels of effects of one kind that change the same to the last bit, by the first of them."""
+    """Labels of effects of one kind whose regressors are identical to the bit, by the label of the first."""
     changes: dict[str, list[bytes]] = {}
     kinds: dict[str, str] = {}
     for c, g in change:
@@ -32,7 +32,7 @@ def twins(change: Sequence[tuple[Candidate, Array]]) -> dict[str, tuple[str, ...
 
 
 def with_twins(found: Sequence[Hypothesis], known: Twins) -> list[Hypothesis]:
-    """Hypotheses of one candidate, each followed by what it says of its twins."""
+    """Hypotheses of one candidate, each followed by the same hypothesis for every twin."""
     every = []
     for h in found:
         others = known.get(h.label, ())
@@ -41,7 +41,7 @@ def with_twins(found: Sequence[Hypothesis], known: Twins) -> list[Hypothesis]:
 
 
 def _moved(h: Hypothesis, location: str) -> Hypothesis:
-    """The same at another location."""
+    """The same hypothesis with its candidate at another location."""
     (c,) = h.candidates
     here, there = (f"{c.kind}_{at}_" for at in (c.location, location))
 
@@ -57,17 +57,17 @@ def _moved(h: Hypothesis, location: str) -> Hypothesis:
 
 
 def limits(kind: str) -> tuple[str, ...]:
-    """Kinds of effects that one becomes at a limit; none of a sensor's fault."""
+    """Kinds that are limits of a kind (Coulomb friction of Stribeck friction); none for a sensor fault."""
     return EFFECTS[kind].becomes if kind in EFFECTS else ()
 
 
 def one_way(h: Hypothesis) -> set[tuple[str, str]]:
-    """Kind and location of what its laws are in a motion that keeps its sign."""
+    """Kinds and locations of the laws that equal its laws as long as the velocity keeps its sign."""
     return {(kind, c.location) for c in h.candidates if c.kind in EFFECTS for kind in EFFECTS[c.kind].one_way}
 
 
 def includes(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether one says of a group of parameters what the other says of one of them, so that both are true."""
+    """Whether h changes a group of parameters and `other` one parameter of that group in the same way."""
     if len(h.candidates) != 1 or len(other.candidates) != 1 or h is other:
         return False
     (group,), (c,) = h.candidates, other.candidates
@@ -76,7 +76,7 @@ def includes(h: Hypothesis, other: Hypothesis) -> bool:
 
 
 def becomes(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether a hypothesis turns into another one, which is simpler, at a limit of its shape."""
+    """Whether `other` is a simpler hypothesis that is a limit of h for some values of its shape."""
     if h is other or len(h.candidates) != len(other.candidates):
         return False
     return any(_member_by_member(h.candidates, order) for order in permutations(other.candidates))

@@ -1,4 +1,4 @@
-"""The question: an FMU, a record, and what of the FMU is unknown. Simulates it for any values of these."""
+"""The problem: an FMU, a measured record and the unknowns. Simulates the FMU for given unknowns."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from estimator.sensor_faults import faulty
 from fmus.export.around.outside import Outside
 from fmus.host.description import PortNames
 
-START_SAMPLES = 20  # from which a start state that is measured is found
-START_ERROR = 3.0  # times the scatter of these samples: the most that it can be wrong
+START_SAMPLES = 20  # first samples from which the start value of a measured state is estimated
+START_ERROR = 3.0  # times the scatter of these samples: bound of the error of that start value
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A quantity to be found: where to start, its bounds, and the size of a change that matters."""
+    """A quantity to be estimated: start value, bounds, and the size of a typical change as its scale."""
 
     name: str
     start: float
@@ -33,12 +33,12 @@ class Unknown:
 
     @property
     def is_moment(self) -> bool:
-        """A time at which an effect sets in."""
+        """Whether it is the onset time of an effect."""
         return self.name.endswith("_t0")
 
 
 class Builder(Protocol):
-    """Gives the FMU with effects built in; picklable, and quick where it was asked before."""
+    """Builds the FMU with effects; must be picklable, and must return quickly for effects built before."""
 
     @property
     def offers(self) -> tuple[tuple[str, str], ...]:
@@ -46,23 +46,23 @@ class Builder(Protocol):
 
     @property
     def quick(self) -> bool:
-        """Whether an FMU with effects is as quick as one without."""
+        """Whether an FMU with effects simulates as fast as one without."""
 
     def outside(self) -> Outside:
-        """The FMU without effects as a site for them, seen from outside."""
+        """Ports, parameters and inputs of the FMU at which effects can be placed."""
 
     def __call__(self, effects: tuple[tuple[str, str], ...]) -> Path:
-        """Path of the FMU with these effects, all off at their start values."""
+        """Path of the FMU with these effects, which are off at their start values."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """An FMU with declared values against a record.
+    """An FMU with declared values, and the record that it is compared with.
 
-    builder gives the FMU with `effects`, (kind, location), built in; declared holds parameters and given
-    start states, calibrate bounds by name, free_states those whose start is not given; form_error is the
-    share of an output that the FMU's form leaves open; policy the limits by which it is answered. Small and
-    picklable: workers open the FMU themselves.
+    builder: builds the FMU with `effects`, pairs of kind and location; declared: values of parameters and of
+    the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
+    given; form_error: share of an output that the form of the FMU leaves open; policy: the limits of the
+    decision. The object is small and picklable; worker processes open the FMU themselves.
     """
 
     builder: Builder
@@ -77,16 +77,16 @@ class Problem:
 
     @property
     def plant(self) -> Plant:
-        """The running FMU, one in each process."""
+        """The FMU as a function of inputs and parameters; one instance per process."""
         return PLANTS.get(self.builder(self.effects), self.record.inputs, self.record.outputs)
 
     @cached_property
     def measured_state(self) -> dict[str, int]:
-        """Column of y of each free state that is measured."""
+        """Output column of each free state that is measured."""
         return {n: j for j, n in enumerate(self.record.outputs) if n in self.free_states}
 
     def simulate(self, theta: Mapping[str, float], more: Sequence[str] = ()) -> list[Array]:
-        """Free run of each run of the record: outputs, then `more`, each (N, n_y + n_more)."""
+        """Simulate each run of the record: the outputs, then the variables `more`, (N, n_y + n_more) each."""
         return [self._run(run, theta, more) for run in self.record.runs]
 
     def residuals(self, theta: Mapping[str, float]) -> list[Array]:
@@ -94,19 +94,19 @@ class Problem:
         return [run.y - self._run(run, theta, ()) for run in self.record.runs]
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
-        """Measured minus simulated outputs on the identify part, (m, n_y)."""
+        """Measured minus simulated outputs on the part to identify, (m, n_y)."""
         return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in self._identified])
 
     @cached_property
     def _identified(self) -> tuple[Run, ...]:
-        """Each run that is fitted, to its last sample that is: what comes after needs no simulation."""
+        """Each run that has a part to identify, cut after the last sample of that part to save simulation."""
         return tuple(_cut(self.record.runs, 1.0))
 
     def start_states(self, run: Run) -> dict[str, tuple[float, float]]:
-        """First guess of the free states and how far it can be wrong.
+        """First guess of each free state, and a bound of its error.
 
-        A line through the first samples where a state is measured; else the FMU's start value, with
-        no limit to its error.
+        If the state is measured, the guess comes from a line through the first samples; otherwise it is the
+        start value of the FMU, with an infinite bound.
         """
         head = slice(START_SAMPLES)
         guess = {}
@@ -120,11 +120,11 @@ class Problem:
         return guess
 
     def with_effects(self, effects: Sequence[tuple[str, str]]) -> Problem:
-        """The same question to the FMU with these effects built in."""
+        """The same problem for the FMU with these effects built in."""
         return replace(self, effects=tuple(effects))
 
     def beginning(self, share: float) -> Problem:
-        """The same question to the first part of each run's samples that are fitted."""
+        """The same problem, restricted to the first share of the part to identify of each run."""
         if share >= 1.0:
             return self
         return replace(self, record=replace(self.record, runs=tuple(_cut(self.record.runs, share))))
@@ -137,7 +137,7 @@ class Problem:
         return faulty(y, run.t, self.record.outputs, theta)
 
     def start(self, theta: Mapping[str, float]) -> dict[str, float]:
-        """Start values of the FMU: declared ones, and those of theta that are its own."""
+        """Start values of the FMU: the declared ones, and those in theta that are variables of the FMU."""
         known = self.plant.fmu.description.variables
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
 
