@@ -72,8 +72,8 @@ def test_rooms_of_closeloop_import_those_before_them(at):
 def constants(file: Path) -> Iterator[str]:
     """Names of the numbers that a module gives a name."""
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Assign):
-            for target in node.targets:
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
                 names = target.elts if isinstance(target, ast.Tuple) else [target]
                 yield from (n.id for n in names if isinstance(n, ast.Name) and n.id.isupper())
 

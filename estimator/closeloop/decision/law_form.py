@@ -19,7 +19,7 @@ from estimator.closeloop.screening.screen import Screening, screen
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import ForceLaw
 
-FOLLOWS: Name = "the force follows the law"
+FORCE_FOLLOWS: Name = "the force follows the law"
 
 
 def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[MissingForce]) -> Judgement:
@@ -48,9 +48,9 @@ def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) 
     """The check that all laws are true to their names and that a single law is the curve of its force."""
     wrong = doubted(baseline, h, forces)
     if wrong or len(h.candidates) > 1:
-        return Check.most(FOLLOWS, len(wrong), 0)
+        return Check.most(FORCE_FOLLOWS, len(wrong), 0)
     own, elsewhere = curvature(baseline, h, forces)
-    return Check.most(FOLLOWS, own, form_of(baseline).curve_limit(h, elsewhere))
+    return Check.most(FORCE_FOLLOWS, own, form_of(baseline).curve_limit(h, elsewhere))
 
 
 def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
