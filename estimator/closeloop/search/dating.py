@@ -1,7 +1,7 @@
-"""When exactly did it set in? Moments tried one after the other by simulation.
+"""Refines the onset times of the leading hypotheses by simulation on a grid around each fitted onset time.
 
-The sum of squares has a minimum for about each swing of the motion: what sets in a swing later does nearly
-the same. A fit stays in the one where it began.
+As a function of the onset time, the sum of squares has about one local minimum per oscillation of the motion.
+A gradient-based fit stays in the minimum in which it started.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,9 @@ from estimator.record import Array
 
 
 def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """All hypotheses, best first on the identify part; leading ones fitted again from a better moment."""
+    """All hypotheses, best first on the part to identify, with the leading ones fitted again from a better
+    onset.
+    """
     limits = fitter.baseline.policy.search
     problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     tried = [h for h in found[: limits.dated] if begins(h) and cost(h) < limits.dated_rival * cost(found[0])]
@@ -33,7 +35,7 @@ def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _moment(problem: Problem, h: Hypothesis, size: Array) -> float | None:
-    """A moment with which, all else as it is, the identify part is matched better, or None."""
+    """An onset time with a lower sum of squares on the identify part, all else unchanged; or None."""
     [name, *_] = begins(h)
     here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
     inside = [t for t in moments_near(now, length) if 0.0 < t < length and t != now]

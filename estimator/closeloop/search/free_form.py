@@ -1,9 +1,10 @@
-"""The fallback where no law explains: a force of free form, one smooth curve at one port.
+"""Fits a free-form force, one smooth curve at one port, if no effect of the library explains the residual.
 
-How often a curve comes back in a turn is chosen by regression of the smoothed missing forces on its splines;
-which port, and over what (velocity, displacement, angle), by regression of the residual on what the splines
-do to the outputs; both are judged on pieces left out. The best are fitted inside the FMU jointly with the
-calibrated parameters. It names no cause, but the FMU with it is nearer to the measurement.
+The period of a curve over an angle is chosen by regression of the smoothed missing force on the splines of
+the curve. The port, and the quantity that the force depends on (velocity, displacement or angle), are chosen
+by regression of the residual on the changes that the splines cause in the outputs. Both are judged on blocks
+that the regression did not use. The best candidates are fitted in the FMU jointly with the calibrated
+parameters. A free-form force does not name a cause, but it reduces the residual of the FMU.
 """
 
 from collections.abc import Sequence
@@ -30,24 +31,26 @@ from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
 
-RESOLVED = 3.0  # standard errors that a control of realistic size must be worth
+RESOLVED = 3.0  # standard errors that a spline coefficient of realistic size must exceed
 
 
-TRIED = 3  # places and quantities that are fitted by simulation
+TRIED = 3  # pairs of port and quantity that are fitted by simulation
 
 
-PLACES = 2  # ports of the effects that came nearest
+PLACES = 2  # further ports, those of the best effects of the library
 
 
-BOUND = 3.0  # times the largest missing force: more than that no curve has
+BOUND = 3.0  # bound of a spline coefficient, as a multiple of the largest missing force
 
 
-CURVE_POINTS = 200  # points of a curve
+CURVE_POINTS = 200  # points at which a fitted curve is evaluated
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A fitted force of free form on a port over a quantity x, with its standard error, (n,) each, SI."""
+    """A fitted free-form force at a port as a function of a quantity x, with its standard error, (n,) each,
+    SI.
+    """
 
     kind: str
     location: str
@@ -60,10 +63,11 @@ class Curve:
 def free_form(
     fitter: Fitter, forces: Sequence[MissingForce], near: Sequence[Hypothesis] = ()
 ) -> Hypothesis | None:
-    """The force of free form that is best on the part to choose, fitted jointly; None where none is better.
+    """The free-form force that is best on the part to choose, fitted jointly; None if none beats the base.
 
-    near: effects that came nearest, best first, whose ports are tried too. Better than the base means by
-    TELLING standard errors over blocks of that part.
+    near: the best effects of the library, best first, whose ports are tried too. A free-form force beats the
+    base if its log score over the blocks of that part is higher by more standard errors than the policy's
+    `telling`.
     """
     baseline, problem = fitter.baseline, fitter.baseline.problem
     base = baseline.hypothesis
@@ -75,7 +79,7 @@ def free_form(
     calibration = Calibration.of(screening.fit)
     chosen = [resolved(calibration, c, g) for c, g in promising(screening.fit, change, near)]
     promises = screen(screening.fit, [((c,), g) for c, g in chosen if c.amplitudes])
-    # a strong law differs from its linear picture, and then a start without it is the better one
+    # for a strong force the linearisation is inaccurate, and a start without the force is better
     promises += [replace(p, start=base.fit.theta) for p in promises]
     fitted = fitter.hypotheses(promises, baseline.policy.search.finalist_pairs)
     found = form_of(baseline).ranked(fitted)
@@ -84,7 +88,7 @@ def free_form(
 
 
 def promising(base: Fit, change: Changes, near: Sequence[Hypothesis]) -> list[tuple[Candidate, Array]]:
-    """Candidates that predict the residual best in pieces left out, and those at the ports of the nearest."""
+    """The candidates that best predict blocks left out, and those at the ports of the best effects."""
     calibration = Calibration.of(base)
     residual = calibration.without(base.residual)
     share = [left_out(calibration.without(g), residual) for _, g in change]
@@ -96,10 +100,10 @@ def promising(base: Fit, change: Changes, near: Sequence[Hypothesis]) -> list[tu
 
 
 def resolved(calibration: Calibration, c: Candidate, g: Array) -> tuple[Candidate, Array]:
-    """A candidate with those of its controls that the record resolves; the others stay at zero.
+    """A candidate with only the spline coefficients that the record resolves; the others stay at zero.
 
-    g: (m, k) changes by its controls at their scales. A constant part, or one that a calibrated parameter
-    makes up for, moves nothing and would run away.
+    g: (m, k) changes by the coefficients at their scales. A coefficient that a calibrated parameter can
+    compensate, such as a constant force, hardly changes the residual, and its fit would diverge.
     """
     triangle, order = qr(calibration.without(g), mode="r", pivoting=True)
     kept = sorted(order[np.abs(np.diag(triangle)) > RESOLVED])
@@ -107,7 +111,7 @@ def resolved(calibration: Calibration, c: Candidate, g: Array) -> tuple[Candidat
 
 
 def _candidates(problem: Problem, d: Dependence, forces: Sequence[MissingForce]) -> list[Candidate]:
-    """The candidate of a dependence in its shape, its controls bound to what the missing force is at most."""
+    """The candidate for a dependence, its coefficients bounded by a multiple of the largest missing force."""
     offers, site = ((d.kind, d.location),), problem.builder.outside()
     shape = {f"{d.kind}_{d.location}_{n}": v for n, v in d.shape.items()}
     [m] = [m for m in forces if m.port.name == d.location]
@@ -122,7 +126,7 @@ def _candidates(problem: Problem, d: Dependence, forces: Sequence[MissingForce])
 
 
 def curve_of(h: Hypothesis) -> Curve:
-    """The curve of a force of free form with the standard error that its fit gives."""
+    """The curve of a fitted free-form force, with the standard error from the fit's covariance."""
     c = next(c for c in h.candidates if c.kind in FREE_FORMS)
     law, prefix = FREE_FORMS[c.kind], c.prefix
     shape = {n.removeprefix(prefix): v for n, v in c.fixed.items()}

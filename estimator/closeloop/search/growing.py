@@ -1,10 +1,11 @@
-"""Leading hypotheses fitted again over a growing part of the record, from the declared values.
+"""Fits the leading hypotheses again to a growing part of the record, starting from the declared values.
 
-Where an effect is strong, the base's values have taken over what they could of it, and a small error of an
-unknown leads the FMU to quite another motion in the end: the sum of squares is rugged. Over the first
-seconds it is not, and what is found there leads the way on, for those that fit them best. Start states,
-which could take over much of so short a part, stay as measured until the whole is fitted. Differences of
-the usual step smooth what is rugged and end in the valley; from there finer ones find the way further down.
+If an effect is strong, the parameters of the calibrated FMU have compensated part of it. A small error of an
+unknown then leads to a very different motion at the end of the record, and the sum of squares has many local
+minima. Over the first seconds it has few, so the fit begins there and its values start the fit to a longer
+part; only the best fits continue. Start states could compensate much of so short a part, so they keep their
+measured values until the whole part is fitted. Differences with the usual step average over small local
+minima and lead into the main valley; finer differences then lead further down.
 """
 
 from collections.abc import Sequence
@@ -21,16 +22,18 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 
-Parts = tuple[tuple[float, int], ...]  # shares of the identify part, and evaluations of a fit to it
+Parts = tuple[tuple[float, int], ...]  # shares of the part to identify, and evaluations for each
 FIRST: Parts = ((0.125, 8), (0.25, 6))
 THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
-GROWN_SHAPES = 2  # of each label, the most promising ones; of one that sets in the best moment
+GROWN_SHAPES = 2  # shapes tried for each label; for an effect with an onset time, only the best one
 
 
 def from_the_beginning(
     fitter: Fitter, found: Sequence[Hypothesis], promises: Sequence[Promise]
 ) -> list[Hypothesis]:
-    """All hypotheses, best first on the identify part, the leading ones perhaps better than found so far."""
+    """All hypotheses, best first on the part to identify, with the leading ones fitted again if that is
+    better.
+    """
     limits, jobs = fitter.baseline.policy.search, fitter.jobs
     problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
     physical = [p for p in promises if not p.candidates[0].is_fault]
@@ -69,7 +72,7 @@ def from_the_beginning(
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
-    """Of the promises of one label those that are fitted; what sets in later does so from nothing."""
+    """The promises of one label that are fitted; an effect with an onset time starts from zero amplitude."""
     best = promises[0]
     if moment(best.candidates[0]) is None:
         return promises[:GROWN_SHAPES]
@@ -78,7 +81,7 @@ def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
 
 
 def _begun(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array) -> Hypothesis | None:
-    """A fit to the first parts of the record; of what sets in later first without it to all before."""
+    """A fit to the first parts of the record; with an onset, first without the effect up to the onset."""
     before, start = _before(problem, promise), promise.start
     if 0.0 < before < 1.0:
         start = start | fit(problem.beginning(before), unknowns, size, start).theta
@@ -88,7 +91,7 @@ def _begun(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size
 def _grown(
     problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, parts: Parts
 ) -> Hypothesis | None:
-    """The best fit to the last of growing parts of the record, or None where the FMU does not run."""
+    """The best fit to the last of several growing parts; None if the FMU cannot be simulated."""
     before, start = _before(problem, promise), promise.start
     best: Hypothesis | None = None
     for part, evaluations in parts:
@@ -104,6 +107,6 @@ def _grown(
 
 
 def _before(problem: Problem, promise: Promise) -> float:
-    """Share of the identify part that lies before what a promise lets set in."""
+    """Share of the part to identify before the onset time of a promise."""
     begins = moment(promise.candidates[0])
     return 0.0 if begins is None else problem.record.runs[0].fit_share(begins)

@@ -1,9 +1,9 @@
-"""What could stand in a law's place? Others that change the outputs as it does, fitted from where it is.
+"""Finds other laws that change the outputs as a fitted law does, and starts their fits from its values.
 
-Two such laws are two names of one motion, but from the calibrated FMU, which is far from it where an effect
-is strong, the fit of one may end where that of the other does not. Whether the record tells them apart is
-asked when both are there. And where the force does not follow the curve of the law that was found, the others
-over the same motion, each from there too.
+Two such laws describe nearly the same motion. If an effect is strong, the calibrated FMU is far from that
+motion, and a fit that starts there may find only one of the two. Starting at the fitted law's values finds
+both, and the verdict decides whether the record distinguishes them. If the force does not follow the curve of
+the law that was found, the other laws over the same motion are fitted from its values too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,10 +25,11 @@ from estimator.record import Array
 def lookalikes(
     screening: Screening, calibration: Calibration, found: Sequence[Hypothesis], change: Changes
 ) -> list[Promise]:
-    """Promises of the best of `found`, best first, with one of its laws replaced by one that looks like it.
+    """Promises of the best of `found`, best first, with one of its laws replaced by a similar one.
 
-    calibration: of the screening's fit; change: of the candidates that may take a place. What was fitted
-    nearly as well is left out. The gain of a promise is what it misses, negative.
+    calibration: of the screening's fit; change: of the candidates that may replace a law. Candidates that
+    were already fitted nearly as well are left out. The gain of a promise is negative: minus the sum of
+    squares by which the replacement misses the law's response.
     """
     best, limits = found[0], screening.problem.policy.search
     known = {h.key for h in found if cost(h) < limits.lookalike_worse * cost(best)}
@@ -52,9 +53,9 @@ def lookalikes(
 def over_the_same(
     screening: Screening, calibration: Calibration, h: Hypothesis, change: Changes
 ) -> list[Promise]:
-    """Promises of other laws over the motion of a single one, at its place, the most alike first.
+    """Promises of other laws over the motion of a single law, at the same place, the most similar first.
 
-    Else as `lookalikes`. None for what is no law over a velocity or displacement.
+    Otherwise as `lookalikes`. Empty if the effect is not a law over a velocity or displacement.
     """
     [c], (location, over) = h.candidates, motion(h)
     if not over:
@@ -72,13 +73,13 @@ def over_the_same(
 def _response(
     screening: Screening, calibration: Calibration, c: Candidate, theta: Mapping[str, float]
 ) -> Array:
-    """What a law does to the residual (m,) and calibration cannot take over."""
+    """The change of the residual (m,) by a law that calibration cannot absorb."""
     [own] = screening.changes([c])
     return calibration.without(own @ [theta[u.name] / u.scale for u in c.amplitudes])
 
 
 def _others(screening: Screening, c: Candidate, change: Changes) -> list[tuple[Candidate, Array]]:
-    """What could take a candidate's place, with its changes; of the same kind in the shape that it has."""
+    """Candidates that may replace c, with their changes; those of the same kind take the shape of c."""
     elsewhere = {other.location: other for other, _ in change if other.kind == c.kind}
     moved = [_shaped(other, _shape(c)) for at, other in elsewhere.items() if at != c.location]
     same = zip(moved, screening.changes(moved), strict=True)
@@ -86,18 +87,18 @@ def _others(screening: Screening, c: Candidate, change: Changes) -> list[tuple[C
 
 
 def _shape(c: Candidate, theta: Mapping[str, float] = MappingProxyType({})) -> dict[str, float]:
-    """Values of a candidate's shape by the name of the parameter alone."""
+    """Values of a candidate's shape, by parameter name without the candidate's prefix."""
     return {u.name.removeprefix(c.prefix): theta.get(u.name, u.start) for u in c.shape}
 
 
 def _shaped(c: Candidate, shape: Mapping[str, float]) -> Candidate:
-    """The candidate in another shape; what that does not tell stays."""
+    """The candidate with another shape; values not given stay as they are."""
     named = ((u, u.name.removeprefix(c.prefix)) for u in c.shape)
     return replace(c, shape=tuple(replace(u, start=shape.get(name, u.start)) for u, name in named))
 
 
 def _nearest(c: Candidate, g: Array, response: Array) -> tuple[float, dict[str, float]]:
-    """What a candidate with the changes g (m, k) misses of a response (m,), squared, and its values."""
+    """Squared misfit of a candidate with the changes g (m, k) to a response (m,), and its values."""
     low, high = (np.array([getattr(u, side) / u.scale for u in c.amplitudes]) for side in ("low", "high"))
     size = lsq_linear(g, response, (low, high)).x
     missed = float(np.sum((response - g @ size) ** 2))

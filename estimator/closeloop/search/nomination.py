@@ -1,15 +1,15 @@
-"""Which of the candidates that the screening promises are fitted."""
+"""Selects which of the screened candidates are fitted."""
 
 from collections.abc import Container, Sequence
 
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.policy import Policy
 
-CONSTANT = ("parameter_offset", "actuator_gain")  # kinds that act alike all the time
+CONSTANT = ("parameter_offset", "actuator_gain")  # kinds that are constant over the record
 
 
 def nominated(policy: Policy, promises: Sequence[Promise], most: int) -> list[Promise]:
-    """The leading physical candidates, each in its best shapes, and the leading faults of sensors."""
+    """The leading physical candidates, each in its best shapes, and the leading sensor faults."""
     limits = policy.search
     labels: dict[str, list[Promise]] = {}
     for p in promises:
@@ -23,10 +23,11 @@ def nominated(policy: Policy, promises: Sequence[Promise], most: int) -> list[Pr
 def overlooked(
     policy: Policy, promises: Sequence[Promise], tried: Sequence[Promise], calibrated: Container[str]
 ) -> list[Promise]:
-    """What is fitted besides where nothing explains: constant changes of parameters and inputs, and the next.
+    """Further candidates if none explains the residual: constant changes of parameters and inputs, and the
+    next ones.
 
-    A constant change that has pushed calibrated parameters against their bounds hardly shows in the linear
-    picture there. What is calibrated is not changed beyond its bounds.
+    A constant change may have pushed calibrated parameters to their bounds. The linearisation at the
+    calibrated values then hardly shows it. Parameters that are calibrated are left out.
     """
     labels = {p.label for p in tried}
     left = [p for p in distinct(promises) if p.label not in labels and not p.candidates[0].is_fault]

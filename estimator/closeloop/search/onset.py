@@ -1,7 +1,7 @@
-"""Did something set in during the record? The FMU fits until a moment, and what came is looked for there.
+"""Finds whether and when an effect sets in during the record, and which candidates could have set in.
 
-An effect that sets in late and strong spoils a calibration of the whole; calibrated on what was before, the
-FMU says what set in, in the first moments after.
+A strong effect that sets in late distorts a calibration on the whole part to identify. The FMU is therefore
+calibrated on the samples before the onset, and its residual shortly after the onset is screened.
 """
 
 from collections.abc import Sequence
@@ -21,21 +21,21 @@ from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
 
-EARLY = (0.5, 0.25, 0.1)  # of the identify part: what may lie before
-ONSET_BLOCKS = 50  # of the identify part whose residuals are compared
-AS_GOOD = 1.5  # times the smallest residual before a moment: as good, and from more of the record
-AFTER = 0.05  # of the identify part: what is looked at after the moment
-LONGER = 2.0  # times that in the short fits
-SHORT_FIT = 7  # evaluations of a short fit
-GENTLE = 0.3  # of the amplitudes that the linear picture asks for: the other start of these fits
-ABOUT = np.arange(-1.0, 2.5, 0.5)  # blocks about the moment
+EARLY = (0.5, 0.25, 0.1)  # shares of the part to identify that are tried as free of the effect
+ONSET_BLOCKS = 50  # blocks of the part to identify whose residuals are compared
+AS_GOOD = 1.5  # times the smallest residual before an onset; up to this, the longest share is preferred
+AFTER = 0.05  # share of the part to identify that is screened after the onset
+LONGER = 2.0  # multiple of AFTER that the short fits use
+SHORT_FIT = 7  # evaluations of a short fit, at most
+GENTLE = 0.3  # second start of the short fits: this share of the amplitudes from regression
+ABOUT = np.arange(-1.0, 2.5, 0.5)  # onset times tried around the detected one, in blocks
 
 
 def onset(baseline: Baseline, times: float) -> tuple[float, Fit] | None:
-    """Share of the identify part after which the residual is another, and the FMU's fit to what was before.
+    """Share of the part to identify before the onset, and the fit of the FMU to that share.
 
-    times: as large its mean square has to be. None where there is no such moment, or where nothing is to be
-    calibrated.
+    times: factor by which the mean square of the residual must grow at the onset. None if there is no such
+    onset, or if nothing is calibrated.
     """
     problem, size = baseline.problem, baseline.noise.scale
     unknowns, found, chance = baseline.hypothesis.fit.unknowns, [], baseline.policy.search.sets_in_chance
@@ -52,16 +52,18 @@ def onset(baseline: Baseline, times: float) -> tuple[float, Fit] | None:
 
 
 def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
-    """Mean square of the weighted residual of each block of the identify part, (ONSET_BLOCKS,)."""
+    """Mean square of the weighted residual in each block of the part to identify, (ONSET_BLOCKS,)."""
     residual = weighted(problem, before.theta, size).reshape(-1, len(size))
     return np.array([float(np.mean(b**2)) for b in np.array_split(residual, ONSET_BLOCKS)])
 
 
 def grown(squares: Array, first: int, times: float, level: float) -> int | None:
-    """The block from which on mean squares (n,) are so many times larger, `first` at the earliest, or None.
+    """The block from which the mean squares (n,) are larger by a factor, at the earliest block `first`; or
+    None.
 
-    Where their logarithms come in two levels, told apart both by size and by rank: by rank alone blocks that
-    move more would do, by size alone a single one.
+    times: that factor. The logarithms of the mean squares are split into two levels, which must differ both
+    by that factor and by a rank test at `level`. The rank test alone would accept blocks that only move more,
+    and the factor alone a single large block.
     """
     logs = np.log(squares + 1e-300)
     spread = {k: k * logs[:k].var() + (len(logs) - k) * logs[k:].var() for k in range(first, len(logs))}
@@ -72,10 +74,11 @@ def grown(squares: Array, first: int, times: float, level: float) -> int | None:
 
 
 def since(fitter: Fitter, at: tuple[float, Fit], candidates: Sequence[Candidate]) -> list[Promise]:
-    """Promises of what can set in about the moment, best first.
+    """Promises of the candidates that can set in near the onset, best first.
 
-    Ranked by the first moments after it; the leading ones again by short fits to some more of the record,
-    all else held at what the FMU was before, since a strong change differs from its linear picture.
+    They are ranked by the residual shortly after the onset. The leading ones are ranked again by short fits
+    to a longer stretch, because a strong change differs from its linearisation. All other values are held at
+    those of the fit before the onset.
     """
     limits, problem = fitter.baseline.policy.search, fitter.baseline.problem
     share, before = at
@@ -90,7 +93,7 @@ def since(fitter: Fitter, at: tuple[float, Fit], candidates: Sequence[Candidate]
 
 
 def _scaled(promise: Promise, factor: float) -> dict[str, float]:
-    """A promise's start with smaller amplitudes."""
+    """The start of a promise with its amplitudes multiplied by a factor."""
     names = {u.name for c in promise.candidates for u in c.amplitudes}
     return {n: v * factor if n in names else v for n, v in promise.start.items()}
 

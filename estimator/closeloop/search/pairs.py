@@ -1,4 +1,4 @@
-"""Pairs of effects: a wrong single effect can hide the right one until its partner is there."""
+"""Fits pairs of effects, as the right effect may only show once a second effect is in the FMU."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,7 +24,7 @@ from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
 
-QUICK = 3e6  # candidates times samples, up to which all leading effects are built in and screened anew
+QUICK = 3e6  # candidates times samples up to which every leading effect is built in and screened again
 
 
 Changes = Sequence[tuple[Candidate, Array]]
@@ -33,11 +33,10 @@ Changes = Sequence[tuple[Candidate, Array]]
 def try_pairs(
     fitter: Fitter, screening: Screening, singles: Sequence[Hypothesis], change: Changes
 ) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Fitted pairs without idle members, and the single hypotheses that idle pairs fell back to.
+    """Fitted pairs whose members are both needed, and the single hypotheses left of the other pairs.
 
-    screening, change: of the base and the single candidates.
-
-    Pairs are nominated twice: by regression from the base, and as partners of the leading single effects.
+    screening, change: of the base and of the single candidates. Pairs are nominated in two ways: by
+    regression from the base, and as partners of the leading single effects.
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
     physical = [(c, g) for c, g in change if not c.is_fault]
@@ -60,7 +59,7 @@ def _rest(h: Hypothesis, c: Candidate) -> tuple[Candidate, ...]:
 
 
 def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
-    """See Hypothesis.worth; least: sums of squares that hypotheses reached, by label."""
+    """The worth of each member, see Hypothesis.worth; least: lowest sums of squares reached, by label."""
     known = {c.label: label(_rest(h, c)) for c in h.candidates}
     return {member: least[rest] - cost(h) for member, rest in known.items() if rest in least}
 
@@ -68,10 +67,11 @@ def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
 def beside(
     fitter: Fitter, best: Hypothesis, screening: Screening, change: Changes, least: float
 ) -> list[Hypothesis]:
-    """Fitted pairs of a hypothesis that explains with what its residual is still like, without idle members.
+    """Fitted pairs of a hypothesis that explains and a second effect, whose members are both needed.
 
-    screening, change: of the base, whose linear picture is near enough to see whether there is anything;
-    least: share of what is left beyond noise that a second effect has to explain.
+    The second effect is nominated by the residual of the hypothesis. screening, change: of the base, whose
+    linearisation is accurate enough to see whether there is a second effect; least: share of the remaining
+    residual beyond noise that the second effect has to explain.
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
     fit = grouped_fit(best.fit, len(screening.size), screening.group)
@@ -100,12 +100,13 @@ def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:
 def _partners(
     baseline: Baseline, screening: Screening, leading: Sequence[Hypothesis], change: Changes
 ) -> list[Promise]:
-    """Pairs of the leading single effects and what could explain most of what each leaves.
+    """Pairs of each leading single effect and the effects that could explain most of its residual.
 
-    Those first that would leave least: a right partner of a single effect that is not the best one counts.
-    The best one is screened anew, with its effect in the FMU and partners in the shapes that its missing
-    force suggests (the frequency of a second effect does not show beside a first one ten times its size); the
-    others are too, in the shapes that they have, where that is quick.
+    They are sorted by the residual that would remain, so that a right partner of an effect that is not the
+    best one counts too. The best effect is screened again with it in the FMU, and its partners take the
+    shapes that the remaining missing force suggests: the frequency of a second effect does not show beside a
+    first effect ten times as large. The other effects are screened again with their partners' present shapes,
+    if that is quick.
     """
     problem, quick = baseline.problem, len(change) * len(screening.fit.residual) < QUICK
     found = []
@@ -124,9 +125,9 @@ def _partners(
 
 
 def _beside(baseline: Baseline, h: Hypothesis, others: Sequence[Candidate]) -> tuple[Fit, Changes]:
-    """The fit of a hypothesis as it is screened with its effect in the FMU, and the changes by all others.
+    """The fit of a hypothesis for screening with its effect in the FMU, and the changes by all others.
 
-    These are in the shapes that what it leaves suggests.
+    The others have the shapes that the remaining missing force suggests.
     """
     problem = baseline.problem
     here, builder, labels = built(problem, h.candidates), problem.builder, {c.label for c in others}
@@ -138,7 +139,7 @@ def _beside(baseline: Baseline, h: Hypothesis, others: Sequence[Candidate]) -> t
 
 
 def _with(problem: Problem, h: Hypothesis, fit: Fit, change: Changes) -> list[Promise]:
-    """A hypothesis with its most promising partners; fit: its own, as the changes are compared with it."""
+    """A hypothesis with its most promising partners; fit: its own, grouped like the changes."""
     limits = problem.policy.search
     own = {c.label for c in h.candidates}
     promises = distinct(screen(fit, [((c,), g) for c, g in change if c.label not in own]))[: limits.pairs]

@@ -1,4 +1,4 @@
-"""A question with its calibrated FMU, and what could explain its residual."""
+"""Screens all candidates against the residual of the calibrated FMU."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ from estimator.record import Array
 
 @dataclass(frozen=True)
 class Screened:
-    """A question with its calibrated FMU, and what could explain the residual; see Outcome.
+    """A problem with its calibrated FMU, and the promises of all candidates; see Outcome.
 
-    fit: of the screening, as changes are compared with it.
+    fit: the screening's fit without the unknowns held by a bound; change: each candidate with its changes.
     """
 
     baseline: Baseline
@@ -37,38 +37,38 @@ class Screened:
 
     @property
     def beyond_noise(self) -> float:
-        """What the sum of squares of the screened residual has more than noise would."""
+        """Sum of squares of the screened residual minus its expectation for noise."""
         return self.screening.fit.beyond_noise
 
     @property
     def likeness(self) -> float:
-        """Share of what is beyond noise that one effect could explain, by linear regression."""
+        """Share of the residual beyond noise that one effect could explain, by linear regression."""
         return max((p.gain for p in self.promises), default=0.0) / max(self.beyond_noise, 1.0)
 
     @property
     def problem(self) -> Problem:
-        """The question."""
+        """The problem that is solved."""
         return self.baseline.problem
 
     @property
     def open_to_form(self) -> bool:
-        """Whether the residual could be another form of the FMU, as it is like no effect."""
+        """Whether a form error could explain the residual, because it resembles no effect."""
         return form_of(self.baseline).could_be(self.likeness)
 
     @property
     def began(self) -> bool:
-        """Whether what could be another form sets in during the record."""
+        """Whether a residual that could be a form error begins during the record."""
         return self.open_to_form and self.came is not None
 
     @cached_property
     def came(self) -> tuple[float, Fit] | None:
-        """What set in during the record; see `onset`."""
+        """The share before the onset and the fit to it, if an effect sets in; see `onset`."""
         limits = self.baseline.policy.search
         least = limits.sets_in_times_open if self.open_to_form else limits.sets_in_times
         return self.stages.done("onset", lambda: onset(self.baseline, least))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
-        """Whether one of them accounts for the residual; that cannot be seen where noise is not declared."""
+        """Whether one of them accounts for the residual; False if the noise is not declared."""
         return self.baseline.noise.known and any(explains(self.baseline, h) for h in found)
 
 
@@ -80,7 +80,7 @@ def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress,
     tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     screening = Screening(problem, baseline.hypothesis.fit, baseline.noise.scale, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
-    # bounds that another form pushes against say nothing of effects
+    # with a form error, a calibrated parameter at its bound says nothing about effects
     fit = loose(screening.fit) if form_of(baseline).exact else screening.fit
     promises = screen(fit, [((c,), g) for c, g in change])
     return Screened(baseline, screening, fit, change, promises, stages)

@@ -1,4 +1,4 @@
-"""The search for what explains a residual: brief fits, long ones, pairs, and laws that look alike."""
+"""Searches for the effects that explain a residual: brief fits, long fits, pairs, and similar laws."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ from estimator.closeloop.search.simpler import simpler
 
 @dataclass(frozen=True)
 class Search:
-    """Fits what the screening promises; `tell` hears what is being done."""
+    """Fits the candidates that the screening nominates; `tell` receives progress messages."""
 
     screened: Screened
     fitter: Fitter
@@ -36,7 +36,7 @@ class Search:
         s = self.screened
         brief, sudden = self._brief()
         singles, pairs = self._finished(brief, sudden)
-        self.tell("simpler", "asking whether a simpler law would do, or one that looks like it")
+        self.tell("simpler", "fitting simpler laws and similar laws")
         ones = s.stages.done("simpler", lambda: self._replaced(singles))
         if s.explained(ones[:1]):
             pairs = [*pairs, *self._beside(ones[0])]
@@ -44,7 +44,7 @@ class Search:
         return self._form.ranked(with_twins(ones, self._alike)), twos
 
     def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The single hypotheses with other laws over the motion of one, fitted from where it is."""
+        """The single hypotheses, with other laws over the motion of h fitted from its values."""
         s = self.screened
         promises = over_the_same(s.screening, Calibration.of(s.fit), h, s.change)
         if not promises:
@@ -60,18 +60,18 @@ class Search:
 
     @cached_property
     def _alike(self) -> Mapping[str, tuple[str, ...]]:
-        """Labels of candidates that change the record as another one does."""
+        """Labels of candidates that change the outputs exactly as another one, by the label of that."""
         return twins(self.screened.change)
 
     @cached_property
     def _single(self) -> Changes:
-        """What each candidate changes, of twins one."""
+        """The changes by each candidate, with one candidate for each set of exact twins."""
         doubled = {label for others in self._alike.values() for label in others}
         return [(c, g) for c, g in self.screened.change if c.label not in doubled]
 
     @cached_property
     def _promises(self) -> list[Promise]:
-        """What the screening promises of them, best first, from the calibrated parameters."""
+        """The promises of these candidates, best first, starting from the calibrated parameters."""
         s, labels = self.screened, {c.label for c, _ in self._single}
         limits = s.problem.policy.search
         promises = at_their_moments(s.screening, s.fit, s.promises, limits.nominees_in_shapes)
@@ -79,7 +79,7 @@ class Search:
         return [replace(p, start={**start, **p.start}) for p in promises if p.label in labels]
 
     def _brief(self) -> tuple[list[Hypothesis], list[Promise]]:
-        """Brief fits, best first, and what may have set in at a moment that shows."""
+        """Brief fits, best first, and the promises of effects that may have set in at a detected onset."""
         s = self.screened
         limits = s.problem.policy.search
         chosen = nominated(
@@ -87,36 +87,38 @@ class Search:
             self._promises,
             limits.nominees if s.problem.builder.quick else limits.nominees // 2,
         )
-        self.tell("faults", "fitting faults of sensors")
+        self.tell("faults", "fitting sensor faults")
         faults, rest = s.stages.done("faults", lambda: self._faults_first(chosen))
         self.tell(
             "brief fits",
-            f"fitting the {len(rest)} most promising effects inside the FMU, with the declared parameters",
+            f"fitting the {len(rest)} most promising effects in the FMU, with the calibrated parameters",
         )
         brief = s.stages.done("brief", lambda: self.fitter.briefly(rest))
         brief = best_by_label([*faults, *brief])
         left = brief[0].fit.beyond_noise if brief else 0.0
         if not self._form.exact and left > limits.overlooked_share * s.beyond_noise:
             further = overlooked(s.problem.policy, self._promises, rest, s.problem.calibrate)
-            self.tell("overlooked", f"fitting {len(further)} more, which calibration may have hidden")
+            self.tell(
+                "overlooked", f"fitting {len(further)} more effects, which calibration may have compensated"
+            )
             more = s.stages.done("overlooked", lambda: self.fitter.briefly(further))
             brief = best_by_label([*more, *brief])
         if faults or not (s.open_to_form or any(sets_in(h) for h in brief[: limits.nominees_in_shapes])):
             return brief, []
-        self.tell("onset", "looking for what set in during the record")
+        self.tell("onset", "looking for effects that set in during the record")
         sudden, more = s.stages.done("sudden", self._sudden)
         return best_by_label([*more, *brief]), sudden
 
     def _finished(
         self, brief: Sequence[Hypothesis], sudden: Sequence[Promise]
     ) -> tuple[list[Hypothesis], list[Hypothesis]]:
-        """Leading hypotheses fitted to the end, and pairs of effects where none of them explains."""
+        """The leading hypotheses fitted to the end, and pairs of effects if none of them explains."""
         s, fitter = self.screened, self.fitter
-        self.tell("long fits", "fitting the leading ones to the end")
+        self.tell("long fits", "fitting the leading effects until convergence")
         finals = s.stages.done("singles", lambda: fitter.to_the_end(brief))
         alone = s.stages.done("dated", lambda: dated(fitter, finals))
         if s.baseline.noise.known and not s.explained(alone):
-            self.tell("growing", "fitting the leading ones to a growing part of the record")
+            self.tell("growing", "fitting the leading effects to a growing part of the record")
             found, hopes = alone, [*sudden, *self._promises]
             alone = s.stages.done("growing", lambda: from_the_beginning(fitter, found, hopes))
         if s.explained(alone):
@@ -126,17 +128,18 @@ class Search:
         return best_by_label([*alone, *freed]), pairs
 
     def _beside(self, one: Hypothesis) -> list[Hypothesis]:
-        """Pairs of one effect that explains and a second."""
+        """Pairs of one effect that explains and a second effect."""
         s = self.screened
-        self.tell("second", "looking at what is left for a second effect")
+        self.tell("second", "looking for a second effect in the remaining residual")
         least = 0.0 if self._form.exact else s.problem.policy.detection.open_form_likeness
         return s.stages.done("beside", lambda: beside(self.fitter, one, s.screening, self._single, least))
 
     def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:
-        """Faults that account for the residual, fitted to the end, and what is still to be tried.
+        """Sensor faults that account for the residual, fitted to the end, and the candidates still to be
+        fitted.
 
-        A fault is as linear as the screening: where one explains, effects that could gain clearly less are no
-        rivals. Where none does, all are tried together.
+        The linearisation is as accurate for a fault as its fit. If a fault explains, effects whose gain is
+        clearly smaller cannot rival it. If no fault explains, all candidates are fitted together.
         """
         s = self.screened
         limits = s.problem.policy.search
@@ -157,7 +160,7 @@ class Search:
         return faults, rivals
 
     def _sudden(self) -> tuple[list[Promise], list[Hypothesis]]:
-        """What may have set in at a moment that shows, and brief fits of the leading ones."""
+        """Promises of effects that may have set in at the onset, and brief fits of the leading ones."""
         s = self.screened
         limits = s.problem.policy.search
         if not s.came:
@@ -167,7 +170,10 @@ class Search:
         return promises, self.fitter.briefly(promises[: limits.sudden], known=False)
 
     def _replaced(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """Hypotheses ranked, other laws in place of those of the best one where that may be the answer."""
+        """Hypotheses ranked, with simpler and similar laws fitted in place of those of the best one.
+
+        If the noise is declared, this is done only if the best hypothesis explains the residual.
+        """
         s = self.screened
         found = self._form.ranked(best_by_label(found))
         if not found or (s.baseline.noise.known and not s.explained(found[:1])):
@@ -179,5 +185,5 @@ class Search:
 
 
 def sets_in(h: Hypothesis) -> bool:
-    """Whether a hypothesis has an effect that is not there from the start."""
+    """Whether one of its effects has an onset time."""
     return any(moment(c) is not None for c in h.candidates)

@@ -1,4 +1,4 @@
-"""Would a simpler law do? The one that the leading effect becomes at a limit takes its place."""
+"""Replaces laws of the best hypothesis by simpler laws that are their limits."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -10,9 +10,9 @@ from estimator.closeloop.hypotheses.relations import limits
 
 
 def simpler(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> list[Promise]:
-    """Promises of the best of `found`, best first, with one or more of its laws as what they become.
+    """Promises of the best of `found` with one or more of its laws replaced by their simpler limits.
 
-    candidates: that can be built in, in all shapes. What was fitted to the end already is left out.
+    candidates: all that can be built in, in all shapes. Sets that were fitted until convergence are left out.
     """
     best, known = found[0], {h.key for h in found if h.fit.converged}
     promises = [
@@ -24,7 +24,7 @@ def simpler(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> lis
 
 
 def _in_place_of(c: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The first shape of each law that one becomes, at its own place."""
+    """The first shape of each law that is a limit of c, at the same location."""
     first: dict[str, Candidate] = {}
     for other in candidates:
         if other.location == c.location and other.kind in limits(c.kind):
@@ -33,7 +33,7 @@ def _in_place_of(c: Candidate, candidates: Sequence[Candidate]) -> list[Candidat
 
 
 def _start(h: Hypothesis, candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Where the hypothesis is; a new law at its realistic size."""
+    """The values of the hypothesis; a new law starts at its realistic size."""
     size = {u.name: u.scale for c in candidates for u in c.amplitudes}
     shape = {u.name: u.start for c in candidates for u in c.shape}
     return {**size, **shape, **h.fit.theta}
