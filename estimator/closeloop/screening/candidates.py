@@ -1,4 +1,4 @@
-"""The candidates of a record: every effect and sensor fault that makes sense, in each shape worth trying."""
+"""The candidates for a record: effects and sensor faults, each with start values of its shape parameters."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -19,22 +19,22 @@ from fmus.effects.parameter_effect import ParameterEffect
 from fmus.effects.site import Site
 from fmus.variables import Parameter, Variable
 
-SHAPE_CHANGE = 0.1  # of a shape parameter's value: a change of it that matters
+SHAPE_CHANGE = 0.1  # scale of a shape parameter, as share of its value
 
 
-LARGEST_CHANGE = 200.0  # realistic sizes of a parameter's change: ten times the parameter
+LARGEST_CHANGE = 200.0  # bound of a parameter's change, in realistic sizes; it is ten times the parameter
 
 
-NEAR_START = 0.2  # of its start: a calibrated parameter is within it
+NEAR_START = 0.2  # share of its start value by which a calibrated parameter may differ from it
 
 
-MOMENT = 0.01  # of the record's length, the same for a time
+MOMENT = 0.01  # scale of an onset time, as share of the record's length
 
 
 def physical_candidates(
     offers: Sequence[tuple[str, str]], site: Site, record: Record, forces: Sequence[MissingForce]
 ) -> list[Candidate]:
-    """Every effect on offer, (kind, location), in each shape worth trying."""
+    """Candidates for each pair of kind and location, one per set of start values of the shape."""
     at = {missing.port.name: missing for missing in forces}
     found: list[Candidate] = []
     for kind, location in offers:
@@ -55,7 +55,7 @@ def physical_candidates(
 
 
 def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
-    """Every fault of the sensor of each measured output."""
+    """Candidates for every kind of sensor fault at every measured output."""
     found = []
     y = np.vstack([run.y for run in record.runs])
     length = max(float(run.t[-1] - run.t[0]) for run in record.runs)
@@ -103,7 +103,7 @@ def _of_a_parameter(
 
 
 def _limited(change: Unknown, of: Variable) -> Unknown:
-    """A change that leaves a parameter within its limits, wherever near its start it may be."""
+    """The change with bounds that keep the parameter within its limits, also after calibration."""
     value, most = of.start or 0.0, LARGEST_CHANGE * change.scale
     low = -np.inf if of.min is None else of.min - value - NEAR_START * abs(value)
     high = np.inf if of.max is None else of.max - value + NEAR_START * abs(value)
@@ -113,7 +113,7 @@ def _limited(change: Unknown, of: Variable) -> Unknown:
 def _candidate(
     effect: type[Effect], location: str, sizes: Mapping[str, float], shape: Mapping[str, float], length: float
 ) -> Candidate:
-    """sizes: of each amplitude; shape: start values, of those that a record tells the final ones."""
+    """A candidate; sizes: scale of each amplitude; shape: start values, or values known from the record."""
     declared = {p.name: p for p in effect.parameters(_ANY[effect.acts_on])}
     fixed = dict(effect.complete)
     fixed |= {n: v for n, v in shape.items() if n in effect.told or n == HOLD}
@@ -137,7 +137,7 @@ def _candidate(
     return Candidate(effect.kind, location, amplitudes, others, named)
 
 
-_ANY = {"port": "rotation", "component": "", "parameter": "1", "input": "1"}  # units do not matter here
+_ANY = {"port": "rotation", "component": "", "parameter": "1", "input": "1"}  # the units are not used
 
 
 def _unknown(
@@ -152,14 +152,14 @@ def _size(
     effect: type[ForceLaw], amplitude: str, shape: Mapping[str, float], motion: tuple[Array, Array, Array],
     force: Array,
 ) -> float:  # fmt: skip
-    """The amplitude with which the law's force has the rms of the missing one."""
+    """The amplitude for which the law's force has the rms of the missing force."""
     unit = effect.along({**shape, amplitude: 1.0}, *motion)
     rms = float(np.sqrt(np.mean(unit**2)))
     return float(np.sqrt(np.mean(force**2))) / max(rms, 1e-12)
 
 
 def _times(record: Record) -> Array:
-    """Times of the identify part, s from the start."""
+    """Times of the part to identify, in s from the start of the run."""
     run = record.runs[0]
     return np.asarray(run.t[run.fit] - run.t[0])
 

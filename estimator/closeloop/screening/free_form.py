@@ -1,4 +1,4 @@
-"""Where a force of free form may act, and over what: by regression of the smoothed missing forces."""
+"""Ports and motions over which a force of free form may act, by regression of the smoothed missing forces."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from estimator.record import Array
 from fmus.effects import EFFECTS
 from fmus.effects.free_form import FreeForm
 
-PIECES = 10  # of the identify part, each left out in turn
+PIECES = 10  # pieces of the part to identify for cross-validation
 
 
-SPLINE_RIDGE = 1e-3  # of the splines' mean square: controls that nothing visits stay at zero
+SPLINE_RIDGE = 1e-3  # share of the splines' mean square; control values without data stay at zero
 
 
 FREE_FORMS: dict[str, type[FreeForm]] = {k: e for k, e in EFFECTS.items() if issubclass(e, FreeForm)}
@@ -22,9 +22,9 @@ FREE_FORMS: dict[str, type[FreeForm]] = {k: e for k, e in EFFECTS.items() if iss
 
 @dataclass(frozen=True)
 class Dependence:
-    """How much of a port's missing force is a curve over one quantity; share: on pieces left out, 1 at most.
+    """How well a curve over one quantity describes the missing force at a port.
 
-    shape: the curve's ends or order.
+    share: explained share of the squares, cross-validated, at most 1; shape: ends or order of the curve.
     """
 
     kind: str
@@ -35,7 +35,7 @@ class Dependence:
 
 
 def dependences(problem: Problem, forces: Sequence[MissingForce]) -> list[Dependence]:
-    """Over what the missing force at each port is a curve, most first; of several shapes the best."""
+    """The dependences of the missing forces on the motion, best first; one per kind of curve and port."""
     best: dict[tuple[str, str], Dependence] = {}
     for d in _dependences(problem, forces):
         key = (d.kind, d.location)
@@ -45,7 +45,7 @@ def dependences(problem: Problem, forces: Sequence[MissingForce]) -> list[Depend
 
 
 def offered(problem: Problem, forces: Sequence[MissingForce]) -> list[tuple[str, str]]:
-    """(kind, port) of every force of free form that makes sense at the port."""
+    """Kind and port of every force of free form that fits the port."""
     model = problem.builder.outside().model
     known = model.ports() if model else {}
     ports = [m.port.name for m in forces]
@@ -65,9 +65,9 @@ def _dependences(problem: Problem, forces: Sequence[MissingForce]) -> Iterator[D
 
 
 def left_out(columns: Array, y: Array) -> float:
-    """Share of the squares of y (n,) that regression on columns (n, k) predicts in pieces left out.
+    """Share of the squares of y (n,) that regression on columns (n, k) predicts, by cross-validation.
 
-    1 is all of it; below 0 the prediction is worse than none.
+    The share is 1 for a perfect prediction, and negative if the prediction is worse than zero.
     """
     pieces = np.array_split(np.arange(len(y)), PIECES)
     grams = np.array([columns[p].T @ columns[p] for p in pieces])
@@ -80,4 +80,4 @@ def left_out(columns: Array, y: Array) -> float:
     return 1 - rest / (float(y @ y) + 1e-300)
 
 
-LEAST_STD = 1e-3  # of the median standard deviation of a missing force: it is nowhere known better
+LEAST_STD = 1e-3  # lower limit of a missing force's standard deviation, as share of its median

@@ -1,7 +1,7 @@
-"""Samples looked at as one where a record is sampled far more often than anything in it moves.
+"""Averaging of samples for the screening, if a record is sampled much faster than its signals change.
 
-The mean of n samples, times the root of n: white noise keeps its variance of 1, and what is slow keeps its
-sum of squares. It is for screening and its tests; what is fitted and judged is the record as it is.
+A group of n samples is replaced by its mean times the root of n. White noise keeps its variance of 1, and
+slow signals keep their sum of squares. Fits and decisions use the record with all its samples.
 """
 
 from dataclasses import replace
@@ -12,15 +12,15 @@ from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 
-GROUPS = (5, 3)  # numbers of samples that may be one, odd so that there is one in the middle
-LOST = 0.01  # of an output's variance within a group: the most that it may be
-ENOUGH_GROUPS = 6000  # groups on the identify part
+GROUPS = (5, 3)  # possible group sizes, odd so that a group has a middle sample
+LOST = 0.01  # largest variance within groups, as share of an output's variance
+ENOUGH_GROUPS = 6000  # smallest number of groups in the part to identify
 
 
 def group_size(problem: Problem, simulated: Array) -> int:
-    """How many fitted samples are one; simulated: outputs (N, n_y) of the first run.
+    """Number of samples per group; simulated: outputs (N, n_y) of the first run.
 
-    A group lies within a stretch of fitted samples: each stretch has to begin and end at a multiple of it.
+    Groups must not cross the ends of the part to identify, so these must lie at multiples of the group size.
     """
     runs = [run for run in problem.record.runs if run.fit.any()]
     fitted = runs[0].fit
@@ -50,5 +50,5 @@ def grouped(columns: Array, n_y: int, n: int) -> Array:
 
 
 def grouped_fit(fit: Fit, n_y: int, n: int) -> Fit:
-    """A fit as it looks in groups."""
+    """A fit with residual and Jacobian averaged over groups."""
     return replace(fit, residual=grouped(fit.residual, n_y, n), jacobian=grouped(fit.jacobian, n_y, n))

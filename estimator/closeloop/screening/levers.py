@@ -1,7 +1,7 @@
-"""What an effect would change of what an FMU is given: forces at ports, inputs, parameters.
+"""The changes that an effect would make to the port forces, inputs and parameters of an FMU.
 
-Effects around the FMU are worked out along its free run, so that hundreds of them can be looked at
-without building an FMU for each.
+The equations of the effect are evaluated along a simulation of the FMU without it, so that hundreds of
+effects can be screened without building an FMU for each.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,12 +19,12 @@ from fmus.integrators.rk4 import runge_kutta
 from fmus.variables import Expr
 
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
-ROUNDING, MOST = 1e-6, 100  # of a step; and the most steps between two samples
+ROUNDING, MOST = 1e-6, 100  # tolerance of the step count; largest number of steps between two samples
 
 
 @dataclass(frozen=True)
 class Course:
-    """The free run of an FMU as effects see it.
+    """A simulation of the FMU: the quantities on which effects depend.
 
     t: (N,) s from the start; motion: (N, 2 n_ports), displacement and velocity of each port;
     given: (N, n) inputs and parameters of the FMU.
@@ -33,13 +33,13 @@ class Course:
     t: Array
     motion: Array
     given: Array
-    way: Array  # (N,) m, zeros where no speed is given
+    way: Array  # (N,) distance travelled, m; zeros if there is no speed input
 
 
 def shifts(made: Around, course: Course, moved: Mapping[str, float]) -> dict[str, Array]:
-    """Change (N,) of each input and parameter by an effect whose parameters are as `moved` says.
+    """Change (N,) of each input and parameter by an effect with the parameter values `moved`.
 
-    Those not named are at their start; an effect is off without its amplitudes.
+    Parameters that are not named have their start values; without amplitudes the effect is off.
     """
     own = np.array([moved.get(p.name, p.start) for p in made.parameters])
     z = np.vstack([course.given.T, np.tile(own[:, None], len(course.t))])
@@ -66,15 +66,15 @@ def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
 
 
 def _between(at: Array, rows: Array) -> Array:
-    """Rows (k, N) at fractions of their index, at: (M,), linearly."""
+    """Rows (k, N), interpolated linearly at fractional indices at (M,)."""
     return np.array([np.interp(at, np.arange(rows.shape[1]), row) for row in rows])
 
 
 @lru_cache(maxsize=8)
 def _step(made: Around) -> tuple[cs.Function, list[tuple[int, int]]]:
-    """step(x, w, w at its end, dt) -> x, and what w is of (m, x, z): what the states see.
+    """A Runge-Kutta step of the effect's states, step(x, w0, w1, dt) -> x, and the rows of (m, x, z) in w.
 
-    It goes on linearly between samples.
+    w holds the motion, inputs and parameters that the states depend on; it is linear between w0 and w1.
     """
     rates, rows = made.slim_rates.function, made.slim_rates.rows
     seen = [(i, row) for i, row in rows if i != 1]
@@ -89,5 +89,5 @@ def _step(made: Around) -> tuple[cs.Function, list[tuple[int, int]]]:
 
 
 def names_of(levers: Sequence[Mapping[str, Array]]) -> list[str]:
-    """All levers that are moved, each once."""
+    """Names of all inputs and parameters that are changed, each once."""
     return list(dict.fromkeys(name for moved in levers for name in moved))

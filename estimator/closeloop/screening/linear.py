@@ -1,4 +1,4 @@
-"""An FMU linearised along its free run, by restarts: what a small change of anything does to its outputs."""
+"""Linearisation of an FMU along its simulation, by restarts with small changes of states and inputs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,16 +12,17 @@ from estimator.plant import PLANTS
 from estimator.record import Array
 
 LINEARISATIONS = 200  # at most this many linearisations along the run
-PROBES = 5  # samples at which a restart is compared with the free run
-HIDDEN = 1e-3  # of a state's largest step: a restart that differs more has lost a state
-LEVER_NUDGE = 1e-4  # of a lever's size
+PROBES = 5  # samples at which a restart is compared with the simulation
+HIDDEN = 1e-3  # share of a state's largest step; a restart that differs by more lacks a hidden state
+LEVER_NUDGE = 1e-4  # finite difference of an input or parameter (lever), as share of its size
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """x+ = A x + B w, y = C x + D w around a free run, w the change of each lever.
+    """x+ = A x + B w, y = C x + D w about a simulation, w being the change of each lever.
 
-    index: (k,) samples; A: (k, n, n); B: (k, n, n_w); C: (k, n_y, n); D: (k, n_y, n_w).
+    A lever is an input or parameter that is changed. index: (k,) samples of the linearisations;
+    A: (k, n, n); B: (k, n, n_w); C: (k, n_y, n); D: (k, n_y, n_w).
     """
 
     index: NDArray[np.intp]
@@ -31,24 +32,24 @@ class Linearised:
     D: Array
 
     def of(self, outputs: slice) -> "Linearised":
-        """The same with some of the outputs."""
+        """The same linearisation with some of the outputs."""
         return replace(self, C=self.C[:, outputs], D=self.D[:, outputs])
 
     def near(self, samples: int) -> NDArray[np.intp]:
-        """For each sample the linearisation before it, (samples,)."""
+        """For each sample the index of the last linearisation before it, (samples,)."""
         near: NDArray[np.intp] = np.maximum(np.searchsorted(self.index, np.arange(samples), "right") - 1, 0)
         return near
 
 
 class Influence(NamedTuple):
-    """What a unit of a lever does to the states in each step, (N, n), and to the outputs, (N, n_y)."""
+    """Change of the states per step, (N, n), and of the outputs, (N, n_y), by a unit change of a lever."""
 
     states: Array
     outputs: Array
 
 
 def shows_its_state(problem: Problem, theta: Mapping[str, float], x: Array) -> bool:
-    """Whether a restart from the states that the FMU shows, x (N, n), goes on as its free run did."""
+    """Whether a restart from the visible states x (N, n) of the FMU reproduces its simulation."""
     plant, run, start = problem.plant, problem.record.runs[0], problem.start(theta)
     if not plant.states:
         return False
@@ -67,7 +68,7 @@ def linearise(
 ) -> Linearised:  # fmt: skip
     """Linearise steps between the samples `keep` of the first run, whose states are x (N, n).
 
-    levers: inputs; more: outputs beside those of the record.
+    levers: inputs; more: further outputs, beside those of the record.
     """
     record, run = problem.record, problem.record.runs[0]
     plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
@@ -99,7 +100,7 @@ def _value(problem: Problem, name: str, given: Mapping[str, float]) -> float:
 
 
 def _size(problem: Problem, name: str, given: Mapping[str, float]) -> float:
-    """Size of a lever, away from its limit above."""
+    """Size of a lever; negative if the finite difference would exceed its upper limit."""
     v = problem.plant.fmu.description.variables[name]
     size = abs(_value(problem, name, given)) or v.nominal or 1.0
     at_the_top = v.max is not None and _value(problem, name, given) + LEVER_NUDGE * size > v.max
@@ -109,10 +110,10 @@ def _size(problem: Problem, name: str, given: Mapping[str, float]) -> float:
 def influences(
     problem: Problem, theta: Mapping[str, float], x: Array, keep: NDArray[np.intp], levers: Sequence[str]
 ) -> tuple[Linearised, dict[str, Influence]]:
-    """The FMU linearised, and what each lever, an input or a parameter, does between the samples `keep`.
+    """The linearised FMU, and the influence of each input or parameter (lever) between the samples `keep`.
 
-    What a parameter does goes with the motion, which may be faster than the linearisations lie apart: it
-    comes from a free run with the parameter changed.
+    The influence of a parameter varies with the motion, which may be faster than the spacing of the
+    linearisations. It is therefore computed from a simulation with the parameter changed.
     """
     plant = problem.plant
     inputs = [name for name in levers if name in plant.fmu.description.inputs]
@@ -127,7 +128,7 @@ def influences(
         after = plant.simulate(run, {**start, name: _value(problem, name, start) + h}, plant.states)[keep]
         dy, dx = np.split((after - before) / h, (n_y,), axis=1)
         steps = dx[1:] - np.einsum("kmn,kn->km", a, dx[:-1])
-        steps[0] = dx[1]  # what moves at the start is no step
+        steps[0] = dx[1]  # a change of the start state is not part of a step
         found[name] = Influence(np.vstack([steps, steps[-1:]]), dy - np.einsum("kyn,kn->ky", c, dx))
     return local, found
 
@@ -135,7 +136,7 @@ def influences(
 def responses(
     local: Linearised, levers: Mapping[str, Influence], moved: Sequence[Mapping[str, Array]], samples: int
 ) -> Array:
-    """Change of the outputs (samples, n_y, k) by each of k sets of changes (samples,) of levers."""
+    """Change of the outputs (samples, n_y, k) by each of k sets of lever changes (samples,)."""
     near = local.near(samples)
     n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
     force, direct = np.zeros((k, samples, n)), np.zeros((k, samples, n_y))

@@ -1,7 +1,7 @@
-"""The force that a port lacks: smoothed from the residual, as a random walk that acts there.
+"""The missing force at a port, estimated from the residual as a random walk by a Kalman smoother.
 
-The FMU is linearised along its free run by restarts. It is assumed that all that is missing acts at this
-port alone.
+The FMU is linearised along its simulation by restarts. For each port it is assumed that the whole residual is
+caused by a force at this port alone.
 """
 
 from collections.abc import Mapping
@@ -16,15 +16,15 @@ from estimator.closeloop.screening.smoothing import smooth
 from estimator.record import Array
 from fmus.host.description import PortNames
 
-SMOOTHED_SAMPLES = 4000  # at most this many are smoothed
+SMOOTHED_SAMPLES = 4000  # largest number of samples for the smoother
 
 
 @dataclass(frozen=True)
 class MissingForce:
-    """Force at a port over the identify part: all (n,), SI.
+    """Missing force at a port over the part to identify; all arrays (n,), SI.
 
-    displacement, velocity: of the port; motion: (n, 2 n_ports), the same of all ports. They are as measured,
-    as far as the outputs tell: those of the FMU with forces at all ports.
+    displacement, velocity: motion of the port; motion: (n, 2 n_ports), motion of all ports. The motion is
+    smoothed too, with missing forces at all ports, so that it is close to the real motion.
     """
 
     port: PortNames
@@ -37,10 +37,10 @@ class MissingForce:
 
 
 def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -> list[MissingForce]:
-    """The missing force at each port of the problem, assuming that it acts there alone.
+    """The missing force at each port of the problem, each assumed to be the only one.
 
-    noise: (n_y,) standard deviation of each output. Where the FMU does not show all of its states, so
-    that it cannot be linearised, its answers to pushes take the smoother's place.
+    noise: (n_y,) standard deviation of each output. If the FMU has hidden states, so that it cannot be
+    linearised by restarts, its responses to force pulses are used instead of the smoother.
     """
     plant, run = problem.plant, problem.record.runs[0]
     if not problem.ports:

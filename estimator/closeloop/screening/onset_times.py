@@ -1,7 +1,7 @@
-"""When did it begin? The moment at which a candidate sets in, found on finer and finer grids.
+"""Onset times of screened candidates, by a search over successively finer grids.
 
-A fit cannot find it: what a later beginning changes is what the effect does in that instant, and that
-turns its sign with the motion.
+Least squares cannot find an onset time: its derivative is the effect of the force at the onset, which changes
+its sign with the motion, so that the sum of squares has many local minima.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,16 @@ from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.screening.screen import Screening, screen
 
-FIRST_SPACING = 0.1  # of the length that is fitted: between the moments that were tried before
+FIRST_SPACING = 0.1  # spacing of the onset times of the candidates, as share of the fitted length
 
 
-GRIDS, GRID_STEPS = 2, 6  # grids, and their points on either side
+GRIDS, GRID_STEPS = 2, 6  # number of grids; each divides the spacing by this number of steps
 
 
 def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise], most: int) -> list[Promise]:
-    """The promises, best first; the best one of each of `most` labels that set in has its best moment.
+    """The promises, best first, with refined onset times for the best promise of each of `most` labels.
 
-    fit: that the promises were worked out from.
+    fit: the fit with which the promises were computed.
     """
     leading: dict[str, Promise] = {}
     for p in promises:
@@ -44,7 +44,7 @@ def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise]
 
 
 def _near(c: Candidate, spacing: float) -> list[Candidate]:
-    """The candidate setting in a little earlier and later, within a spacing on either side."""
+    """The candidate with onset times on a grid within one spacing on either side."""
     here = moment(c) or 0.0
     times = here + spacing * np.arange(1 - GRID_STEPS, GRID_STEPS) / GRID_STEPS
     return [set_in(c, float(t)) for t in times if t > 0 and t != here]

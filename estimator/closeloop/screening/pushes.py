@@ -1,7 +1,8 @@
-"""The missing force of an FMU that shows no states: from its responses to pushes at the port.
+"""The missing force at a port of an FMU with hidden states, from its responses to force pulses.
 
-The force is a line through a few points in time; the FMU answers to a push at each of them, and least
-squares finds the sizes. Coarser than the smoother, but it needs nothing but inputs and outputs.
+The force is piecewise linear between a few points in time. The FMU is simulated with a triangular pulse at
+each point, and least squares finds the sizes. This is coarser than the smoother, but needs only inputs and
+outputs.
 """
 
 from collections.abc import Mapping
@@ -12,14 +13,14 @@ from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 from fmus.host.description import PortNames
 
-PUSHES = 24  # in time, over the identify part
-DAMPING = 1e-3  # of the largest response: keeps points that nothing shows at zero
+PUSHES = 24  # points in time over the part to identify
+DAMPING = 1e-3  # ridge, as share of the largest response; points without influence stay at zero
 
 
 def pushed(
     problem: Problem, theta: Mapping[str, float], port: PortNames, residual: Array, noise: Array
 ) -> tuple[Array, Array]:
-    """Force and its standard deviation at the port, (n,) each, from the identify part's residual (n, n_y)."""
+    """Force at the port and its standard deviation, (n,) each, from the residual (n, n_y)."""
     run = problem.record.runs[0].part(0, len(residual))
     start = problem.start(theta)
     base = problem.plant.simulate(run, start)

@@ -1,4 +1,4 @@
-"""Regressors of candidates with what calibration could take over projected out, many at once."""
+"""Regressors of candidates, projected orthogonal to the Jacobian of the calibrated parameters."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,33 +10,33 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.record import Array
 
-Changes = Sequence[tuple[Candidate, Array]]  # of the weighted residual (m, k) by a candidate's amplitudes
-NOTHING = 1e-6  # of a regressor's length left after projection: it says nothing new
-RIDGE = 1e-9  # of a regressor's square, in normal equations
-COLUMNS_AT_ONCE = 64  # columns that are worked on at once: hundreds of long ones do not fit into memory twice
+Changes = Sequence[tuple[Candidate, Array]]  # candidates with their changes (m, k) of the weighted residual
+NOTHING = 1e-6  # share of a regressor's length after projection, below which only rounding is left
+RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
+COLUMNS_AT_ONCE = 64  # columns per batch; copies of hundreds of long columns would not fit into memory
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Directions that the calibrated parameters can move the weighted residual in, orthonormal (m, n)."""
+    """Orthonormal basis (m, n) of the changes of the weighted residual by the calibrated parameters."""
 
     basis: Array
 
     @classmethod
     def of(cls, base: Fit) -> "Calibration":
-        """Of a fit: its jacobian's range."""
+        """The basis of the range of a fit's Jacobian."""
         if base.jacobian.shape[1]:
             return cls(np.linalg.qr(base.jacobian)[0])
         return cls(np.zeros((len(base.residual), 0)))
 
     def without(self, x: Array) -> Array:
-        """What of columns x (m, k) or a column (m,) calibration cannot take over."""
+        """Columns x (m, k), or one column (m,), projected orthogonal to the basis."""
         rest: Array = x - self.basis @ (self.basis.T @ x)
         return rest
 
 
 def batches(change: Changes) -> Iterator[tuple[slice, Array]]:
-    """All columns in turn, some (m, k) at a time, and which of all columns these are."""
+    """All columns in batches (m, k), with the slice of their positions among all columns."""
     first, held, width = 0, [], 0
     for _, g in change:
         held.append(g)
@@ -49,18 +49,18 @@ def batches(change: Changes) -> Iterator[tuple[slice, Array]]:
 
 
 def columns_of(change: Changes) -> list[slice]:
-    """Which of all columns are each candidate's."""
+    """The slice of each candidate's columns among all columns."""
     ends = np.cumsum([0, *(g.shape[1] for _, g in change)])
     return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
 
 def is_wave(c: Candidate) -> bool:
-    """Whether its amplitudes are those of a sine and a cosine: its phase is free."""
+    """Whether its amplitudes belong to a sine and a cosine, so that its phase is free."""
     return sorted(u.name[-4:] for u in c.amplitudes) == ["_cos", "_sin"]
 
 
 def lengths(calibration: Calibration, change: Changes) -> Array:
-    """Length of each column after projection (K,), zero where no more than rounding is left."""
+    """Length of each column after projection (K,), zero if only rounding is left."""
     found = []
     for _, g in batches(change):
         left = np.linalg.norm(calibration.without(g), axis=0)
@@ -69,10 +69,10 @@ def lengths(calibration: Calibration, change: Changes) -> Array:
 
 
 def alike(calibration: Calibration, change: Changes, rows: int, rng: np.random.Generator) -> Array:
-    """Cosines between all projected columns (K, K), zero for columns with nothing left.
+    """Cosines between all projected columns (K, K), zero for columns that the projection removes.
 
-    Of long columns they are estimated from so many random sums of rows (a count sketch: Charikar, Chen,
-    Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), to about 1 / sqrt(rows).
+    For long columns they are estimated from random sums of rows (a count sketch: Charikar, Chen,
+    Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), with an error of about 1 / sqrt(rows).
     """
     m = len(calibration.basis)
     rows = min(rows, m)

@@ -1,9 +1,9 @@
-"""Screening by sensitivity: how much of the residual could each candidate explain?
+"""Screening of candidates: the reduction of the sum of squares that each could bring, by linear regression.
 
-Each effect is worked out around the FMU along its free run, at a realistic size; what that change of
-forces, inputs and parameters does to the outputs comes from the linearised FMU, or from a simulation where
-the FMU hides its state. What the calibrated parameters could take over is projected out. It nominates;
-the joint fit decides.
+Each effect is evaluated at a realistic size along a simulation of the FMU without it. The resulting changes
+of forces, inputs and parameters are mapped to the outputs by the linearised FMU, or by a simulation if the
+FMU has hidden states. The columns of the calibrated parameters are projected out. The screening only ranks
+the candidates; the joint fits decide.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,27 +33,27 @@ from estimator.sensor_faults import faulty
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 
-USABLE = 1e-9  # of a regressor left after projection: it says nothing new
+USABLE = 1e-9  # share of a regressor's length after projection, below which it is not used
 
 
-NEARLY_PARALLEL = 1e-2  # of a regressor's length: of two that differ by less each gets half
+NEARLY_PARALLEL = 1e-2  # ridge, as share of a regressor's length; nearly equal regressors share the gain
 
 
-TRUSTED = 5.0  # scales from which a linear answer is not trusted further
+TRUSTED = 5.0  # scales: largest change for which the linear regression is trusted
 
 
-CHANGES_AT_ONCE = 128  # changes whose responses are worked out at once
+CHANGES_AT_ONCE = 128  # number of responses that are computed together
 
 
-RUNAWAY = 1e9  # times what counts as one: no answer of a linear picture that holds
+RUNAWAY = 1e9  # weighted residual above which the linearised response is taken as diverged
 
 
 class Screening:
-    """Works out what candidates would change; the FMU is run and linearised when first asked for.
+    """Computes the changes of the residual by candidates; the FMU is linearised when first needed.
 
-    size: (n_y,) of a residual that counts as one. forces: at each port, with the motion there that it
-    makes; a law is worked out along that motion, since the FMU without the law may move quite differently.
-    fit: the fit as changes are to be compared with it, so many samples (`grouped.py`) as one.
+    size: (n_y,) unit of each output's residual. forces: missing force at each port with the smoothed motion;
+    a law is evaluated along that motion, since the FMU without the law may move quite differently.
+    fit: the fit with its samples averaged in groups (see `grouped.py`), to which the changes refer.
     """
 
     def __init__(self, problem: Problem, base: Fit, size: Array, forces: Sequence[MissingForce] = ()) -> None:
@@ -75,11 +75,11 @@ class Screening:
 
     @property
     def length(self) -> float:
-        """Of the run that is fitted, s."""
+        """Length of the fitted run, s."""
         return float(self._free.t[-1])
 
     def _moved(self, c: Candidate) -> list[dict[str, Array]]:
-        """What each amplitude of a candidate changes of what the FMU is given."""
+        """Changes of the inputs and parameters of the FMU by each amplitude of a candidate."""
         if c.label not in self._made:
             self._made[c.label] = around(self.problem.builder.outside(), [(c.kind, c.location)])
         course = self._courses.get(c.location, self._free)
@@ -87,12 +87,12 @@ class Screening:
 
     @cached_property
     def _at(self) -> NDArray[np.intp]:
-        """Samples that are looked at: the middle of each group, up to the last one that is fitted."""
+        """Index of the middle sample of each group, up to the end of the part to identify."""
         return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
 
     @cached_property
     def _free(self) -> Course:
-        """The free run of the first run of the record."""
+        """The simulation of the first run of the record."""
         problem, theta, at = self.problem, self.theta, self._at
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
@@ -110,19 +110,19 @@ class Screening:
 
     @cached_property
     def _courses(self) -> dict[str, Course]:
-        """For each port the course with the motion that its missing force makes."""
+        """For each port the course with the smoothed motion."""
         return {m.port.name: _along(self._free, m) for m in self.forces if m.motion is not None}
 
     @cached_property
     def _states(self) -> Array | None:
-        """States of the free run (n, n_x); None where the FMU does not show all of them."""
+        """States of the simulation (n, n_x); None if the FMU has hidden states."""
         plant = self.problem.plant
         [full, *_] = self.problem.simulate(self.theta, plant.states)
         x: Array = full[: _last(self.problem), len(plant.outputs) :]
         return x if shows_its_state(self.problem, self.theta, x) else None
 
     def _answers(self, moved: Sequence[Mapping[str, Array]]) -> list[Array]:
-        """Change of the weighted residual on the identify part by each change of levers, (m,) each."""
+        """Change of the weighted residual on the part to identify by each change of levers, (m,) each."""
         if not moved:
             return []
         if self._states is None:
@@ -136,7 +136,7 @@ class Screening:
                 y = responses(local, levers, some, len(self._at))[fit]
                 columns = (y * scale).reshape(-1, y.shape[2]).T
                 sound = np.all(np.abs(columns) < RUNAWAY, axis=1)
-            # what sticks and slips has no linear picture: it runs away
+            # the linearised response of a model with stick and slip may diverge, so that it is simulated
             found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
         return found
 
@@ -146,7 +146,7 @@ class Screening:
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:
-        """The same of one change by a simulation with it given to the FMU."""
+        """The same change of the residual, by a simulation with the changed inputs and parameters."""
         problem = self.problem
         run, plant, start = problem.record.runs[0], problem.plant, problem.start(self.theta)
         known = plant.fmu.description.variables
@@ -173,12 +173,12 @@ class Screening:
         return self._weighted(np.concatenate(parts))[:, None]
 
     def _weighted(self, change: Array) -> Array:
-        """A change of the outputs on the identify part (m, n_y) as one of the residual of `fit`."""
+        """The change of the residual of `fit` by a change (m, n_y) of the outputs on the part to identify."""
         return grouped(-(change / self.size).ravel(), len(self.size), self.group)
 
 
 def _along(free: Course, missing: MissingForce) -> Course:
-    """The course with the motion that a missing force makes."""
+    """The course with the smoothed motion of a missing force."""
     t = missing.t - missing.t[0]
     motion = np.column_stack([np.interp(free.t, t, column) for column in np.asarray(missing.motion).T])
     return replace(free, motion=motion)
@@ -189,13 +189,13 @@ def _last(problem: Problem) -> int:
 
 
 def screen(base: Fit, sets: Sequence[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
-    """Promise of each set of candidates with its changes (m, k), best first."""
+    """The promise of each set of candidates from its changes (m, k) by linear regression, best first."""
     basis = np.linalg.qr(base.jacobian)
     return sorted((_promise(base, *basis, c, raw) for c, raw in sets), key=lambda p: -p.gain)
 
 
 def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:
-    """Amplitudes (k,) within bounds with which regressors g (m, k) come nearest to r; short where alike."""
+    """Least-squares amplitudes (k,) of regressors g (m, k) for r, within bounds, with a small ridge."""
     if not g.shape[1]:
         return np.zeros(0)
     size = np.linalg.norm(g, axis=0)

@@ -1,4 +1,4 @@
-"""A force as a random walk on a linearised FMU: its smoothed course, for many places at once."""
+"""Kalman filter and smoother on a linearised FMU, with forces as random walks, for many ports at once."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,16 @@ from numpy.typing import NDArray
 from estimator.closeloop.screening.linear import Linearised
 from estimator.record import Array
 
-WALKS = (0.01, 0.1, 1.0)  # candidate changes of the force in a second, in units of its first guess
-FOLLOWS = 1e-3  # of what a force does in a sample, from which an output shows it at once
+WALKS = (0.01, 0.1, 1.0)  # random walk intensities that are tried, in units of the force's first guess
+FOLLOWS = 1e-3  # share of a force's effect in one sample, above which an output has direct feedthrough
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """For each lever alone: x (n_w, N, n) change of the states, force and std (n_w, N).
+    """Smoothed changes of the states and forces.
 
-    together: (N, n) change of the states with all levers at work, which is nearest to the measured motion.
+    x: (n_w, N, n), force, std: (n_w, N), each lever (force input) taken alone; together: (N, n) change of the
+    states with all levers acting, which is closest to the measured motion.
     """
 
     x: Array
@@ -26,9 +27,9 @@ class Smoothed:
 
 
 def smooth(local: Linearised, residual: Array, noise: Array, dt: Array) -> Smoothed:
-    """The force at each lever alone that explains a residual (N, n_y), of noise (n_y,), steps dt (N-1,).
+    """The force at each lever alone that explains a residual (N, n_y) with noise (n_y,) and steps dt (N-1,).
 
-    Of several random walks the one that makes the residual most likely.
+    The intensity of the random walk is the one with the largest likelihood of the residual.
     """
     guess = _first_guess(local, residual, dt)
     alone = np.arange(len(guess))[:, None]
@@ -40,7 +41,7 @@ def smooth(local: Linearised, residual: Array, noise: Array, dt: Array) -> Smoot
 
 
 def _first_guess(local: Linearised, residual: Array, dt: Array) -> Array:
-    """A size of each force that the residual, or its rate, could come from, (n_w,)."""
+    """A size of each force that could cause the residual or its rate, (n_w,)."""
     step = float(np.median(dt))
     direct = np.median(np.abs(local.D), axis=0)  # (n_y, n_w)
     slow = np.median(np.abs(local.C @ local.B), axis=0) / step
@@ -53,9 +54,9 @@ def _first_guess(local: Linearised, residual: Array, dt: Array) -> Array:
 
 
 class _Filter:
-    """Kalman filters side by side, one a group of levers, whose forces are further states.
+    """Kalman filters in parallel, one per group of levers, whose forces are additional states.
 
-    groups: (n_g, r) levers; walk: (n_g, r) changes of their forces in a second.
+    groups: (n_g, r) levers; walk: (n_g, r) random walk intensities of their forces, per root of a second.
     """
 
     def __init__(
@@ -81,10 +82,10 @@ class _Filter:
         self.score, self.weight, self.rest = self.x, self.P, self.P  # see `run`
 
     def run(self, keep: bool) -> Array:
-        """Filter; log likelihood of each group, (n_g,).
+        """Run the filters; returns the log likelihood of each group, (n_g,).
 
-        keep: for the way back the states and covariances after each sample, C' S⁻¹ e (score), C' S⁻¹ C
-        (weight) and I - K C (rest).
+        keep: whether to store what the smoother needs, the states and covariances after each sample,
+        C' S⁻¹ e (score), C' S⁻¹ C (weight) and I - K C (rest).
         """
         steps, (n_g, m) = len(self.residual), self.Q.shape[:2]
         x, P, likelihood = np.zeros((n_g, m)), self.Q.copy(), np.zeros(n_g)
@@ -113,9 +114,9 @@ class _Filter:
         return likelihood
 
     def smoothed(self) -> tuple[Array, Array, Array]:
-        """States (n_g, N, n), forces and their standard deviations (n_g, N, r).
+        """Smoothed states (n_g, N, n), forces and their standard deviations (n_g, N, r).
 
-        Bryson and Frazier's way back, which inverts no covariance (Bierman 1973).
+        The backward pass is that of Bryson and Frazier, which inverts no covariance (Bierman 1973).
         """
         self.run(keep=True)
         n, last = self.n, len(self.x) - 1
