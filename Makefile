@@ -21,7 +21,7 @@ test: .venv/ready-dev  ## everything that is fast
 
 test-all: .venv/ready-dev  ## the slow ones too, and other importers of FMUs
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[interop]'
-	$(BIN)/python -m pytest -m ""
+	$(BIN)/python -m pytest -m "" -n auto --maxprocesses 4 --dist loadfile
 
 lint: .venv/ready-dev
 	$(BIN)/ruff check .

@@ -256,7 +256,7 @@ def test_an_effect_of_another_size_carries_over_as_a_law_and_not_in_its_value(bu
     [both] = commons([one, other], found, left.left)
     assert not both.serves
     assert both.likeness.p_value < 1e-6
-    assert "no one value" in both.sentence
+    assert "no single value" in both.sentence
 
 
 def test_a_record_without_the_effect_says_so_where_it_would_show(builder: ModelBuilder) -> None:
@@ -264,7 +264,7 @@ def test_a_record_without_the_effect_says_so_where_it_would_show(builder: ModelB
     without = fast(builder, coulomb(0.0), 7, "without", kinds=(), quiet=True)
     found = transfers(one, without)
     assert statuses(found) == {"coulomb_friction": "absent"}
-    assert standing(one, found).sentence == "coulomb_friction@carriage is not in without"
+    assert standing(one, found).sentence == "coulomb_friction@carriage is not found in without"
 
 
 def test_a_record_that_would_not_show_an_effect_says_nothing(builder: ModelBuilder) -> None:

@@ -1,8 +1,9 @@
-"""A black box for the residual: what a linear model without any physics would make of the same record.
+"""A black-box model of the residual for comparison: a linear model without physics, fitted to the record.
 
-An ARX model from the FMU's inputs and simulated outputs to the residual, all outputs with the same poles.
-Least squares, refined by prefiltering (Steiglitz and McBride, IEEE Trans. Automatic Control 10 (1965),
-461-464) since what counts is the free run; nothing measured is fed back. Order by Schwarz's criterion.
+The inputs of this ARX model are the FMU's inputs and simulated outputs, its outputs the residual, and all
+outputs have the same poles. Least squares is refined by prefiltering (Steiglitz and McBride, IEEE Trans.
+Automatic Control 10 (1965), 461-464), because the error of the simulation counts; no measured value is fed
+back. The order is chosen by Schwarz's criterion.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,20 +22,20 @@ from estimator.record import (
 )
 
 ORDERS = (0, 1, 2, 4, 8)  # numbers of poles that are tried
-PREFILTERINGS = 6  # of prefiltering
-MOST_SAMPLES = 4000  # at most so many are fitted, each the mean of several where a record has more
+PREFILTERINGS = 6  # iterations of prefiltering
+MOST_SAMPLES = 4000  # largest number of samples that are fitted; longer records are averaged in groups
 LARGEST_POLE = 0.999  # magnitude of a pole
-BOX_RIDGE = 1e-9  # of the columns' mean square: neighbouring samples of a smooth signal are nearly alike
-SAMPLES_PER_COEFFICIENT = 10  # samples for each coefficient
-STILL = 1e-9  # of a signal's size: it moves less, and drives nothing
+BOX_RIDGE = 1e-9  # ridge, as share of the columns' mean square; successive samples are nearly collinear
+SAMPLES_PER_COEFFICIENT = 10  # smallest number of samples per coefficient
+STILL = 1e-9  # relative spread of a signal, below which it is constant and not an input
 
 
 @dataclass(frozen=True, eq=False)
 class BlackBox:
-    """What is left with a black box added to the calibrated FMU.
+    """The residual that is left with a black-box model added to the calibrated FMU.
 
-    order: number of poles, None where no black box is worth its coefficients; poles: in the plane of z,
-    at steps of `step` s; residuals: of each run (N, n_y); rms: on the test part, (n_y,).
+    order: number of poles, None if no black box improves Schwarz's criterion; poles: in the z plane, for a
+    time step of `step` s; residuals: of each run (N, n_y); rms: on the test part, (n_y,).
     """
 
     order: int | None
@@ -46,7 +47,7 @@ class BlackBox:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A run at the black box's rate: t (n,), what drives it z (n, n_z), residual e (n, n_y), fit (n,)."""
+    """A run at the rate of the black box: t (n,), model inputs z (n, n_z), residual e (n, n_y), fit (n,)."""
 
     t: Array
     z: Array
@@ -56,7 +57,7 @@ class _Part:
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """A denominator a (order + 1,), and its free run of each part (n, n_y); squares left by output (n_y,)."""
+    """Denominator a (order + 1,), simulated outputs of each part (n, n_y), and squares left (n_y,)."""
 
     a: Array
     shown: list[Array]
@@ -65,9 +66,9 @@ class _Model:
 
 
 def black_box(record: Record, residuals: Sequence[Array], size: Array) -> BlackBox:
-    """Fit a black box to the residuals (N, n_y) of a calibrated FMU's runs, on the identify part alone.
+    """Fit a black box to the residuals (N, n_y) of the runs of a calibrated FMU, on the part to identify.
 
-    size: (n_y,) size of a residual that counts as one.
+    size: (n_y,) unit of each output's residual.
     """
     every = max(1, -(-sum(len(run.t) for run in record.runs) // MOST_SAMPLES))
     parts = _scaled([_part(run, r, size, every) for run, r in zip(record.runs, residuals, strict=True)])
@@ -88,19 +89,19 @@ def black_box(record: Record, residuals: Sequence[Array], size: Array) -> BlackB
 
 
 def _part(run: Run, residual: Array, size: Array, every: int) -> _Part:
-    """Means of `every` samples; a last piece that is shorter is left out."""
+    """A run averaged over groups of `every` samples; an incomplete last group is left out."""
     n = len(run.t) // every * every
 
     def means(x: Array | BoolArray) -> Array:
         return np.asarray(x[:n].reshape(-1, every, *x.shape[1:]).mean(axis=1))
 
     z = means(np.hstack([run.u, run.y - residual]))
-    fitted: BoolArray = means(run.fit) > 1 - 0.5 / every  # all of them
+    fitted: BoolArray = means(run.fit) > 1 - 0.5 / every  # all samples of the group are fitted
     return _Part(means(run.t), z, means(residual / size), fitted)
 
 
 def _scaled(parts: Sequence[_Part]) -> list[_Part]:
-    """What drives, about its mean and in units of its spread, with a constant; what is still is left out."""
+    """Parts with a constant and standardised model inputs; constant signals are left out."""
     z = np.concatenate([part.z[part.fit] for part in parts])
     mean, spread = z.mean(axis=0), z.std(axis=0)
     moves = spread > STILL * (np.abs(mean) + 1e-300)
@@ -116,12 +117,12 @@ def _scaled(parts: Sequence[_Part]) -> list[_Part]:
 
 
 def _between(t: Array, e: Array, at: Array) -> Array:
-    """Values e (n, n_y) at times t (n,), linear between them, at other times (N,)."""
+    """Values e (n, n_y) at times t (n,), interpolated linearly at other times (N,)."""
     return np.column_stack([np.interp(at, t, column) for column in e.T])
 
 
 def _chosen(parts: Sequence[_Part]) -> _Model | None:
-    """The model of the order that Schwarz's criterion prefers, or None where that is no model."""
+    """The model with the best Schwarz criterion, or None if that of no model is better."""
     fitted = np.concatenate([part.e[part.fit] for part in parts])
     n, n_y = fitted.shape
     best, least = None, float(n * np.log(np.mean(fitted**2, axis=0) + 1e-300).sum())
@@ -136,7 +137,7 @@ def _chosen(parts: Sequence[_Part]) -> _Model | None:
 
 
 def _rounds(parts: Sequence[_Part], order: int) -> Iterator[_Model]:
-    """The model of an order, and its refinements by prefiltering."""
+    """The models of an order after each iteration of prefiltering."""
     a = np.array([1.0])
     for _ in range(PREFILTERINGS if order else 1):
         if order:
@@ -145,14 +146,14 @@ def _rounds(parts: Sequence[_Part], order: int) -> Iterator[_Model]:
 
 
 def _lagged(x: Array, a: Array, order: int) -> Array:
-    """Columns x (n, k) filtered by 1/a, at 0 to `order` steps before: (n, k (order + 1)), at rest before."""
+    """Columns x (n, k) filtered by 1/a and delayed by 0 to `order` steps, from rest, (n, k (order + 1))."""
     filtered = lfilter([1.0], a, x, axis=0)
     padded = np.vstack([np.zeros((order, x.shape[1])), filtered])
     return np.hstack([padded[order - i : len(padded) - i] for i in range(order + 1)])
 
 
 def _denominator(parts: Sequence[_Part], a: Array, order: int) -> Array:
-    """The next denominator: least squares of the ARX equation, all signals filtered by 1/a, made stable."""
+    """The next denominator, by least squares of the ARX equation with signals filtered by 1/a; stable."""
     drives, own = [], []
     for part in parts:
         if not part.fit.any():
@@ -168,7 +169,7 @@ def _denominator(parts: Sequence[_Part], a: Array, order: int) -> Array:
 
 
 def _free_run(parts: Sequence[_Part], a: Array, order: int) -> _Model:
-    """Numerators by least squares of the free run with a denominator, from rest."""
+    """The model with a denominator whose numerators minimise the error of its simulation from rest."""
     columns = [_lagged(part.z, a, order) for part in parts]
     phi = np.concatenate([c[part.fit] for c, part in zip(columns, parts, strict=True)])
     e = np.concatenate([part.e[part.fit] for part in parts])
@@ -178,14 +179,14 @@ def _free_run(parts: Sequence[_Part], a: Array, order: int) -> _Model:
 
 
 def _solve(phi: Array, e: Array) -> Array:
-    """Least squares phi x = e by the normal equations, with a little ridge."""
+    """Least squares phi x = e by the normal equations, with a small ridge."""
     gram = phi.T @ phi
     gram[np.diag_indices_from(gram)] += BOX_RIDGE * np.mean(np.diag(gram)) + 1e-300
     return np.asarray(cho_solve(cho_factor(gram), phi.T @ e))
 
 
 def _stable(a: Array) -> Array:
-    """A polynomial in 1/z with the poles outside of the unit circle mirrored into it."""
+    """A polynomial in 1/z whose roots outside of the unit circle are reflected into it."""
     poles = np.roots(a)
     size = np.abs(poles)
     inside = np.minimum(np.where(size > 1, 1 / np.maximum(size, 1.0), size), LARGEST_POLE)

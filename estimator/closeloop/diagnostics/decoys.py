@@ -1,8 +1,8 @@
-"""Decoys: regressors that mean nothing but have the spectrum of real ones. What they reach is chance.
+"""Decoys: random regressors with the spectra of real ones, which show the gain that chance can reach.
 
-Phases are drawn anew at each frequency, the same for all outputs, so that spectra and the relations between
-outputs stay (Prichard and Theiler, Physical Review Letters 73 (1994), 951-954). A promise that decoys
-reach is none.
+The phases are drawn at random for each frequency, equal for all outputs, so that spectra and the relations
+between outputs are kept (Prichard and Theiler, Physical Review Letters 73 (1994), 951-954). A promise with no
+more gain than a decoy is not significant.
 """
 
 import numpy as np
@@ -12,16 +12,16 @@ from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.screening.regressors import RIDGE, Calibration, Changes, is_wave
 from estimator.record import Array
 
-FAMILIES = 12  # leading effects of which decoys are made
-BROAD = 8.0  # lines of a spectrum, from which a regressor with other phases is another regressor
+FAMILIES = 12  # leading effects from which decoys are made
+BROAD = 8.0  # effective spectral lines, above which random phases give a different regressor
 
 
 def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generator, copies: int = 15) -> float:
-    """Fall of the sum of squares that the best of a set of decoys reaches, the median over the copies.
+    """Reduction of the sum of squares by the best of a set of decoys, the median over the copies.
 
-    base: of the calibrated FMU; change: candidates with their changes (m, k), outputs sample after sample;
-    a set holds one decoy of each leading family. Compares with Promise.gain; 0 where no regressor is broad
-    enough to have decoys, as in a record at one steady state.
+    base: fit of the calibrated FMU; change: candidates with their changes (m, k), outputs sample by sample.
+    A set holds one decoy for each leading effect. The result is comparable with Promise.gain. It is 0 if no
+    regressor has a broad enough spectrum, as in a record of one steady state.
     """
     calibration = Calibration.of(base)
     residual = calibration.without(base.residual)
@@ -38,9 +38,9 @@ def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generato
 
 
 def leading(base: Fit, change: Changes, outputs: int) -> list[Array]:
-    """Changes (m, k) of the leading families that can have decoys, projected, the best shape of each.
+    """Projected changes (m, k) of the leading effects that can have decoys, the best shape of each.
 
-    Waves are left out: their phase is free, so that a decoy would be the same candidate again.
+    Sine waves are left out, because their phase is free and a decoy would be the same candidate again.
     """
     calibration = Calibration.of(base)
     residual = calibration.without(base.residual)
@@ -57,7 +57,7 @@ def leading(base: Fit, change: Changes, outputs: int) -> list[Array]:
 
 
 def decoy(spectrum: NDArray[np.complex128], samples: int, rng: np.random.Generator) -> Array:
-    """A regressor (m, k) with the spectrum (f, n_y, k) of another and phases drawn anew; its mean stays."""
+    """A regressor (m, k) with a given spectrum (f, n_y, k) and random phases; its mean is kept."""
     turn = np.exp(2j * np.pi * rng.random(len(spectrum)))
     turn[0] = 1.0
     if samples % 2 == 0:
@@ -67,13 +67,13 @@ def decoy(spectrum: NDArray[np.complex128], samples: int, rng: np.random.Generat
 
 
 def lines(g: Array, outputs: int) -> float:
-    """How many lines a spectrum of columns (m, k) has in effect: the participation ratio of its power."""
+    """Effective number of spectral lines of columns (m, k), the participation ratio of their power."""
     power = np.sum(np.abs(np.fft.rfft(g.reshape(-1, outputs, g.shape[1]), axis=0)) ** 2, axis=(1, 2))
     return float(power.sum() ** 2 / (np.sum(power**2) + 1e-300))
 
 
 def gain(residual: Array, g: Array) -> float:
-    """Fall of the residual's (m,) sum of squares by regression on columns (m, k)."""
+    """Reduction of the sum of squares of the residual (m,) by regression on columns (m, k)."""
     gram, along = g.T @ g, g.T @ residual
     size = np.sqrt(np.diag(gram) + 1e-300)
     scaled = gram / size[:, None] / size + RIDGE * np.eye(len(size))

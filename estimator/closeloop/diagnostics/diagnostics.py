@@ -1,4 +1,4 @@
-"""Beside the finding: what a model without physics reaches, and what effects could have been seen."""
+"""Diagnostics for the report: black box, smallest detectable effects, decoys, stability of the nomination."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,9 +17,12 @@ from estimator.closeloop.screening.regressors import Changes
 
 @dataclass(frozen=True, eq=False)
 class Diagnostics:
-    """black_box: a model without physics on the same record; power: the smallest effects that would have been
-    shown; decoy_gain: what chance regressors reach of Promise.gain; stability: by kind@location, the share of
-    halves of the record in which it leads."""
+    """Diagnostics of a record and its calibrated FMU.
+
+    black_box: a linear model of the same residual without physics; power: the smallest effects that would be
+    detected; decoy_gain: Promise.gain that random regressors reach; stability: by kind@location, the share
+    of halves of the record in which the effect is among the leading ones.
+    """
 
     black_box: BlackBox
     power: tuple[Visible, ...]
@@ -34,9 +37,9 @@ def diagnose(
     level: float,
     rng: np.random.Generator,
 ) -> Diagnostics:
-    """All of it, from the calibrated FMU, its fit as it was screened, and the screening's changes.
+    """All diagnostics from the calibrated FMU, its fit in the screening, and the changes by all candidates.
 
-    level: of the test for likeness to any effect.
+    level: significance level of the test for likeness to any effect.
     """
     problem, base, size = baseline.problem, baseline.hypothesis, baseline.noise.scale
     return Diagnostics(
@@ -48,7 +51,7 @@ def diagnose(
 
 
 def room(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
-    """The largest change of each parameter of the FMU that its limits leave."""
+    """The largest change of each parameter of the FMU within its limits."""
     given, known = problem.start(theta), problem.plant.fmu.description.variables
     found = {}
     for name in problem.plant.fmu.description.parameters:

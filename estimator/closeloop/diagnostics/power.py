@@ -1,8 +1,9 @@
-"""The power statement: the smallest effect of each kind and place that a record would have shown.
+"""Power of the detection: the smallest effect of each kind and location that a record would have shown.
 
-Shown: the test for a discrepancy would have called it more than noise, at its level and with POWER. From
-the sensitivities of the screening, so to first order, and for effects that last through the identify part
-with the shape (gap, time, order ...) named. Whether such an effect would also matter is another question.
+Such an effect would have been detected as more than noise with probability POWER at the level of the test. It
+is computed from the sensitivities of the screening, so to first order, for effects that act through the part
+to identify with the given shape (gap, time, order). Whether the effect would be large enough to matter is not
+considered.
 """
 
 from collections.abc import Mapping
@@ -28,18 +29,18 @@ from estimator.sensor_faults import FAULTS
 from fmus.effects.parameter_effect import SMALL
 
 POWER = 0.8
-DRAWS = 4000  # of noise, from which the threshold of the largest of all directions is found
-ROWS = 2000  # random sums that stand for a long regressor
-WITHIN_LIMITS = ("parameter_offset", "parameter_step")  # a drift ends at the limits, at any rate
-PHASES = 90  # of a sine and a cosine, of which the least visible counts
+DRAWS = 4000  # draws of noise for the threshold of the largest projection
+ROWS = 2000  # length of the random sketch of a long regressor
+WITHIN_LIMITS = ("parameter_offset", "parameter_step")  # a drift may have any rate, as it ends at the limits
+PHASES = 90  # phases of a sine wave that are evaluated; the least visible one counts
 
 
 @dataclass(frozen=True)
 class Visible:
-    """The smallest amplitude of a kind at a place that would have been shown, in the parameter's unit.
+    """The smallest detectable amplitude of an effect, in the unit of its parameter.
 
-    parameter: its name, "amplitude" for a sine and a cosine together; smallest: in the shape that shows
-    most, which `shape` holds; largest: in the one that shows least; inf where none could be shown.
+    parameter: its name, "amplitude" for a sine and a cosine together; smallest: for the most visible shape,
+    which is given by `shape`; largest: for the least visible shape; infinite if no amplitude is detectable.
     """
 
     kind: str
@@ -58,11 +59,11 @@ def power(
     chance: float = POWER,
     room: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Visible]:
-    """The statement for every candidate with its changes, sorted by kind and location.
+    """The smallest detectable amplitudes of all candidates, sorted by kind and location.
 
-    base: of the calibrated FMU, residuals weighted so that noise is one; level: probability that noise
-    alone is called an effect, any of them; chance: that the effect is shown; room: the largest change of
-    a parameter that its limits leave, by name.
+    base: fit of the calibrated FMU, residuals weighted to unit noise; level: probability that noise alone is
+    detected as any effect; chance: probability that the effect is detected; room: the largest change of each
+    parameter within its limits, by name.
     """
     calibration = Calibration.of(base)
     left = lengths(calibration, change)
@@ -78,7 +79,7 @@ def power(
 
 
 def threshold(cosines: Array, level: float, rng: np.random.Generator) -> float:
-    """What the largest projection of white noise on any of these directions exceeds with this probability.
+    """Threshold that the largest projection of white noise onto K directions exceeds with probability level.
 
     cosines: (K, K) between the directions.
     """
@@ -94,12 +95,12 @@ def threshold(cosines: Array, level: float, rng: np.random.Generator) -> float:
 def _sizes(
     c: Candidate, left: Array, cosines: Array, needed: float, room: Mapping[str, float]
 ) -> list[tuple[str, float]]:
-    """Smallest amplitude by name, inf beyond what it can be; of a wave in the phase that shows least."""
+    """Smallest detectable amplitude by name, infinite beyond its bounds; of a wave for the worst phase."""
     scale = np.array([u.scale for u in c.amplitudes])
     if is_wave(c):
         angles = np.linspace(0, np.pi, PHASES, endpoint=False)
         parts = np.vstack([np.cos(angles), np.sin(angles)]) * (left / scale)[:, None]
-        shown = np.abs(cosines @ parts).max(axis=0).min()  # on the better of both directions
+        shown = np.abs(cosines @ parts).max(axis=0).min()  # the larger projection counts
         return [("amplitude", float(needed / shown) if shown > 0 else np.inf)]
     sizes = np.where(left > 0, needed * scale / np.where(left > 0, left, 1.0), np.inf)
     return [
@@ -109,9 +110,9 @@ def _sizes(
 
 
 def _most(c: Candidate, u: Unknown, room: Mapping[str, float]) -> float:
-    """The largest amplitude for which the statement holds: within bounds and limits.
+    """The largest amplitude within bounds and limits for which the first order is accurate enough.
 
-    A change of a parameter as large as itself is far from its first order.
+    For the change of a parameter by its own size, for instance, it is not.
     """
     most = max(u.high, -u.low)
     if c.kind.startswith("parameter_"):
@@ -128,6 +129,6 @@ def _shape(c: Candidate) -> dict[str, float]:
 
 
 def _both(a: Visible, b: Visible) -> Visible:
-    """The statement over the shapes of both."""
+    """Two results for one effect combined over their shapes."""
     best = min(a, b, key=lambda v: v.smallest)
     return Visible(a.kind, a.location, a.parameter, best.smallest, max(a.largest, b.largest), best.shape)

@@ -1,7 +1,8 @@
-"""Stability of the nomination: who stays among the leading when half of the record is left out.
+"""Stability of the nomination: how often an effect is among the leading ones on half of the record.
 
-Complementary halves of blocks (Meinshausen and Bühlmann, J. Royal Statistical Society B 72 (2010), 417-473;
-Shah and Samworth, ibid. 75 (2013), 55-80). What leads by a few moments of the record leads in few halves.
+The halves are complementary sets of blocks (Meinshausen and Bühlmann, J. Royal Statistical Society B 72
+(2010), 417-473; Shah and Samworth, ibid. 75 (2013), 55-80). An effect that leads because of a short part of
+the record leads in few halves only.
 """
 
 from dataclasses import dataclass
@@ -13,13 +14,13 @@ from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
 from estimator.closeloop.screening.regressors import NOTHING, RIDGE, Changes
 from estimator.record import Array
 
-PAIRS = 25  # of complementary halves
-LEADING = 10  # effects that are nominated, of each the best shape
+PAIRS = 25  # pairs of complementary halves
+LEADING = 10  # number of effects that count as leading, each with its best shape
 
 
 @dataclass(frozen=True)
 class _Pieces:
-    """Sums over each block: of columns with one another, and with the residual: (B, n, n) and (B, n)."""
+    """Products of columns with each other (B, n, n) and with the residual (B, n), summed over each block."""
 
     gram: Array
     along: Array
@@ -30,7 +31,7 @@ def stability(
 ) -> dict[str, float]:
     """Share of block halves in which each effect (kind@location) is among the leading ones, by its gain.
 
-    base: of the calibrated FMU; what calibration could take over is projected out in each half anew.
+    base: fit of the calibrated FMU; the columns of the calibration are projected out in each half separately.
     """
     halves = _halves(rng, pairs)
     blocks = np.array_split(np.arange(len(base.residual)), BLOCKS)
@@ -49,7 +50,7 @@ def stability(
 
 
 def _halves(rng: np.random.Generator, pairs: int) -> Array:
-    """Which blocks are in each half, (2 pairs, BLOCKS): one and its complement in turn."""
+    """Indicators of the blocks in each half, (2 pairs, BLOCKS): all first halves, then their complements."""
     order = rng.permuted(np.tile(np.arange(BLOCKS), (pairs, 1)), axis=1)
     one = order < BLOCKS // 2
     return np.vstack([one, ~one]).astype(float)
@@ -61,7 +62,7 @@ def _pieces(columns: Array, residual: Array, edges: list[slice]) -> _Pieces:
 
 
 def _gains(c: Candidate, g: Array, base: Fit, own: _Pieces, edges: list[slice], halves: Array) -> Array:
-    """Fall of each half's sum of squares by a candidate, (h,); nothing beyond its amplitude's bounds."""
+    """Reduction of the sum of squares of each half by a candidate, (h,); 0 if its sign is out of bounds."""
     mine = _pieces(g, base.residual, edges)
     across = np.einsum("hb,bnk->hnk", halves, np.array([base.jacobian[e].T @ g[e] for e in edges]))
     gram, along = np.einsum("hb,bkl->hkl", halves, mine.gram), halves @ mine.along
@@ -78,6 +79,6 @@ def _gains(c: Candidate, g: Array, base: Fit, own: _Pieces, edges: list[slice], 
     found: Array = np.sum(z * beta, axis=1)
     if len(c.amplitudes) == 1:
         u = c.amplitudes[0]
-        wanted = -beta[:, 0]  # the residual is reduced by the opposite of what it looks like
+        wanted = -beta[:, 0]  # the change that reduces the residual has the opposite sign
         found = np.where((wanted < 0) & (u.low >= 0) | (wanted > 0) & (u.high <= 0), 0.0, found)
     return found

@@ -1,6 +1,6 @@
-"""What the runs of one machine share of its effects, and what each run has of its own.
+"""The unknowns of effects, divided into those of the machine and those of the single run.
 
-An effect declares the latter (`of_run`): moments, phases, what was before the start.
+An effect declares the unknowns of a run in `of_run`: onset times, phases and states before the start.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,13 +14,13 @@ from estimator.closeloop.screening.regressors import is_wave
 from estimator.record import Array
 from fmus.effects import EFFECTS
 
-PHASE, AMPLITUDE = "phase", "amplitude"  # of a sine and a cosine together
-TURN = 0.1  # rad, a change of a phase that matters
+PHASE, AMPLITUDE = "phase", "amplitude"  # names of the unknowns that replace a sine and a cosine
+TURN = 0.1  # rad, scale of a phase
 
 
 @dataclass(frozen=True)
 class Wave:
-    """Names of a sine's and a cosine's size, and of amplitude and phase: sin = amplitude cos(phase)."""
+    """Names of the sine and cosine coefficients, amplitude and phase; sine = amplitude * cos(phase)."""
 
     sine: str
     cosine: str
@@ -30,9 +30,10 @@ class Wave:
 
 @dataclass(frozen=True)
 class Chart:
-    """The unknowns of effects in other coordinates: those of the machine, and those of a run.
+    """A change of coordinates from the unknowns of the FMU to those of the machine and those of a run.
 
-    They are the FMU's own but for waves whose phase is the run's: these have an amplitude and a phase.
+    Both are the same, except for sine waves whose phase belongs to the run: these have amplitude and phase
+    instead of the coefficients of a sine and a cosine.
     """
 
     natives: tuple[Unknown, ...]
@@ -41,7 +42,7 @@ class Chart:
     waves: tuple[Wave, ...]
 
     def native(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Values by the FMU's names; all that is no wave's is passed on."""
+        """Values by the names of the FMU; values of other unknowns than waves are unchanged."""
         found = dict(values)
         for w in self.waves:
             size, phase = found.pop(w.amplitude), found.pop(w.phase)
@@ -57,7 +58,7 @@ class Chart:
         return found
 
     def slopes(self, values: Mapping[str, float], native: Sequence[str], names: Sequence[str]) -> Array:
-        """Derivatives of the FMU's values by those of the chart, (len(native), len(names))."""
+        """Derivatives of the FMU's values with respect to those of the chart, (len(native), len(names))."""
         found = np.array([float(n == name) for n in native for name in names])
         found = found.reshape(len(native), len(names))
         for w in self.waves:
@@ -75,7 +76,7 @@ class Chart:
 
 
 def chart(candidates: Sequence[Candidate]) -> Chart:
-    """The chart of effects, none of them a fault of a sensor."""
+    """The chart of effects, which must not be sensor faults."""
     natives: list[Unknown] = []
     machine: list[Unknown] = []
     run: list[Unknown] = []

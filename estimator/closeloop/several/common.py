@@ -1,4 +1,4 @@
-"""An effect with one value for several records: its estimate, and whether one value serves them all."""
+"""Joint fit of an effect to several records, and the test whether one value accounts for all of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,16 +23,16 @@ from estimator.closeloop.several.transfer import (
 )
 from fmus.host.fmu import FmuError
 
-SHOWS: tuple[Status, ...] = ("confirmed", "agrees", "differs")  # where a record has a value of its own
+SHOWS: tuple[Status, ...] = ("confirmed", "agrees", "differs")  # transfers with a value for the target record
 
 
 @dataclass(frozen=True, eq=False)
 class Common:
-    """An effect (label) in several records, fitted to all of them and to each.
+    """An effect (label) in several records, fitted to all of them jointly and to each separately.
 
-    alone: each record's own fit, said: what it says of the machine's unknowns, and costs: its sum of squares;
-    samples: residuals that were fitted, of each record; accounted: whether the common value accounts for it;
-    level: chance of a difference, below which the values differ.
+    alone, costs: each record's own fit and its sum of squares; said: the estimates of the machine's unknowns
+    from these fits; samples: number of fitted residuals of each record; accounted: whether the common value
+    accounts for each record; level: p-value below which the values of the records differ.
     """
 
     label: str
@@ -58,21 +58,23 @@ class Common:
 
     @property
     def chi2_alone(self) -> tuple[float, ...]:
-        """The same with each record's own value."""
+        """Mean square of each record's weighted residual with its own value, 1 for noise."""
         return tuple(c / n for c, n in zip(self.costs, self.samples, strict=True))
 
     @property
     def sentence(self) -> str:
-        """What it comes to."""
+        """The result as a sentence for the report."""
         every, chance = " and ".join(self.names), f"p = {self.likeness.p_value:.2g}"
         if not self.serves:
             left = [n for n, ok in zip(self.names, self.accounted, strict=True) if not ok]
             return (
-                f"no one value of {self.label} accounts for {every}; not for {' and '.join(left)} ({chance})"
+                f"no single value of {self.label} accounts for {every}: it fails in {' and '.join(left)} "
+                f"({chance})"
             )
         if self.likeness.p_value < self.level:
             return (
-                f"one value of {self.label} accounts for {every}, though their own values differ ({chance})"
+                f"one value of {self.label} accounts for {every}, although their separate estimates differ "
+                f"({chance})"
             )
         return f"one value of {self.label} accounts for {every} ({chance})"
 
@@ -80,7 +82,7 @@ class Common:
 def commons(
     records: Sequence[Traced], found: Sequence[Transfer], wanted: Sequence[Hypothesis], jobs: int = 1
 ) -> list[Common]:
-    """Joint fits of these effects, each to all the records of one FMU that it accounts for."""
+    """Joint fits of the wanted effects, each to all records of one FMU that show it."""
     by_name = {r.name: r for r in records}
     alone = {
         labels: {r.name: own for r in records if (own := _own(r, labels, found)) is not None}
@@ -100,12 +102,12 @@ def commons(
 
 
 def labels_of(h: Hypothesis) -> tuple[str, ...]:
-    """Its candidates' labels, in an order that does not depend on how they were found."""
+    """The labels of its candidates in sorted order."""
     return tuple(sorted(c.label for c in h.candidates))
 
 
 def _own(r: Traced, labels: Sequence[str], found: Sequence[Transfer]) -> Hypothesis | None:
-    """A record's own fit of an effect that it shows: as its chain or a transfer found it."""
+    """A record's own fit of an effect, from its own result or from a transfer; None if it has none."""
     fits = [h for h in r.members if labels_of(h) == labels]
     for t in found:
         if t.target == r.name and labels_of(t.member) == labels and t.status in SHOWS and t.own:
@@ -120,9 +122,9 @@ def _part(r: Traced, own: Hypothesis, labels: Sequence[str]) -> Part:
 
 
 def _fitted(parts: Sequence[Part], alone: Sequence[Hypothesis]) -> tuple[Together, tuple[float, ...]] | None:
-    """The joint fit, and the least sum of squares of each record by itself, also from the joint values on.
+    """The joint fit, and the smallest sum of squares of each record fitted separately.
 
-    None where the FMU does not run with what was found.
+    The separate fits are repeated from the joint values. Returns None if the FMU cannot be simulated.
     """
     try:
         found = fit_together(parts)

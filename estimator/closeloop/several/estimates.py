@@ -1,4 +1,4 @@
-"""What records say of a machine's unknowns, and how far apart they are."""
+"""Estimates of a machine's unknowns from single records, and the test whether two of them differ."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.several.chart import Chart
 from estimator.record import Array
 
-LOOSE = 10.0  # times its scale: the standard deviation of an unknown before any record
-TELLS = 0.5  # of that: a record that leaves more of it tells nothing of the unknown
+LOOSE = 10.0  # prior standard deviation of an unknown, in its scales
+TELLS = 0.5  # share of the prior standard deviation, above which a record does not determine the unknown
 
 
 @dataclass(frozen=True)
 class Estimates:
-    """What a record says of the machine's unknowns.
+    """Estimates of the machine's unknowns from one record.
 
-    values: (n,); covariance: (n, n) of them, and `white`, what it would be in white noise.
+    values: (n,); covariance: (n, n); white: (n, n), the covariance that white residuals would give.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -37,12 +37,12 @@ class Estimates:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Names of those that the record says something of."""
+        """Names of the unknowns that the record determines."""
         error = np.sqrt(np.diag(self.covariance))
         return tuple(u.name for u, e in zip(self.unknowns, error, strict=True) if e < TELLS * LOOSE * u.scale)
 
     def only(self, names: Sequence[str]) -> "Estimates":
-        """Those of some names, in their order."""
+        """The estimates of the named unknowns, in the order of the names."""
         at = [[u.name for u in self.unknowns].index(n) for n in names]
         block = np.ix_(at, at)
         some = tuple(self.unknowns[i] for i in at)
@@ -50,7 +50,7 @@ class Estimates:
 
 
 def widths(unknowns: Sequence[Unknown], loose: Sequence[Unknown]) -> Array:
-    """Widths (n,) between the bounds; of the `loose` ones no more than what is known of them beforehand."""
+    """Widths (n,) between the bounds; those of the `loose` unknowns are limited to their prior width."""
     every = np.array([u.high - u.low for u in unknowns])
     most = np.array([np.sqrt(12) * LOOSE * u.scale if u in loose else np.inf for u in unknowns])
     least: Array = np.minimum(every, most)
@@ -58,7 +58,7 @@ def widths(unknowns: Sequence[Unknown], loose: Sequence[Unknown]) -> Array:
 
 
 def estimates(made: Chart, fit: Fit) -> Estimates:
-    """What a fit with the chart's effects says of the machine's unknowns."""
+    """Estimates of the machine's unknowns from a fit with the effects of the chart."""
     scale = np.array([u.scale for u in fit.unknowns])
     width = widths(fit.unknowns, made.natives)
     covariance = sandwich(fit.residual, fit.jacobian, scale, width)
@@ -76,7 +76,7 @@ def estimates(made: Chart, fit: Fit) -> Estimates:
 
 @dataclass(frozen=True)
 class Difference:
-    """How far apart two records are: in standard errors, over so many unknowns, and its chance."""
+    """Distance of two estimates in standard errors, the number of compared unknowns, and the p-value."""
 
     distance: float
     unknowns: int
@@ -84,7 +84,7 @@ class Difference:
 
 
 def difference(a: Estimates, b: Estimates) -> Difference:
-    """Of the unknowns that both records tell; the Wald statistic of their equality."""
+    """The Wald test of equality of two estimates, over the unknowns that both records determine."""
     told = [n for n in a.told if n in b.told]
     if not told:
         return Difference(0.0, 0, 1.0)

@@ -1,4 +1,4 @@
-"""One fit to several records: what belongs to the machine is one value, the rest is each record's own."""
+"""Joint least-squares fit to several records, which share the unknowns of the machine but no others."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from estimator.closeloop.several.part import Part
 from estimator.record import Array
 
 JOINT_EVALUATIONS = 25
-OFF_BOUND = 1e-9  # of a scale: so far values stay away from their bounds
+OFF_BOUND = 1e-9  # scales: distance that start values keep from their bounds
 
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """A fit of several records: what they share, and each record's hypothesis at these values."""
+    """A joint fit of several records: the shared estimates, and each record's hypothesis at these values."""
 
     shared: Estimates
     parts: tuple[Hypothesis, ...]
 
     @property
     def costs(self) -> tuple[float, ...]:
-        """Sum of squares of each record's identify part."""
+        """Sum of squares of each record on its part to identify."""
         return tuple(float(h.fit.residual @ h.fit.residual) for h in self.parts)
 
 
@@ -45,22 +45,22 @@ class _Stack:
         self.names = [[u.name for u in (*self.shared, *p.own)] for p in parts]
 
     def values(self, x: Array, i: int) -> dict[str, float]:
-        """Of a record by its chart's names."""
+        """The values of the i-th record by the names of its chart."""
         return {**self.held, **dict(zip(self.names[i], x[self.at[i]].tolist(), strict=True))}
 
     def start(self, low: Array, high: Array) -> Array:
-        """Each record's own start; of what is shared the mean, within the bounds."""
+        """Start values within bounds: the mean over the records if shared, else those of each record."""
         turned = [p.chart.turned(p.start) for p in self.parts]
         common = [float(np.mean([t[u.name] for t in turned])) for u in self.shared]
         own = [t[u.name] for t, p in zip(turned, self.parts, strict=True) for u in p.own]
         return np.asarray(np.clip([*common, *own], low, high))
 
     def residual(self, x: Array) -> Array:
-        """Of all records, one after the other, (m,)."""
+        """The residuals of all records, one after the other, (m,)."""
         return np.concatenate([p.residual(self.values(x, i)) for i, p in enumerate(self.parts)])
 
     def jacobian(self, x: Array) -> Array:
-        """Its derivatives (m, n)."""
+        """The derivatives of the residuals, (m, n)."""
         pieces = []
         for i, p in enumerate(self.parts):
             slopes = p.slopes(self.values(x, i), self.names[i])
@@ -70,20 +70,21 @@ class _Stack:
         return np.vstack(pieces)
 
     def rows(self) -> list[slice]:
-        """Of each record in the residual."""
+        """The rows of each record in the residual."""
         lengths = [len(p.size) * sum(int(r.fit.sum()) for r in p.problem.record.runs) for p in self.parts]
         return [slice(a, b) for a, b in pairwise(np.cumsum([0, *lengths]).tolist())]
 
     def order(self) -> Array:
-        """Rows so that a block of all is a block of each record: the records are independent."""
+        """An order of rows in which each of the BLOCKS blocks holds one block of every record."""
         split = [np.array_split(np.arange(r.start, r.stop), BLOCKS) for r in self.rows()]
         return np.concatenate([block for blocks in zip(*split, strict=True) for block in blocks])
 
 
 def fit_together(parts: Sequence[Part], held: Mapping[str, float] | None = None) -> Together:
-    """Least squares over all records, the machine's unknowns one for all, from the mean of their starts.
+    """Least squares over all records with shared unknowns of the machine, from their mean start values.
 
-    held: values of some of these, which are not fitted. FmuError where the FMU does not run at the end.
+    held: values of shared unknowns that are not fitted. Raises FmuError if the FMU cannot be simulated with
+    the fitted values.
     """
     stack = _Stack(parts, held or {})
     low, high, scale = (np.array([getattr(u, k) for u in stack.unknowns]) for k in ("low", "high", "scale"))
@@ -111,7 +112,7 @@ def fit_together(parts: Sequence[Part], held: Mapping[str, float] | None = None)
 
 @dataclass(frozen=True)
 class Likeness:
-    """Whether one value serves all records: rise of the sum of squares over separate fits, and its chance."""
+    """Test of one value for all records: rise of the sum of squares over separate fits, and its p-value."""
 
     rise: float
     unknowns: int
@@ -119,10 +120,10 @@ class Likeness:
 
 
 def likeness(joint: Together, costs: Sequence[float], alone: Sequence[Estimates]) -> Likeness:
-    """Joint against separate fits with these sums of squares; residuals that are not white count for less.
+    """Likelihood-ratio test of a joint fit against separate fits with the sums of squares `costs`.
 
-    The rise is divided by the mean ratio of the estimates' variances to those in white noise (first order of
-    Rao and Scott, Annals of Statistics 12 (1984), 46-60).
+    To allow for residuals that are not white, the rise is divided by the mean ratio of the variances to those
+    in white noise (first-order correction of Rao and Scott, Annals of Statistics 12 (1984), 46-60).
     """
     rise = max(0.0, sum(joint.costs) - sum(costs))
     told = [n for e in alone for n in e.told]

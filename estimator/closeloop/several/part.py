@@ -1,4 +1,4 @@
-"""A record's part in a fit of several."""
+"""One record in a joint fit of several records: its unknowns, residual and derivatives."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from estimator.record import Array
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A record in a fit of several.
+    """One record in a joint fit of several records.
 
-    problem: without the effects; effects: those that are shared; beside: others of this record alone;
-    calibrated: its unknowns without effects; size: (n_y,) of a residual that counts as one; start: values
-    by the FMU's names.
+    problem: without the effects; effects: those that all records share; beside: effects of this record only;
+    calibrated: its unknowns without effects; size: (n_y,) unit of each output's residual; start: start values
+    by the names of the FMU.
     """
 
     problem: Problem
@@ -46,30 +46,30 @@ class Part:
 
     @cached_property
     def built(self) -> Problem:
-        """The question to the FMU with all effects."""
+        """The problem for the FMU with all effects."""
         return built(self.problem, (*self.effects, *self.beside))
 
     @cached_property
     def chart(self) -> Chart:
-        """Of the shared effects."""
+        """The chart of the shared effects."""
         return chart(self.effects)
 
     @property
     def others(self) -> tuple[Unknown, ...]:
-        """Unknowns of this record alone, by the FMU's names: calibrated ones and the effects beside."""
+        """Unknowns of this record by the names of the FMU: calibrated ones, and those of its own effects."""
         return (*self.calibrated, *(u for c in self.beside for u in c.unknowns))
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """Unknowns of this record alone."""
+        """All unknowns that this record does not share."""
         return (*self.others, *self.chart.run)
 
     def residual(self, values: Mapping[str, float]) -> Array:
-        """Weighted, (m,), at values by the chart's names."""
+        """The weighted residual (m,) at values by the names of the chart."""
         return weighted(self.built, self.chart.native(values), self.size)
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Array:
-        """Derivatives of the weighted residual by these of the chart's names, (m, len(names))."""
+        """Derivatives of the weighted residual with respect to names of the chart, (m, len(names))."""
         unknowns, theta = (*self.others, *self.chart.natives), self.chart.native(values)
         turn = self.chart.slopes(values, [u.name for u in unknowns], names)
         moved = np.any(turn != 0, axis=1)
@@ -81,7 +81,7 @@ class Part:
     def hypothesis(
         self, values: Mapping[str, float], residual: Array, slopes: Array, covariance: Array
     ) -> Hypothesis:
-        """At fitted values, the shared effects fixed; slopes by and covariance of the unknowns `others`."""
+        """The hypothesis at fitted values, shared effects fixed; slopes, covariance: those of `others`."""
         theta = self.chart.native(values)
         fixed = [replace(c, fixed={**c.fixed, **_own(c, theta)}) for c in self.effects]
         at = np.array([theta[u.name] for u in self.others])

@@ -1,4 +1,4 @@
-"""What is left of a record's finding once the other records of the same FMU have been asked."""
+"""The result of a record after its effects have been tested in other records of the same FMU."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,10 +12,11 @@ EXCLUDED: tuple[Status, ...] = ("differs", "surpassed", "absent")
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """Of a record's class: the members that are left, who confirms them, and who rules out the others.
+    """The members of a record's answer that are left, those that are ruled out, and the records that decide.
 
-    confirmed: names of records by label; ruled_out: by label the record and its reason; disputed: records to
-    which no member carries over, with the transfers that say so; undecided: reasons where nothing is said.
+    confirmed: names of the confirming records by label; ruled_out: the record and its reason by label;
+    disputed: records to which no member carries over, with their transfers; undecided: reasons of transfers
+    without a result.
     """
 
     record: str
@@ -28,7 +29,7 @@ class Standing:
 
     @property
     def sentence(self) -> str:
-        """What it comes to; empty where there was nothing to ask."""
+        """The result as a sentence for the report; empty if there was nothing to test."""
         said = [_kept(h.label, self.confirmed[h.label]) for h in self.left if self.confirmed[h.label]]
         said += [f"{label} is ruled out by {by}" for label, (by, _) in self.ruled_out.items()]
         said += self._disputes()
@@ -37,13 +38,13 @@ class Standing:
         return "; ".join(said or self.undecided)
 
     def _disputes(self) -> list[str]:
-        """Records to which nothing carries over, in few words."""
+        """Phrases on the records to which no member carries over."""
         other = [t for found in self.disputed.values() for t in found if t.status == "differs"]
         said = [f"{t.member.label} has other values in {t.target}, {_far(t)}" for t in other]
         without = [by for by in self.disputed if by not in {t.target for t in other}]
         if without:
-            alone = f"{self.members[0].label} is not in {' and '.join(without)}"
-            every = f"no member of the class is in {' and '.join(without)}"
+            alone = f"{self.members[0].label} is not found in {' and '.join(without)}"
+            every = f"no member of the class is found in {' and '.join(without)}"
             said.append(alone if len(self.members) == 1 else every)
         return said
 
@@ -57,10 +58,10 @@ def _kept(label: str, by: Sequence[str]) -> str:
 
 
 def standing(a: Traced, found: Sequence[Transfer]) -> Standing:
-    """Of a record's class, from the transfers of its members to others.
+    """The standing of a record's members, from their transfers to other records.
 
-    Where one member carries over to a record, those that do not are ruled out by it. Where none does, those
-    that it contradicts are disputed, for no record says which of two is another's.
+    If a member carries over to a record, the members that do not are ruled out by that record. If none does,
+    nothing is ruled out but the record is disputed, since the two records may come from different machines.
     """
     own = [t for t in found if t.source == a.name]
     ruled: dict[str, tuple[str, str]] = {}

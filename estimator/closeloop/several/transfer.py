@@ -1,7 +1,7 @@
-"""Does an effect carry over? What one record shows is built into the FMU of another and held at its values.
+"""Transfer of effects between records: an effect found in one record is tested in another of the same FMU.
 
-Where it accounts for that record too it is confirmed by data that had no part in finding it. A second
-record so splits a class that the first could not tell apart.
+The effect is built into the FMU of the other record with the values found. If it accounts for that record
+too, it is confirmed by independent data. A second record can so tell apart effects that the first cannot.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ from estimator.closeloop.several.part import Part
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
-TRANSFERRED_SHAPES = 2  # of an effect, those most promising in the other record, that it is fitted from
+TRANSFERRED_SHAPES = 2  # shapes of an effect, most promising in the other record, used as start values
 
 Status = Literal["confirmed", "agrees", "differs", "surpassed", "absent", "silent", "open", "impossible"]
 CARRIES: tuple[Status, ...] = ("confirmed", "agrees")
@@ -38,7 +38,7 @@ CARRIES: tuple[Status, ...] = ("confirmed", "agrees")
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """A record with what the chain found in it."""
+    """A record with its problem and its outcome of close-loop."""
 
     name: str
     problem: Problem
@@ -46,7 +46,7 @@ class Traced:
 
     @property
     def members(self) -> tuple[Hypothesis, ...]:
-        """The verdict's class, faults of sensors left out: these are the record's own."""
+        """The hypotheses of the answer without sensor faults, which belong to one record only."""
         return tuple(h for h in self.found.judgement.members if not any(c.is_fault for c in h.candidates))
 
     @property
@@ -56,16 +56,17 @@ class Traced:
 
     @property
     def explanation(self) -> Hypothesis | None:
-        """What accounts for the record: effects, or none at all; None where nothing does."""
+        """The hypothesis that accounts for the record, possibly without effects; None if there is none."""
         return self.found.base if self.quiet else self.found.chosen
 
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """An effect of the record `source` in the FMU of the record `target`.
+    """An effect of the record `source`, tested in the FMU of the record `target`.
 
-    held: with the values of `source`, own: with those fitted to `target`, other effects of `target` beside;
-    loose: names of values that `source` does not tell, fitted to `target`; difference: of the values of both.
+    held: fit to `target` with the values of `source`; own: fit to `target` with free values; both include the
+    other effects of `target`. loose: names of values that `source` does not determine and that are fitted to
+    `target`; difference: test of equality of the values of both records.
     """
 
     source: str
@@ -86,7 +87,7 @@ class Transfer:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """All that a worker needs for one transfer; known: what `target` itself found with the effect."""
+    """The input of a worker process for one transfer; known: the fit of `target` that has the effect."""
 
     source: str
     target: str
@@ -99,7 +100,7 @@ class _Task:
 
 
 def transfers(a: Traced, b: Traced, jobs: int = 1) -> list[Transfer]:
-    """All physical members of the class of `a` in the FMU of `b`, which has to be the same."""
+    """Transfers of all physical members of the answer of `a` to `b`, which must have the same FMU."""
     tasks = [_task(a, h, b) for h in a.members]
     found = iter(Parallel(n_jobs=jobs)(delayed(_transferred)(t) for t in tasks if isinstance(t, _Task)))
     return [
@@ -109,7 +110,7 @@ def transfers(a: Traced, b: Traced, jobs: int = 1) -> list[Transfer]:
 
 
 def _task(a: Traced, member: Hypothesis, b: Traced) -> _Task | str:
-    """What there is to do, or why it cannot be done."""
+    """The task of a transfer, or the reason why it is impossible."""
     for c in member.candidates:
         if (c.kind, c.location) not in b.problem.builder.offers:
             return f"{c.label} cannot be built into the FMU of {b.name}"
@@ -118,7 +119,7 @@ def _task(a: Traced, member: Hypothesis, b: Traced) -> _Task | str:
     moved = [as_told_by(b, c) for c in member.candidates]
     here = [c for c in moved if c is not None]
     if len(here) < len(moved):
-        return f"{b.name} does not tell what {member.label} needs to know of a run"
+        return f"{b.name} does not give the values of the run that {member.label} needs"
     labels = {c.label for c in here}
     own = (h for h in b.found.judgement.members if labels <= {c.label for c in h.candidates})
     return _Task(
@@ -132,7 +133,7 @@ def _port(record: Traced, c: Candidate) -> object:
 
 
 def as_told_by(b: Traced, c: Candidate) -> Candidate | None:
-    """A candidate in another record: what a record tells of it is that record's; None where it does not."""
+    """A candidate with the values known from record b; None if b does not give the values that it needs."""
     for p in b.found.promises:
         for here in p.candidates:
             if here.label == c.label:
@@ -141,7 +142,7 @@ def as_told_by(b: Traced, c: Candidate) -> Candidate | None:
 
 
 def _promises(a: Traced, member: Hypothesis, b: Traced, here: tuple[Candidate, ...]) -> list[Promise]:
-    """From where the effect is fitted to `b`: from all values of `a`, and in the shapes that `b` suggests."""
+    """Start values of the effect in `b`: all values of `a`, and the shapes that are most promising in `b`."""
     base, theta = b.found.base.fit.theta, member.fit.theta
     calibrated = {n: theta[n] for n in b.problem.calibrate if n in theta}
     effect = {u.name: theta[u.name] for c in here for u in c.unknowns}
@@ -158,14 +159,14 @@ def _promises(a: Traced, member: Hypothesis, b: Traced, here: tuple[Candidate, .
 
 
 def values_of(h: Hypothesis) -> dict[str, float]:
-    """Values of the machine's unknowns of a hypothesis, by the chart's names."""
+    """Values of the machine's unknowns of a hypothesis, by the names of the chart."""
     made = chart(h.candidates)
     turned = made.turned(h.fit.theta)
     return {u.name: turned[u.name] for u in made.machine}
 
 
 def said_of(h: Hypothesis, labels: Sequence[str]) -> Estimates:
-    """What a fit says of the machine's unknowns of some of its effects."""
+    """Estimates of the machine's unknowns of some effects of a fit."""
     return estimates(chart([c for c in h.candidates if c.label in labels]), h.fit)
 
 
@@ -173,7 +174,7 @@ def _transferred(task: _Task) -> Transfer:
     t, labels = task, [c.label for c in task.member.candidates]
     own = t.known or next(iter(Fitter(t.baseline).finished(t.promises)), None)
     if own is None:
-        return Transfer(t.source, t.target, t.member, "impossible", "the FMU does not run with it")
+        return Transfer(t.source, t.target, t.member, "impossible", "the FMU cannot be simulated with it")
     said = said_of(t.member, labels)
     apart = difference(said, said_of(own, labels))
     values = {n: v for n, (v, _) in said.figures.items() if n in said.told}
@@ -182,12 +183,13 @@ def _transferred(task: _Task) -> Transfer:
         held = _held(t, own, values, [c for c in own.candidates if c.label not in labels])
         status, reason = _judged(t, held, own, apart, values)
     except FmuError as error:
-        return Transfer(t.source, t.target, t.member, "impossible", f"the FMU does not run with it: {error}")
+        reason = f"the FMU cannot be simulated with it: {error}"
+        return Transfer(t.source, t.target, t.member, "impossible", reason)
     return Transfer(t.source, t.target, t.member, status, reason, held, own, apart, loose)
 
 
 def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequence[Candidate]) -> Hypothesis:
-    """The effect at given values, all else fitted, from what its own fit or the other effects found."""
+    """Fit with the effect held at given values, from the better of two sets of start values."""
     labels = {c.label for c in t.member.candidates}
     effects = tuple(c for c in own.candidates if c.label in labels)
     rest = t.explanation.fit.theta if t.explanation and beside else {}
@@ -205,33 +207,33 @@ def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequen
 def _judged(
     t: _Task, held: Hypothesis, own: Hypothesis, apart: Difference, values: Mapping[str, float]
 ) -> tuple[Status, str]:
-    """Whether the effect carries over, and why it is said."""
+    """The status of a transfer and its reason as a sentence."""
     a, b, label = t.source, t.target, t.member.label
     far = f"{apart.distance:.3g} standard errors apart"
     if any(explains(t.baseline, h) for h in (held, own)):
         if t.explanation and not t.known and _outdone(t, own, t.explanation):
-            return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} does so better"
+            return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} fits better"
         if explains(t.baseline, held):
             return "confirmed", f"{label} with the values of {a} accounts for {b} too"
         if apart.p_value >= t.baseline.policy.decision.different:
             return "agrees", f"{label} accounts for {b} with values that agree with those of {a}, {far}"
         return "differs", f"{label} accounts for {b} with other values only, {far}"
     if t.explanation is None:
-        return "open", f"{label} does not account for {b}, and nothing else does"
+        return "open", f"{label} does not account for {b}, and no other effect does"
     labels = {c.label for c in t.member.candidates}
     beside = [c for c in t.explanation.candidates if c.label not in labels]
     both = _held(t, own, values, beside) if beside else held
     worse = t.baseline.beats(t.explanation, both) and (
         not t.quiet or apart.p_value < t.baseline.policy.decision.different
     )
-    by = "needs no effect" if t.quiet else f"is accounted for by {t.explanation.label}"
+    by = "needs no effect" if t.quiet else f"is explained by {t.explanation.label}"
     if worse:
-        return "absent", f"{b} {by}, and {label} with the values of {a} makes it worse"
-    return "silent", f"{b} {by}, and would not show {label} of {a} beside that"
+        return "absent", f"{b} {by}, and {label} with the values of {a} makes the fit worse"
+    return "silent", f"{b} {by}, and would not show {label} with the values of {a} in addition"
 
 
 def _outdone(t: _Task, own: Hypothesis, explanation: Hypothesis) -> bool:
-    """Whether what the other record found is better there, and by more than a small difference of form."""
+    """Whether the explanation of the other record is better by more than a small error of form."""
     b = t.baseline
     matters = b.lead(explanation, own)[0] >= b.policy.decision.alike * -float(b.scores(explanation).sum())
     return matters and b.beats(explanation, own)
