@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.hypotheses.relations import becomes, twins, with_twins
 from estimator.closeloop.policy import DEFAULT
@@ -25,7 +24,7 @@ from estimator.closeloop.screening.linear import (
     responses,
     shows_its_state,
 )
-from estimator.closeloop.screening.onset_times import at_their_moments
+from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration
 from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
@@ -221,7 +220,7 @@ class Steps:
         return float(self.t[-1])
 
     def changes(self, candidates):
-        return [(self.t >= moment(c)).astype(float)[:, None] for c in candidates]
+        return [(self.t >= c.onset).astype(float)[:, None] for c in candidates]
 
 
 @settings(max_examples=25)
@@ -231,20 +230,20 @@ def test_the_moment_of_a_step_is_found(share, size):
     true = 20.0 * share
     base = nothing_calibrated(-size * (t >= true))
     steps, c = Steps(t, base), candidate("step_force", "wheel", [("t0", 1.0)])
-    tried = [set_in(c, m) for m in np.linspace(0, 20, 12)[1:-1]]
+    tried = [c.with_onset(m) for m in np.linspace(0, 20, 12)[1:-1]]
     promises = screen(base, [((x,), g) for x, g in zip(tried, steps.changes(tried), strict=True)])
-    found = at_their_moments(steps, steps.fit, promises, 1)
-    assert abs(moment(found[0].candidates[0]) - true) < 20.0 * 0.1 / 36 + 0.01
+    found = at_their_onsets(steps, steps.fit, promises, 1)
+    assert abs(found[0].candidates[0].onset - true) < 20.0 * 0.1 / 36 + 0.01
     assert found[0].gain >= promises[0].gain
     assert len(found) == len(promises)
 
 
 def test_what_is_always_there_has_no_moment():
     c = candidate("coulomb_friction", "wheel", [("v_s", 0.1)])
-    assert moment(c) is None
+    assert c.onset is None
     promise = Promise((c,), 1.0, {})
     steps = Steps(np.arange(3.0), nothing_calibrated(np.ones(3)))
-    assert at_their_moments(steps, steps.fit, [promise], 3) == [promise]
+    assert at_their_onsets(steps, steps.fit, [promise], 3) == [promise]
 
 
 # ---- twins

@@ -25,7 +25,7 @@ def equivalent(baseline: Baseline, best: Hypothesis, others: Sequence[Hypothesis
     members = [best]
     for h in others:
         further = len(best.fit.unknowns) - len(h.fit.unknowns) if becomes(best, h) else 0
-        if h is not best and not form.told(best, h, unknown * further):
+        if h is not best and not form.distinguishes(best, h, unknown * further):
             members.append(h)
     members = [h for h in members if not any(_replaces(other, h, members) for other in members)]
     return [h for h in members if not any(includes(other, h) for other in members)]

@@ -49,7 +49,7 @@ class ModelForm(ABC):
         """Whether the residual of each output (n_y,) comes down to its noise or to the open share."""
 
     @abstractmethod
-    def told(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
+    def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """Whether the record rejects h against the best one; price: log score for unknowns that h lacks."""
 
     @abstractmethod
@@ -126,7 +126,7 @@ class Closed(ModelForm):
         """See ModelForm."""
         return self._at_noise(h)
 
-    def told(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
+    def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
         b, limits = self.baseline, self.baseline.policy.decision
         alike = limits.alike * -float(b.scores(best).sum())
@@ -223,7 +223,7 @@ class Open(ModelForm):
             down | gone | np.where(large, left < share, after <= limits.decision.clean * before)
         )
 
-    def told(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
+    def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; by both parts together, because the open form adds to what the best one leaves."""
         b, limits = self.baseline, self.baseline.policy.decision
         alike = limits.alike * -float(b.scores(best).sum())

@@ -14,7 +14,6 @@ from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
-from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.relations import becomes
 from fmus.effects import EFFECTS
 
@@ -178,7 +177,7 @@ def _noise_alone(baseline: Baseline, part: Part) -> bool:
 
 def one_curve(h: Hypothesis) -> bool:
     """Whether two laws over the same motion act at one place from the start; any curve could be their sum."""
-    always = [c for c in h.candidates if c.kind in EFFECTS and moment(c) is None]
+    always = [c for c in h.candidates if c.kind in EFFECTS and c.onset is None]
     kinds = [(c.location, EFFECTS[c.kind].over) for c in always]
     laws = [(at, over) for at, over in kinds if over]
     return len(set(laws)) < len(laws)

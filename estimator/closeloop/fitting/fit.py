@@ -79,7 +79,7 @@ def fit(
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
     begun = _begun(problem, theta, size) if fading else None
-    steps = np.array([STEP if u.is_moment else step for u in unknowns])
+    steps = np.array([STEP if u.is_onset else step for u in unknowns])
     slopes = Slopes(residual, scale, high, [(known or {}).get(n) for n in names], fading, begun, steps)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])

@@ -12,10 +12,9 @@ import numpy as np
 from estimator.closeloop.fitting.fit import fit, weighted
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.refined import lower, refined
-from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.candidate import Candidate, onsets_near
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.onset import begins, moments_near
 from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
@@ -67,18 +66,18 @@ def reached(h: Hypothesis, b: Hypothesis) -> Array:
 def bends(c: Candidate) -> bool:
     """Whether a candidate has an amplitude and a shape parameter, which may compensate each other."""
     free = {u.name for u in c.unknowns}
-    return any(u.name in free for u in c.amplitudes) and any(not u.is_moment for u in c.shape)
+    return any(u.name in free for u in c.amplitudes) and any(not u.is_onset for u in c.shape)
 
 
 def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, float], dict[str, float]]:
     """Standard errors by name, and values with a lower sum of squares, if some were found."""
     wider: dict[str, float] = {}
-    for name in begins(h):
+    for name in h.onset_names:
         half, deeper = _when(problem, h, name, size)
         wider[name] = half / WIDTH
         if deeper:
             return wider, deeper
-    for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_moment):
+    for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_onset):
         for side in (-1.0, 1.0):
             half, deeper = _half(problem, h, u, size, side)
             wider[u.name] = max(wider.get(u.name, 0.0), half / WIDTH)
@@ -132,7 +131,7 @@ def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[floa
         r = weighted(here, {**h.theta, name: t}, size)
         return float(np.sum((r - others @ (others.T @ r)) ** 2))
 
-    tried = np.array(moments_near(now, length))
+    tried = np.array(onsets_near(now, length))
     rises = (np.array([squares(t) for t in tried]) - squares(now)) / _usual(h, i)
     if rises.min() < -DEEPER:
         return 0.0, {name: float(tried[np.argmin(rises)])}

@@ -1,10 +1,16 @@
 """A candidate effect that could explain a residual, with its unknowns and their start values."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from estimator.closeloop.question.problem import Unknown
 from estimator.sensor_faults import FAULTS
+
+REACH, REACH_STEPS = 0.05, 25  # half width of the grid, as share of the fitted length; steps per side
 
 
 @dataclass(frozen=True)
@@ -48,3 +54,18 @@ class Candidate:
     def prefix(self) -> str:
         """Prefix of the names of its unknowns; sensor faults do not use it."""
         return f"{self.kind}_{self.location}_"
+
+    @property
+    def onset(self) -> float | None:
+        """Onset time, in s; None if it acts from the start."""
+        return next((u.start for u in self.shape if u.is_onset), None)
+
+    def with_onset(self, t: float) -> Candidate:
+        """The candidate with its onset at time t, in s."""
+        return replace(self, shape=tuple(replace(u, start=t) if u.is_onset else u for u in self.shape))
+
+
+def onsets_near(now: float, length: float) -> list[float]:
+    """A grid of onset times about `now`, in s, ascending and within the fitted length."""
+    grid = now + REACH * length * np.arange(-REACH_STEPS, REACH_STEPS + 1) / REACH_STEPS
+    return [float(t) for t in np.unique(np.clip(grid, 0.0, length))]

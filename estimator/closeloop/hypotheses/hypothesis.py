@@ -50,6 +50,11 @@ class Hypothesis:
         return {u.name for c in self.candidates for u in c.unknowns}
 
     @property
+    def onset_names(self) -> list[str]:
+        """Names of its unknowns that are onset times."""
+        return [u.name for c in self.candidates for u in c.shape if u.is_onset]
+
+    @property
     def others(self) -> list[Unknown]:
         """The unknowns that do not belong to its candidates."""
         own = self.own

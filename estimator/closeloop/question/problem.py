@@ -32,7 +32,7 @@ class Unknown:
     scale: float
 
     @property
-    def is_moment(self) -> bool:
+    def is_onset(self) -> bool:
         """Whether it is the onset time of an effect."""
         return self.name.endswith("_t0")
 

@@ -28,7 +28,7 @@ LARGEST_CHANGE = 200.0  # bound of a parameter's change, in realistic sizes; it 
 NEAR_START = 0.2  # share of its start value by which a calibrated parameter may differ from it
 
 
-MOMENT = 0.01  # scale of an onset time, as share of the record's length
+ONSET_SCALE = 0.01  # scale of an onset time, as share of the record's length
 
 
 def physical_candidates(
@@ -129,7 +129,7 @@ def _candidate(
             n,
             declared[n],
             v,
-            MOMENT * length if n == "t0" else SHAPE_CHANGE * (abs(v) or 1.0),
+            ONSET_SCALE * length if n == "t0" else SHAPE_CHANGE * (abs(v) or 1.0),
         )
         for n, v in free.items()
     )

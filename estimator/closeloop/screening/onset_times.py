@@ -10,7 +10,6 @@ import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.screening.screen import Screening, screen
 
@@ -20,14 +19,14 @@ FIRST_SPACING = 0.1  # spacing of the onset times of the candidates, as share of
 GRIDS, GRID_STEPS = 2, 6  # number of grids; each divides the spacing by this number of steps
 
 
-def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise], most: int) -> list[Promise]:
+def at_their_onsets(screening: Screening, fit: Fit, promises: Sequence[Promise], most: int) -> list[Promise]:
     """The promises, best first, with refined onset times for the best promise of each of `most` labels.
 
     fit: the fit with which the promises were computed.
     """
     leading: dict[str, Promise] = {}
     for p in promises:
-        if moment(p.candidates[0]) is not None:
+        if p.candidates[0].onset is not None:
             leading.setdefault(p.label, p)
     best = dict(list(leading.items())[:most])
     spacing = screening.length * FIRST_SPACING
@@ -45,6 +44,6 @@ def at_their_moments(screening: Screening, fit: Fit, promises: Sequence[Promise]
 
 def _near(c: Candidate, spacing: float) -> list[Candidate]:
     """The candidate with onset times on a grid within one spacing on either side."""
-    here = moment(c) or 0.0
+    here = c.onset or 0.0
     times = here + spacing * np.arange(1 - GRID_STEPS, GRID_STEPS) / GRID_STEPS
-    return [set_in(c, float(t)) for t in times if t > 0 and t != here]
+    return [c.with_onset(float(t)) for t in times if t > 0 and t != here]

@@ -17,7 +17,6 @@ from estimator.closeloop.fitting.fit import NEAR_NOISE, fit
 from estimator.closeloop.fitting.fitter import Fitter, from_there, hypothesis, together
 from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost, mean_square
-from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
@@ -74,7 +73,7 @@ def from_the_beginning(
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
     """The promises of one label that are fitted; an effect with an onset time starts from zero amplitude."""
     best = promises[0]
-    if moment(best.candidates[0]) is None:
+    if best.candidates[0].onset is None:
         return promises[:GROWN_SHAPES]
     off = {u.name: 0.0 for u in best.candidates[0].amplitudes}
     return [replace(best, start={**best.start, **off})]
@@ -108,5 +107,5 @@ def _grown(
 
 def _before(problem: Problem, promise: Promise) -> float:
     """Share of the part to identify before the onset time of a promise."""
-    begins = moment(promise.candidates[0])
+    begins = promise.candidates[0].onset
     return 0.0 if begins is None else problem.record.runs[0].fit_share(begins)

@@ -15,7 +15,6 @@ from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.onset import moment, set_in
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.screen import Screening, screen
@@ -105,8 +104,8 @@ def _by_response(
     run = problem.record.runs[0]
     here = problem.beginning(min(1.0, share + AFTER))
     there = fit(here, before.unknowns, size, before.theta, evaluations=1)
-    labels = {c.label: c for c in reversed(candidates) if moment(c) is not None}
-    tried = [set_in(c, run.fit_time(share + g / ONSET_BLOCKS)) for c in labels.values() for g in ABOUT]
+    labels = {c.label: c for c in reversed(candidates) if c.onset is not None}
+    tried = [c.with_onset(run.fit_time(share + g / ONSET_BLOCKS)) for c in labels.values() for g in ABOUT]
     screening = Screening(here, there, size)
     change = screening.changes(tried)
     found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])

@@ -7,11 +7,10 @@ from functools import cached_property
 from estimator.closeloop.decision.model_form import ModelForm, form_of
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
-from estimator.closeloop.hypotheses.onset import moment
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import twins, with_twins
 from estimator.closeloop.progress import Progress
-from estimator.closeloop.screening.onset_times import at_their_moments
+from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.search.dating import dated
 from estimator.closeloop.search.growing import from_the_beginning
@@ -74,7 +73,7 @@ class Search:
         """The promises of these candidates, best first, starting from the calibrated parameters."""
         s, labels = self.screened, {c.label for c, _ in self._single}
         limits = s.problem.policy.search
-        promises = at_their_moments(s.screening, s.fit, s.promises, limits.nominees_in_shapes)
+        promises = at_their_onsets(s.screening, s.fit, s.promises, limits.nominees_in_shapes)
         start = s.baseline.hypothesis.fit.theta
         return [replace(p, start={**start, **p.start}) for p in promises if p.label in labels]
 
@@ -186,4 +185,4 @@ class Search:
 
 def sets_in(h: Hypothesis) -> bool:
     """Whether one of its effects has an onset time."""
-    return any(moment(c) is not None for c in h.candidates)
+    return any(c.onset is not None for c in h.candidates)
