@@ -1,4 +1,4 @@
-"""Filters by name. Each file of this folder that defines an Estimator is one; there is no other list."""
+"""Filters by name. Every file of this folder that defines an Estimator adds one; there is no other list."""
 
 import sys
 from functools import cache
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @cache
 def filters() -> dict[str, type["Estimator"]]:
-    """Loaded when first asked for: parts of this folder are used without any filter, which take a second."""
+    """All filters by name. They are imported at the first call, because that takes about a second."""
     from estimator.filters.named import Estimator
 
     # what is found is concrete

@@ -1,7 +1,7 @@
-"""The small matrices of the filters: compiled where numba is installed, the same text in Python where not.
+"""Linear algebra of small matrices for the filters, compiled if numba is installed, else plain Python.
 
-What a filter does at every step is written out in loops and fills arrays that it is given: at these sizes
-a call of a library, or handing an array back from compiled code, costs more than the sums.
+Functions that run at every step are written as loops that fill given arrays: for matrices of this size, a
+library call or the return of an array from compiled code takes longer than the arithmetic.
 """
 
 from collections.abc import Callable
@@ -21,26 +21,26 @@ except ImportError:
 
 
 def compiled(function: Function) -> Function:
-    """The function as machine code, kept on disk, or as it is."""
+    """The function compiled by numba and cached on disk, or unchanged without numba."""
     made: Function = _numba.njit(cache=True)(function) if _numba else function
     return made
 
 
 @compiled
 def symmetric(P: Array) -> Array:
-    """P (n, n) without the rounding that makes it lopsided."""
+    """The symmetric part of P (n, n), without asymmetry by rounding."""
     return (P + P.T) * 0.5
 
 
 @compiled
 def factorise(P: Array, L: Array) -> bool:
-    """The lower factor of P (n, n) into L, whose upper part is zero; False where there is none."""
+    """Write the lower Cholesky factor of P (n, n) into L, zero in its upper part; False if there is none."""
     n = len(P)
     for j in range(n):
         square = P[j, j]
         for k in range(j):
             square -= L[j, k] * L[j, k]
-        if not 0.0 < square < np.inf:  # nan is neither
+        if not 0.0 < square < np.inf:  # also true for nan
             return False
         L[j, j] = np.sqrt(square)
         for i in range(j + 1, n):
@@ -53,13 +53,13 @@ def factorise(P: Array, L: Array) -> bool:
 
 @compiled
 def finite(x: Array) -> bool:
-    """Whether all of x (n,) is."""
+    """Whether all values of x (n,) are finite."""
     return not np.isnan(np.sum(x * 0.0))
 
 
 @compiled
 def there(y: Array, found: BoolArray) -> int:
-    """How many of y (m,) are measured, and which, into found (m,)."""
+    """Number of measured values in y (m,); the mask of these is written into found (m,)."""
     n = 0
     for i in range(len(y)):
         found[i] = np.isfinite(y[i])
@@ -69,7 +69,7 @@ def there(y: Array, found: BoolArray) -> int:
 
 @compiled
 def draw(x: Array, factor: Array, scale: float, points: Array) -> None:
-    """Points (2n + 1, n): x, and x plus and minus the columns of a scaled factor (n, n)."""
+    """Write sigma points (2n + 1, n): x, and x plus and minus the columns of a scaled factor (n, n)."""
     n = len(x)
     for j in range(n):
         points[0, j] = x[j]
@@ -80,7 +80,7 @@ def draw(x: Array, factor: Array, scale: float, points: Array) -> None:
 
 @compiled
 def mean(points: Array, weights: Array, x: Array) -> None:
-    """Weighed mean x (n,) of points (k, n)."""
+    """Write the weighted mean of points (k, n) into x (n,)."""
     for j in range(len(x)):
         total = 0.0
         for i in range(len(weights)):
@@ -90,7 +90,7 @@ def mean(points: Array, weights: Array, x: Array) -> None:
 
 @compiled
 def cross(A: Array, a: Array, B: Array, b: Array, weights: Array, P: Array) -> None:
-    """Weighed covariance P (n, m) of points A (k, n) about a (n,) and B (k, m) about b (m,)."""
+    """Write the weighted covariance of points A (k, n) about a and B (k, m) about b into P (n, m)."""
     P[:] = 0.0
     for k in range(len(weights)):
         for i in range(len(a)):
@@ -103,9 +103,9 @@ def cross(A: Array, a: Array, B: Array, b: Array, weights: Array, P: Array) -> N
 def predict(
     before: Array, x0: Array, after: Array, Wm: Array, Wc: Array, Q: Array, x: Array, P: Array, C: Array
 ) -> None:
-    """Moments of weighed points (k, n) after a step: x (n,), P (n, n) with Q, and C (n, n) with x0 before it.
+    """Write the mean x (n,) and covariance P (n, n), with Q added, of weighted points after a step.
 
-    C: covariance of what was and what is, before: the points about x0 that were moved.
+    before, after: points (k, n) about x0 before and after the step; C: (n, n) their cross-covariance.
     """
     mean(after, Wm, x)
     cross(after, x, after, x, Wc, P)
@@ -115,14 +115,14 @@ def predict(
 
 @compiled
 def expect(Y: Array, Wm: Array, Wc: Array, y: Array, S: Array) -> None:
-    """Mean y (m,) and covariance S (m, m) of weighed outputs Y (k, m)."""
+    """Write the mean y (m,) and covariance S (m, m) of weighted outputs Y (k, m)."""
     mean(Y, Wm, y)
     cross(Y, y, Y, y, Wc, S)
 
 
 @compiled
 def solve(L: Array, b: Array) -> None:
-    """b (n, m) becomes what solves L L' x = b, by forward and backward substitution."""
+    """Replace b (n, m) by the solution x of L L' x = b, by forward and backward substitution."""
     n = len(L)
     for j in range(b.shape[1]):
         for i in range(n):
@@ -141,10 +141,10 @@ def solve(L: Array, b: Array) -> None:
 def correct(
     Wc: Array, X: Array, x: Array, Y: Array, y: Array, S: Array, e: Array, R: Array, x1: Array, P1: Array
 ) -> None:
-    """Mean x1 (n,), covariance P1 (n, n) of points X (k, n) after innovations e (m,) of outputs Y (k, m).
+    """Write the mean x1 (n,) and covariance P1 (n, n) of points X (k, n) corrected by innovations e (m,).
 
-    x (n,), y (m,) are their means, S (m, m) the covariance of e, in which R (m, m) is noise. Joseph's form:
-    a sum of squares. nan where S is not positive definite.
+    Y: outputs (k, m) of the points; x, y: means of X and Y; S: (m, m) covariance of e, of which R is the
+    measurement noise. P1 is a sum of squares (Joseph's form). Both are nan if S is not positive definite.
     """
     n, m = len(x), len(y)
     L, gain, rest, none = np.zeros((m, m)), np.empty((m, n)), np.empty(X.shape), np.zeros(n)
@@ -171,7 +171,7 @@ def correct(
 
 @compiled
 def joseph(x: Array, P: Array, H: Array, e: Array, R: Array) -> tuple[Array, Array]:
-    """x (n,), P (n, n) corrected by innovations e (m,) of outputs H x with noise R, as a sum of squares."""
+    """x (n,), P (n, n) corrected by innovations e (m,) of outputs H x with noise R, in Joseph's form."""
     HP = H @ P
     K = np.linalg.solve(HP @ H.T + R, HP).T
     rest = np.eye(len(x)) - K @ H
@@ -183,7 +183,7 @@ def joseph(x: Array, P: Array, H: Array, e: Array, R: Array) -> tuple[Array, Arr
 def log_density(e: Array, S: Array) -> tuple[float, float]:
     """Logarithm of the normal density of e (m,) with covariance S (m, m), and e' S^-1 e.
 
-    -inf and nan where S is not positive definite.
+    The results are -inf and nan if S is not positive definite.
     """
     m = len(e)
     L, x = np.zeros((m, m)), np.empty((m, 1))

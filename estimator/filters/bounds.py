@@ -1,4 +1,4 @@
-"""Parameters within bounds: a filter's own coordinate z on the whole line, and the parameter theta(z)."""
+"""Transformations theta(z) of a filter's unbounded coordinate z into a parameter within bounds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from estimator.record import Array
 from fmus.errors import BadInput
 
 Kind = Literal["free", "log", "logit", "clip"]
-KINDS: tuple[Kind, ...] = get_args(Kind)  # their places are the codes of compiled functions
+KINDS: tuple[Kind, ...] = get_args(Kind)  # their positions are the codes in compiled functions
 FREE, LOG, LOGIT, CLIP = range(len(KINDS))
 Whole: TypeAlias = NDArray[np.int64]
-LARGEST = 700.0  # of an exponent; beyond it a double overflows
+LARGEST = 700.0  # largest exponent; beyond it a double overflows
 
 
 @compiled
@@ -34,7 +34,7 @@ def grown(code: int, low: float, high: float, z: float) -> float:
 
 @compiled
 def grow(codes: Whole, low: Array, high: Array, Z: Array, theta: Array) -> None:
-    """Parameters theta (k, p) at coordinates Z (k, p), of transforms with these codes and bounds (p,)."""
+    """Write the parameters theta (k, p) at coordinates Z (k, p); codes, low, high: (p,) of the transforms."""
     for i in range(len(codes)):
         for k in range(len(Z)):
             theta[k, i] = grown(codes[i], low[i], high[i], Z[k, i])
@@ -45,7 +45,7 @@ class Transform:
     """theta(z) of one parameter between low and high.
 
     free: theta = z. log: theta = low + e^z. logit: theta = low + (high - low)/(1 + e^-z).
-    clip: theta = z cut off at the bounds, as the sources do it, for comparison.
+    clip: theta = z clipped to the bounds, as in the literature, for comparison.
     """
 
     kind: Kind
@@ -60,7 +60,7 @@ class Transform:
         return found.reshape(given.shape)
 
     def z(self, theta: float) -> float:
-        """The coordinate of a value; BadInput where it lies on or outside the bounds."""
+        """The coordinate of a value; raises BadInput if the value is not between the bounds."""
         if self.kind in ("free", "clip"):
             return theta
         if not self.low < theta < self.high:
@@ -81,11 +81,11 @@ class Transform:
         return (self.high - self.low) * share * (1 - share)
 
     def spread(self, z: Array, std: Array) -> Array:
-        """Half the width of the band that one standard deviation of z opens about theta(z)."""
+        """Half the distance between the parameters at z plus and minus one standard deviation."""
         return (self.theta(z + std) - self.theta(z - std)) / 2
 
     def settled(self, z: Array) -> Array:
-        """The coordinate that a filter goes on with: only clipping changes it."""
+        """The coordinate after a correction, which only clipping changes."""
         return self.theta(z) if self.kind == "clip" else z
 
 
@@ -97,7 +97,7 @@ def coded(transforms: Sequence[Transform]) -> tuple[Whole, Array, Array]:
 
 
 def bounded(bounds: tuple[float, float] | None) -> Transform:
-    """The transformation that keeps a parameter within bounds, infinite ones included; None is free."""
+    """The transformation that keeps a parameter within bounds, which may be infinite; None means free."""
     low, high = bounds or (-inf, inf)
     if not low < high:
         raise BadInput(f"bounds [{low:g}, {high:g}] do not increase; give [lower, upper]")

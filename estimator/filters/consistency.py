@@ -1,4 +1,4 @@
-"""Does a filter believe what it should? NIS, NEES and whiteness of innovations, with their bands."""
+"""Consistency of a filter: NIS, NEES and whiteness of the innovations, with their confidence bands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,15 +8,15 @@ from scipy.stats import chi2
 
 from estimator.record import Array
 
-LAGS = 20  # samples over which innovations must not remember
-FALSE_REJECTION = 0.05  # chance that any of the checks rejects a filter whose model and noise are right
+LAGS = 20  # lags of the autocorrelation of the innovations
+FALSE_REJECTION = 0.05  # probability that any check rejects a filter whose model and noise are right
 NIS = "NIS"
 WHITENESS = "whiteness of "
 
 
 @dataclass(frozen=True)
 class Band:
-    """A statistic with the interval in which it lies with the probability asked for."""
+    """A statistic with its confidence interval under the hypothesis that the filter is consistent."""
 
     value: float
     low: float
@@ -24,22 +24,22 @@ class Band:
 
     @property
     def within(self) -> bool:
-        """Whether it lies there."""
+        """Whether the value lies in the interval."""
         return bool(self.low <= self.value <= self.high)
 
 
 def squares(error: Array, covariance: Array) -> Array:
-    """Normalised squares e' P^-1 e of errors (..., n) with covariances (..., n, n), (...)."""
+    """Normalised squares e' P^-1 e (...) of errors (..., n) with covariances (..., n, n)."""
     solved = np.linalg.solve(covariance, error[..., None])[..., 0]
     found: Array = np.einsum("...i,...i->...", error, solved)
     return found
 
 
 def mean_band(found: Array, freedom: Array, probability: float = 0.95) -> Band:
-    """Mean of independent normalised squares (N,), each of `freedom` (N,) degrees, and its band.
+    """Mean of independent normalised squares (N,), with `freedom` (N,) degrees of freedom, and its band.
 
-    For innovations this is the NIS, for errors of the estimate over runs of different seeds the NEES
-    (Bar-Shalom, Li, Kirubarajan 2001, 5.4). Without samples all is nan.
+    For innovations this is the NIS; for estimation errors over simulations with different seeds it is the
+    NEES (Bar-Shalom, Li, Kirubarajan 2001, 5.4). Without samples all values are nan.
     """
     n = len(found)
     if n == 0:
@@ -50,7 +50,9 @@ def mean_band(found: Array, freedom: Array, probability: float = 0.95) -> Band:
 
 
 def share_within(found: Array, freedom: Array, probability: float = 0.95) -> float:
-    """Share of normalised squares (N,) within their own central band; the probability where all is well."""
+    """Share of normalised squares (N,) within their central band, which a consistent filter makes equal to
+    the probability.
+    """
     if len(found) == 0:
         return np.nan
     low, high = (chi2.ppf(p, freedom) for p in ((1 - probability) / 2, (1 + probability) / 2))
@@ -59,20 +61,20 @@ def share_within(found: Array, freedom: Array, probability: float = 0.95) -> flo
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Memory of a normalised innovation: correlation (L,) by lag, p value of Ljung and Box's test."""
+    """Autocorrelation (L,) of a normalised innovation by lag, and the p-value of the Ljung-Box test."""
 
     correlation: Array
     p_value: float
-    limit: float  # 95 % of the correlations of white noise are smaller
+    limit: float  # bound below which 95 % of the correlations of white noise lie
 
     @property
     def largest(self) -> float:
-        """The largest correlation by size."""
+        """The largest magnitude of a correlation."""
         return float(np.max(np.abs(self.correlation), initial=0.0))
 
 
 def whiteness(innovation: Array, lags: int = LAGS) -> Whiteness:
-    """Of innovations (N,) over their standard deviations, by Ljung and Box, Biometrika 65 (1978) 297."""
+    """Whiteness of normalised innovations (N,) by the test of Ljung and Box, Biometrika 65 (1978) 297."""
     e = innovation[np.isfinite(innovation)]
     n = len(e)
     lags = min(lags, n // 4)
@@ -87,7 +89,7 @@ def whiteness(innovation: Array, lags: int = LAGS) -> Whiteness:
 
 @dataclass(frozen=True)
 class Check:
-    """One test of a filter by its own innovations, passed where the value is within the limit [low, high]."""
+    """One consistency test of a filter, passed if the value is within the limits [low, high]."""
 
     check: str
     value: float
@@ -96,9 +98,9 @@ class Check:
 
 
 def checks(nis: Array, freedom: Array, innovation: Array, outputs: Sequence[str]) -> tuple[Check, ...]:
-    """The mean NIS of squares (N,), and each output's whiteness by innovations (N, m) over their deviations.
+    """Checks of the mean NIS (N,), and of the whiteness of each output's normalised innovations (N, m).
 
-    FALSE_REJECTION is shared evenly between them (Bonferroni). What too few samples leave open is left out.
+    FALSE_REJECTION is divided evenly between them (Bonferroni). Checks with too few samples are left out.
     """
     level, used = FALSE_REJECTION / (1 + len(outputs)), freedom > 0
     band = mean_band(nis[used], freedom[used], 1 - level)

@@ -1,4 +1,4 @@
-"""A joint system with derivatives: the FMU's own with respect to its states, differences for the rest."""
+"""A joint system with derivatives: those of the FMU for its states, finite differences for other unknowns."""
 
 from collections.abc import Callable
 
@@ -17,15 +17,16 @@ from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.errors import BadInput
 
-LEAST = 1e-4  # by which parameters' coordinates and unknown inputs are perturbed, of themselves or of one
-MOST_PARTS = 32  # of a step, beyond which the FMU is stiff
-AGREES = 1e-3  # of the largest entry, to which both ways must give the same
+LEAST = 1e-4  # finite difference of parameters and unknown inputs, relative to their value or to 1
+MOST_PARTS = 32  # largest number of integration steps per time step; beyond it the FMU is stiff
+AGREES = 1e-3  # largest difference of both kinds of derivatives, as share of the largest entry
 
 
 class Differentiated:
-    """A Joint that an extended filter need not difference with respect to the FMU's states.
+    """A Joint with derivatives with respect to the FMU's states for an extended Kalman filter.
 
-    Made by `differentiated`. An unknown input acts over a step in the FMU, so it belongs to the rest.
+    It is made by `differentiated`. Derivatives with respect to parameters and unknown inputs are finite
+    differences.
     """
 
     def __init__(self, joint: Joint, exchange: Exchange) -> None:
@@ -48,7 +49,7 @@ class Differentiated:
         return self.joint.settled(x)
 
     def dfdx(self, x: Array, u: Array, t: float, dt: float, carried: Array) -> Array:
-        """d f / dx, (n, n); for the states with the mean of inputs that act in parts."""
+        """d f / dx, (n, n); if the inputs act in parts, the columns of the states use their mean."""
         F = self._rest(lambda X: self.joint.f(X, u, t, dt, carried)[0], x)
         held = u.mean(axis=0) if u.ndim == 2 else u
         values = self.joint.rows(x[None], held, carried)[0]
@@ -65,7 +66,7 @@ class Differentiated:
         return H
 
     def _rest(self, of: Callable[[Array], Array], x: Array) -> Array:
-        """The Jacobian's columns of what is no state, by differences; those of the states stay zero."""
+        """The Jacobian with columns for parameters and unknown inputs by differences, zero for states."""
         n = self._n
         points, away = central(x[n:], np.maximum(np.abs(x[n:]), 1.0) * LEAST / NUDGE)
         values = of(np.hstack([np.tile(x[:n], (len(points), 1)), points]))
@@ -73,10 +74,11 @@ class Differentiated:
 
 
 def differentiated(joint: Joint, u: Array, t: float, dt: float) -> Differentiated | None:
-    """The joint system with the FMU's own derivatives, freed with it; None where they are not to be had.
+    """The joint system with the FMU's own derivatives; None if they are missing, wrong or too expensive.
 
-    They must agree with differences at the start, with inputs u (n_u,): no flag is believed. A stiff FMU
-    is left to differences too, which go through its own steps and not through many short ones.
+    The derivatives must agree with finite differences at the start, with inputs u (n_u,); the flags of the
+    FMU are not relied on. For a stiff FMU finite differences are used, since they need only its own steps.
+    The instance for the derivatives is freed together with the joint system.
     """
     try:
         exchange = joint.exchange()

@@ -1,8 +1,9 @@
-"""Dual filter: one filter for the states and one for the parameters, each trusting the other's mean.
+"""Dual filter: one filter for the states and one for the parameters, each using the mean of the other.
 
-Wan and Nelson, in Haykin (ed.), Kalman Filtering and Neural Networks, 2001, ch. 5. Cheaper than a joint
-filter where there are many parameters, but blind to the correlation of states and parameters: a parameter
-is learnt only from what it does within one step, so that states which it moves should be measured.
+Source: Wan and Nelson, in Haykin (ed.), Kalman Filtering and Neural Networks, 2001, ch. 5. It needs fewer
+simulations than a joint filter with many parameters, but neglects the correlation of states and parameters.
+A parameter is estimated from its influence within one step, so that the states it influences should be
+measured.
 """
 
 from dataclasses import replace
@@ -26,8 +27,8 @@ from fmus.errors import BadInput
 class Dual(Estimator):
     """Two unscented filters on one system, whose x holds n_x states and then the parameters.
 
-    Contract and arguments as of `Filter`, Q and start of the whole x. The covariance between the two
-    parts stays zero.
+    Interface and arguments are those of `Filter`; Q and start refer to the whole x. The covariance between
+    states and parameters stays zero.
     """
 
     name = "dual"
@@ -55,17 +56,17 @@ class Dual(Estimator):
         """See Estimator.of."""
         if asked.gate or asked.adapt:
             raise BadInput(
-                f"[estimate.options] gate and adapt are not for filter = '{cls.name}'; leave them out"
+                f"[estimate.options] filter = '{cls.name}' does not support gate and adapt; leave them out"
             )
         return cls(joint, len(joint.states), start, joint.noise, asked.R, asked.dt, asked.spread)
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
-        """As of Filter."""
+        """See Filter.step."""
         n, before = self._n, self.now
         dt = self.dt if dt is None else dt
         if before.u is not None:
             self._learning.origin = before, (before.u + u) / 2 if held is None else held, dt
-        if before.S.size:  # to the parameters what the states do not know is noise
+        if before.S.size:  # for the parameter filter, the uncertainty of the states is measurement noise
             self.parameters.R = before.S
         theta = self.parameters.step(u, y, dt, held)
         self._moving.rest = np.concatenate([before.x[:n], theta.x])
@@ -87,14 +88,14 @@ class Dual(Estimator):
 
 
 class _Part:
-    """A system of which only the part `where` of x is moved; the rest stays at `rest`."""
+    """A system restricted to the part `where` of x; all other values are held at `rest`."""
 
     def __init__(self, system: System, where: slice, rest: Array) -> None:
         self.system, self.where, self.rest = system, where, rest
         self.names, self.outputs = system.names[where], system.outputs
 
     def whole(self, X: Array) -> Array:
-        """All of x for rows of the part."""
+        """The whole x for rows of the part."""
         full = np.tile(self.rest, (len(X), 1))
         full[:, self.where] = X
         return full
@@ -114,9 +115,9 @@ class _Part:
 
 
 class _Learning(_Part):
-    """The parameters, which stay as they are and are seen through the step that the states make with them."""
+    """The system of the parameter filter: constant parameters, observed by their influence on one step."""
 
-    origin: tuple[Estimate, Array, float] | None = None  # the states before the step, inputs held, its length
+    origin: tuple[Estimate, Array, float] | None = None  # estimate before the step, its inputs and length
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
         """See System."""
@@ -134,7 +135,7 @@ class _Learning(_Part):
 
 
 def part(e: Estimate, where: slice) -> Estimate:
-    """An estimate of a part of x, before any sample or after one."""
+    """The estimate of a part of x."""
     return Estimate(e.t, e.x[where].copy(), e.P[where, where].copy(), e.u, carried=e.carried)
 
 

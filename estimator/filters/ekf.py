@@ -1,4 +1,4 @@
-"""Extended Kalman filter: the system's own derivatives where it has them, else differences."""
+"""Extended Kalman filter with the derivatives of the system, or finite differences if it has none."""
 
 from typing import Protocol, Self, runtime_checkable
 
@@ -19,12 +19,12 @@ from estimator.filters.named import Estimator, Request
 from estimator.filters.system import Joint
 from estimator.record import Array, BoolArray
 
-LEAST = 1e-3  # of a value
+LEAST = 1e-3  # smallest scale of finite differences, relative to the value
 
 
 @runtime_checkable
 class Differentiable(Protocol):
-    """A system that knows its derivatives with respect to x."""
+    """A system that provides its derivatives with respect to x."""
 
     def dfdx(self, x: Array, u: Array, t: float, dt: float, carried: Array) -> Array:
         """d f / dx, (n, n)."""
@@ -34,7 +34,7 @@ class Differentiable(Protocol):
 
 
 class Ekf(Filter, Estimator):
-    """Moves the mean through the system and the covariance through its derivatives at the mean."""
+    """Propagates the mean by the system and the covariance by its derivatives at the mean."""
 
     name = "ekf"
 
@@ -87,5 +87,5 @@ class Ekf(Filter, Estimator):
 
 
 def _scale(x: Array, P: Array) -> Array:
-    """What differences are small against: what is believed of x, and not less than rounding allows."""
+    """Scales (n,) of the finite differences: standard deviations of x, limited from below by rounding."""
     return np.maximum(np.sqrt(np.diag(P)), LEAST * np.abs(x))

@@ -1,4 +1,4 @@
-"""The contract of all filters: what they estimate, what they are told, and how they give up."""
+"""The common part of all filters: the system, the estimate, gating, noise adaptation and divergence."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -16,47 +16,47 @@ from estimator.filters.algebra import (
 )
 from estimator.record import Array, BoolArray
 
-Covariance = Array | Callable[[float], Array]  # constant, or of the length of a step [s]
+Covariance = Array | Callable[[float], Array]  # constant, or a function of the step length [s]
 NONE = np.empty(0)
-ROUNDING = 1e-12  # of a correlation, below which an eigenvalue cannot be told from zero
+ROUNDING = 1e-12  # eigenvalues of a correlation matrix below this are zero to rounding
 
 
 class Diverged(RuntimeError):
-    """A filter that cannot go on; the sentence says when, at which state and why."""
+    """A filter has diverged; the message gives the time, the state and the reason."""
 
 
 class System(Protocol):
-    """x+ = f(x, u), y = h(x, u) for many x at once, with noise added by the filter.
+    """x+ = f(x, u), y = h(x, u) for many x at once; the filter adds the noise.
 
-    Row 0 of X is the mean. `carried` are values that move with row 0 and are not estimated.
+    Row 0 of X is the mean. `carried` are states that are simulated with row 0 but not estimated.
     """
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What x holds."""
+        """Names of the elements of x."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """What y holds."""
+        """Names of the elements of y."""
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
-        """States (k, n) at t + dt [s] with inputs held, and what row 0 carries then.
+        """States (k, n) at t + dt [s] with constant inputs, and the values carried with row 0.
 
-        u: (n_u,), or (parts, n_u) held one after the other over equal parts of dt.
+        u: (n_u,), or (parts, n_u) for inputs that are constant on successive equal parts of dt.
         """
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
-        """Outputs (k, m) at t with inputs (n_u,) of that moment."""
+        """Outputs (k, m) at t with the inputs (n_u,) at t."""
 
     def settled(self, x: Array) -> Array:
-        """The state (n,) that a filter goes on with after a correction."""
+        """The state (n,) after a correction, clipped to its bounds if the system requires it."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What is believed after a sample, and how it came about; a filter restarted from it goes on exactly.
+    """The estimate after a sample, with the intermediate results; a filter can be restarted from it exactly.
 
-    Where nothing was measured, innovation is nan, S empty and log_likelihood 0.
+    If nothing was measured, innovation is nan, S is empty and log_likelihood is 0.
     """
 
     t: float  # s
@@ -64,23 +64,24 @@ class Estimate:
     P: Array  # (n, n)
     u: Array | None = None  # (n_u,) inputs at t; None before the first sample
     innovation: Array = field(default_factory=lambda: NONE)  # (m,) nan where nothing was measured
-    S: Array = field(default_factory=lambda: NONE)  # (m, m) covariance expected of the innovation
-    used: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) what corrected x
-    gated: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) measured, but too far off
+    S: Array = field(default_factory=lambda: NONE)  # (m, m) expected covariance of the innovation
+    used: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) channels that were used
+    gated: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) rejected by the gate
     log_likelihood: float = 0.0
-    nis: float = 0.0  # normalised square of the innovation that was used
+    nis: float = 0.0  # normalised innovation squared, of the channels that were used
     x_prior: Array = field(default_factory=lambda: NONE)  # (n,) before the correction
     P_prior: Array = field(default_factory=lambda: NONE)  # (n, n)
     C: Array = field(default_factory=lambda: NONE)  # (n, n) covariance of x before and after the step
     carried: Array = field(default_factory=lambda: NONE)
-    memory: Any = None  # what an option of the filter remembers
+    memory: Any = None  # internal state of the gate and the adaptation
 
 
 @dataclass(frozen=True)
 class Gate:
-    """Leave out a channel whose innovation exceeds `deviations` times what is expected of it.
+    """Rejects a channel whose innovation exceeds `deviations` times its expected standard deviation.
 
-    After `patience` samples in a row it is believed again: then the model is wrong, not the sensor.
+    After `patience` samples in a row the channel is used again, because then the model is wrong and not the
+    sensor.
     """
 
     deviations: float = 5.0
@@ -89,36 +90,36 @@ class Gate:
 
 @dataclass(frozen=True)
 class Adaptation:
-    """Noise that follows the innovations with a memory of so many samples.
+    """Adaptation of the noise to the innovations, with a memory of `samples` samples.
 
-    measurement: the variance of each channel. process: one factor on all of Q.
+    measurement: whether the variance of each channel is adapted; process: whether a common factor of Q is.
     """
 
     samples: float = 500.0
     measurement: bool = True
     process: bool = False
-    limits: tuple[float, float] = (1e-2, 1e4)  # of a variance over the one declared
+    limits: tuple[float, float] = (1e-2, 1e4)  # of the ratio of a variance to the declared one
 
 
 @dataclass(frozen=True)
 class Adapted:
-    """What the adaptation remembers."""
+    """The internal state of the gate and the adaptation."""
 
     scatter: Array  # (m,) mean square of the innovations
-    R: Array  # (m,) variances over the declared ones
-    Q: float  # factor
-    rejected: Array  # (m,) samples in a row that were gated
+    R: Array  # (m,) ratios of the variances to the declared ones
+    Q: float  # factor of the process noise
+    rejected: Array  # (m,) number of successive samples that were gated
 
 
-# of an Estimate: innovation, S, used, gated, log_likelihood, nis
+# fields of an Estimate: innovation, S, used, gated, log_likelihood, nis
 Facts = tuple[Array, Array, BoolArray, BoolArray, float, float]
 
 
 class Filter(ABC):
-    """Estimates x step by step. Q, R: process noise of a step and measurement noise, as covariances.
+    """Estimates x step by step. Q, R: covariances of the process noise per step and the measurement noise.
 
-    Each `step` moves the time by dt [s], and the first one by nothing unless `start` already saw a sample.
-    Inputs act over a step with the mean of both its ends, as in all simulations here.
+    Each `step` advances the time by dt [s], except the first one if `start` is from before the first sample.
+    Inputs act over a step with the mean of their values at both ends, as in all simulations of railfmi.
     """
 
     def __init__(
@@ -141,30 +142,30 @@ class Filter(ABC):
         self.factored(start.x, start.P, start.t)
 
     def factored(self, x: Array, P: Array, t: float) -> Array:
-        """A factor of P (n, n), worked out once; Diverged where there is none."""
+        """A factor of P (n, n), computed once; raises Diverged if there is none."""
         if self._factor is None or self._factor[0] is not P:
             self._factor = P, checked(x, P, self.names, t)
         return self._factor[1]
 
     @abstractmethod
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
-        """Move from `now`: x, P, their covariance with the old x, what is carried."""
+        """Prediction from `now`: x, P, cross-covariance with the old x, and carried values."""
 
     @abstractmethod
     def _expect(self, x: Array, P: Array, u: Array, t: float, carried: Array) -> tuple[Array, Array]:
-        """Outputs expected at x (m,) and their covariance without that of the noise (m, m)."""
+        """Expected outputs at x (m,), and their covariance without measurement noise (m, m)."""
 
     @abstractmethod
     def _correct(
         self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        """x, P after the channels `used`: their innovations (m_u,), covariance (m_u, m_u), noise in it."""
+        """x, P corrected by the channels `used`; innovation (m_u,), S and R (m_u, m_u) are of these."""
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
-        """Move on by dt with inputs u (n_u,) at its end, correct by outputs y (m,), nan where there are none.
+        """Predict over dt with inputs u (n_u,) at its end, correct by outputs y (m,), nan if not measured.
 
-        held: inputs that act over the step, where the mean of both ends is not good enough; see System.f.
-        Raises Diverged where the estimate can not be carried on.
+        held: inputs that act over the step, if the mean of both ends is too coarse; see System.f.
+        Raises Diverged if the estimate is not finite or its covariance not positive semidefinite.
         """
         now, dt = self.now, self.dt if dt is None else dt
         t, x, P, C, carried = now.t, now.x, now.P, NONE, now.carried
@@ -184,7 +185,7 @@ class Filter(ABC):
     def _measured(
         self, x: Array, P: Array, u: Array, y: Array, t: float, carried: Array
     ) -> tuple[Array, Array, Facts]:
-        """The same x, P where nothing is to be used."""
+        """x, P after the correction, or the same objects if no channel is used."""
         m = len(y)
         seen = np.empty(m, np.bool_)
         n = there(y, seen)
@@ -213,9 +214,9 @@ class Filter(ABC):
         return x, P, (innovation, S, used, gated, likelihood, nis)
 
     def _cannot_weigh(self, innovation: Array, S: Array, used: BoolArray, t: float) -> None:
-        """Raise Diverged with the output that no density can be given for."""
+        """Raise Diverged with the output whose innovation covariance is not positive definite."""
         checked(innovation, S, [n for n, there in zip(self.system.outputs, used, strict=True) if there], t)
-        raise Diverged(f"at t = {t:g} s outputs are expected without any scatter; give them noise")
+        raise Diverged(f"at t = {t:g} s the expected outputs have no variance; declare noise for the outputs")
 
     def _process_noise(self, dt: float) -> Array:
         Q = self._Q(dt) if callable(self._Q) else self._Q
@@ -231,7 +232,7 @@ class Filter(ABC):
         return far
 
     def _adapt(self, a: Adaptation, innovation: Array, S: Array, R: Array, used: BoolArray) -> None:
-        """Covariance matching: what innovations scatter beyond what the state explains is noise."""
+        """Covariance matching: scatter of the innovations beyond that of the predicted outputs is noise."""
         m, share = self._memory, 1 / a.samples
         known = np.where(np.isnan(m.scatter), np.diag(S), m.scatter)
         scatter = np.where(used, known + share * (innovation**2 - known), known)
@@ -247,9 +248,9 @@ class Filter(ABC):
 
 
 def checked(x: Array, P: Array, names: Sequence[str], t: float) -> Array:
-    """A factor L (n, n) with L L' = P; Diverged, with the name of the state, where there is none.
+    """A factor L (n, n) with L L' = P; raises Diverged, with the name of the state, if there is none.
 
-    P may be semidefinite to rounding, as where a filter without process noise knows a state exactly.
+    P may be semidefinite to rounding, for instance if a filter without process noise knows a state exactly.
     """
     if not finite(x):
         name = names[int(np.argmin(np.isfinite(x)))]
@@ -263,15 +264,17 @@ def _semidefinite_factor(P: Array, names: Sequence[str], t: float) -> Array:
     bad = ~(np.isfinite(P).all(axis=1) & (spread > 0))
     if bad.any():
         i = int(np.argmax(bad))
-        what = f"is {spread[i]:.3g}" if not spread[i] > 0 else "goes with one that is not finite"
-        raise Diverged(f"at t = {t:g} s the variance of '{names[i]}' {what}; the covariance broke")
+        what = f"variance of '{names[i]}' is {spread[i]:.3g}"
+        if spread[i] > 0:
+            what = f"covariance of '{names[i]}' with another state is not finite"
+        raise Diverged(f"at t = {t:g} s the {what}; the covariance matrix is no longer valid")
     size = np.sqrt(spread)
     values, vectors = np.linalg.eigh(P / np.outer(size, size))
     if values[0] < -ROUNDING:
         i = int(np.argmax(np.abs(vectors[:, 0])))
         raise Diverged(
-            f"at t = {t:g} s the covariance is not positive definite, mostly in '{names[i]}' (least "
-            f"eigenvalue of the correlation {values[0]:.2g})"
+            f"at t = {t:g} s the covariance is not positive definite, mostly in '{names[i]}' (smallest "
+            f"eigenvalue of the correlation matrix {values[0]:.2g})"
         )
     factor: Array = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     return factor

@@ -1,4 +1,4 @@
-"""A filter's way through a record: what it believed at each sample, and how well it foresaw the next."""
+"""Filtering of a whole record: the estimates at all samples, the innovations and the likelihood."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from estimator.filters.algebra import compiled
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.record import Array, BoolArray
 
-EVEN = 1e-6  # of a step, below which a difference is one of printed times
-TOLD = 200  # samples between two reports of progress
+EVEN = 1e-6  # relative difference of time steps that is attributed to the rounding of printed times
+TOLD = 200  # samples between two progress reports
 
 
 class Steps(Protocol):
-    """Any filter."""
+    """The interface of any filter."""
 
     now: Estimate
     names: tuple[str, ...]
@@ -26,16 +26,16 @@ class Steps(Protocol):
 
 @dataclass(frozen=True)
 class Samples:
-    """What a filter is fed with: measured outputs, nan where there are none, and inputs."""
+    """The data for a filter: inputs and measured outputs, nan where nothing was measured."""
 
     t: Array  # (N,) s, increasing
-    u: Array  # (N, n_u) at t
-    held: Array  # (N - 1, parts, n_u) acting one after the other between
+    u: Array  # (N, n_u) inputs at t
+    held: Array  # (N - 1, parts, n_u) constant inputs on successive parts of each step
     y: Array  # (N, m)
 
     @property
     def steps(self) -> Array:
-        """Lengths of the steps (N - 1,), s; even ones are made alike to the last bit."""
+        """Lengths of the time steps (N - 1,), s; nearly equal steps are made exactly equal."""
         steps = np.diff(self.t)
         usual = np.median(steps)
         return np.where(np.abs(steps - usual) < EVEN * usual, usual, steps)
@@ -46,9 +46,9 @@ class Samples:
 
 
 def samples(t: Array, u: Array, y: Array, every: int = 1, parts: int = 1) -> Samples:
-    """Each `every`-th sample of a record; inputs run linearly between its samples.
+    """Every `every`-th sample of a record, whose inputs are taken as piecewise linear.
 
-    Between two of those that are kept they act with their exact mean over each of so many equal parts.
+    Between kept samples the inputs are replaced by their exact means over `parts` equal parts of the step.
     """
     at = np.arange(0, len(t), every)
     share = np.arange(parts) / parts
@@ -58,7 +58,7 @@ def samples(t: Array, u: Array, y: Array, every: int = 1, parts: int = 1) -> Sam
 
 
 def _area(t: Array, u: Array, edges: Array) -> Array:
-    """Integral (M, n_u) from t[0] to edges (M,) of inputs (N, n_u) that run linearly between times (N,)."""
+    """Integral (M, n_u) from t[0] to edges (M,) of inputs (N, n_u) that are linear between times (N,)."""
     slope = np.diff(u, axis=0) / np.diff(t)[:, None]
     area = np.vstack([np.zeros(u.shape[1]), np.cumsum((u[1:] + u[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
     k = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, len(t) - 2)
@@ -69,26 +69,26 @@ def _area(t: Array, u: Array, edges: Array) -> Array:
 
 @dataclass(frozen=True)
 class History:
-    """All that is kept of N samples; `estimates` only where smoothing needs them."""
+    """The results of a filter over N samples; `estimates` are kept only if smoothing needs them."""
 
     names: tuple[str, ...]
     t: Array  # (N,)
     x: Array  # (N, n)
     std: Array  # (N, n)
     innovation: Array  # (N, m) over its standard deviation, nan where nothing was measured
-    nis: Array  # (N,) normalised squares of what was used
-    freedom: Array  # (N,) how many channels that were
-    gated: BoolArray  # (N, m)
+    nis: Array  # (N,) normalised squares of the innovations that were used
+    freedom: Array  # (N,) number of channels that were used
+    gated: BoolArray  # (N, m) channels that were measured but rejected by the gate
     log_likelihood: float
     last: Estimate
-    broken: str  # why the filter stopped early, empty where it did not
+    broken: str  # reason why the filter stopped early, empty if it did not
     estimates: Sequence[Estimate] = ()
 
 
 def filtered(
     filter: Steps, s: Samples, tell: Callable[[float], None] = lambda _: None, keep: bool = False
 ) -> History:
-    """Take a filter through samples; one that diverges stops with what it has. tell: hears the share done."""
+    """Run a filter over samples, until it diverges at most; `tell` is called with the share that is done."""
     rows, kept, last, broken = _Rows(len(s.t), len(filter.names), s.y.shape[1]), [], filter.now, ""
     steps = s.steps.tolist()
     for k in range(len(s.t)):
@@ -109,7 +109,7 @@ def filtered(
 
 
 class _Rows:
-    """Rows of a history: time, NIS, likelihood, freedom; then x, deviations, innovations, what was gated."""
+    """Rows of a history: time, NIS, log likelihood, degrees of freedom, x, std, innovations, gated."""
 
     def __init__(self, most: int, n: int, m: int) -> None:
         self._rows, self._ends, self._k = np.empty((most, 4 + 2 * n + 2 * m)), np.cumsum([4, n, n, m]), 0
@@ -136,7 +136,7 @@ class _Rows:
 def note(
     x: Array, P: Array, innovation: Array, S: Array, used: BoolArray, gated: BoolArray, row: Array
 ) -> None:
-    """Fill a row from its freedom on; innovations (m,) are over the deviations expected in S (m, m)."""
+    """Fill a row from its degrees of freedom on; innovations (m,) are normalised by their covariance S."""
     n, m = len(x), len(innovation)
     row[0] = 0.0
     for i in range(n):

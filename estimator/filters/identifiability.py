@@ -1,4 +1,4 @@
-"""What data can tell of each unknown: before, by free simulations; after, by what the filter learnt."""
+"""Identifiability of unknowns: from simulations before filtering, and from the filter's covariance after."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,16 +7,16 @@ import numpy as np
 
 from estimator.record import Array
 
-NUDGE = 1e-3  # of the prior deviation, for differences
-INFORMED = 0.9  # of its prior deviation must an unknown fall below to count as informed by the data
-ALIKE = 0.99  # correlation from which on only a combination of two unknowns is known
+NUDGE = 1e-3  # finite difference, as share of the prior standard deviation
+INFORMED = 0.9  # ratio of posterior to prior deviation, below which the data determine an unknown
+ALIKE = 0.99  # correlation above which only a combination of two unknowns is determined
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """How far the data narrow each unknown, and which they cannot tell apart.
+    """How much the data reduce the uncertainty of each unknown, and which unknowns they cannot separate.
 
-    left: (n,) deviation afterwards over that before; correlation: (n, n).
+    left: (n,) ratio of posterior to prior standard deviation; correlation: (n, n) of the posterior.
     """
 
     names: tuple[str, ...]
@@ -25,12 +25,12 @@ class Identifiability:
 
     @property
     def informed(self) -> tuple[bool, ...]:
-        """Whether the data say anything about each."""
+        """Whether the data determine each unknown, at least in part."""
         return tuple(bool(v < INFORMED) for v in self.left)
 
     @property
     def alike(self) -> list[tuple[str, str, float]]:
-        """Pairs of which only a combination is known, with their correlation, the worst first."""
+        """Pairs of which only a combination is determined, with their correlation, the largest first."""
         n = len(self.names)
         found = [
             (self.names[i], self.names[j], float(self.correlation[i, j]))
@@ -42,9 +42,9 @@ class Identifiability:
 
 
 def information(simulate: Callable[[Array], Array], z: Array, std: Array, noise: Array) -> Array:
-    """Empirical Fisher information (n, n) of unknowns z (n,) in outputs (N, m) with noise (m,).
+    """Fisher information (n, n) of unknowns z (n,) from outputs (N, m) with noise (m,), by differences.
 
-    simulate(z) -> (N, m), nan where nothing is measured; differences over a small part of std (n,).
+    simulate: function of z that returns (N, m), nan where nothing is measured; std: (n,) prior deviations.
     """
     columns = []
     for i, s in enumerate(std):
@@ -58,9 +58,9 @@ def information(simulate: Callable[[Array], Array], z: Array, std: Array, noise:
 
 
 def before(names: Sequence[str], F: Array, std: Array, wanted: int) -> Identifiability:
-    """What the information F (n, n) leaves of prior deviations std (n,), for the last `wanted` unknowns.
+    """Identifiability of the last `wanted` unknowns from information F (n, n) and prior deviations std (n,).
 
-    The bound of Cramér and Rao with the prior: no process noise, so that no filter can do better.
+    This is the Cramér-Rao bound with the prior and without process noise, so that no filter can be better.
     """
     P = np.asarray(
         np.linalg.inv(F * np.outer(std, std) + np.eye(len(std))), dtype=np.float64
@@ -70,7 +70,7 @@ def before(names: Sequence[str], F: Array, std: Array, wanted: int) -> Identifia
 
 
 def afterwards(names: Sequence[str], P0: Array, P: Array, wanted: int) -> Identifiability:
-    """What a filter's covariance P (n, n) leaves of the one it began with, for the last `wanted` unknowns."""
+    """Identifiability of the last `wanted` unknowns from a filter's initial and final covariance (n, n)."""
     std: Array = np.sqrt(np.diag(P0))
     return _narrowed(names, P, std, wanted)
 

@@ -1,4 +1,4 @@
-"""The linear Kalman filter, for linear systems and FMUs linearised about a point."""
+"""The linear Kalman filter, for linear systems and for FMUs linearised about a point."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from estimator.record import Array, BoolArray
 
 
 class Kf(Filter):
-    """Exact where the system is linear and all noise is normal."""
+    """A Kalman filter, exact for a linear system with Gaussian noise."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Where the unknowns of a filter stand in x and in the rows of values that an FMU is given."""
+"""Positions of a filter's unknowns in x and in the rows of values that are set in an FMU."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,16 +18,17 @@ from estimator.record import Array
 
 @dataclass(frozen=True)
 class Layout:
-    """x = n states, parameters' coordinates, states of unknown inputs.
+    """The order of values in x and in a row.
 
-    A row = n states, other states, parameters, known inputs, inputs that unknown ones feed.
+    x: n states, coordinates of the parameters, states of the unknown inputs. Row: n states, other states,
+    parameters, known inputs, inputs that are driven by unknown inputs.
     """
 
     n: int
     others: int
     transforms: tuple[Whole, Array, Array]  # (p,) each, see transform.coded
     inputs: int
-    fed: Whole  # (n_fed,) which of the unknown inputs' states drives each
+    fed: Whole  # (n_fed,) index of the unknown inputs' state that drives each input
 
     @property
     def width(self) -> int:
@@ -35,10 +36,10 @@ class Layout:
         return self.n + self.others + len(self.transforms[0]) + self.inputs + len(self.fed)
 
     def rows(self, X: Array, u: Array, carried: Array, F: Array) -> tuple[Array, Array]:
-        """Rows (k, width) for a step from each of X (k, n_x), and X after it but for the FMU's states.
+        """Rows (k, width) for a step from X (k, n_x), and X after the step without the FMU's states.
 
-        u: (inputs,); carried: (others,); F (n_w, n_w): transition of the unknown inputs' states. They act
-        with the mean of both ends.
+        u: (inputs,); carried: (others,); F: (n_w, n_w) transition of the states of the unknown inputs, which
+        act with the mean of their values at both ends.
         """
         values, after = np.empty((len(X), self.width)), np.empty_like(X)
         at, end = self.n + self.others, self.n + len(self.transforms[0])
@@ -51,7 +52,7 @@ class Layout:
 def layout(
     n: int, others: int, transforms: Sequence[Transform], inputs: int, unknown: Sequence[UnknownInput]
 ) -> Layout:
-    """Of n states and so many others and known inputs."""
+    """The layout for n states and the given numbers of other states and known inputs."""
     fed, at = [], 0
     for w in unknown:
         fed += [at + state for state in w.feeds.values()]
@@ -63,7 +64,7 @@ def layout(
 def fill(
     X: Array, u: Array, carried: Array, F: Array, n: int, first: int, fed: Whole, values: Array, after: Array
 ) -> None:
-    """See Layout.rows; first: place of the unknown inputs in x. Leaves the parameters in values out."""
+    """See Layout.rows; first: position of the unknown inputs in x. Parameters in `values` are not filled."""
     at_inputs = len(carried) + first
     at_fed = at_inputs + len(u)
     for row in range(len(X)):

@@ -1,4 +1,4 @@
-"""Linear systems, and the linear system that any other is about a point."""
+"""Linear systems, and the linearisation of any system about a point."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ import numpy as np
 from estimator.filters.estimator import NONE, System
 from estimator.record import Array
 
-NUDGE = 1e-3  # of a state's scale, for differences
+NUDGE = 1e-3  # finite difference, as share of a state's scale
 
 
 @dataclass(frozen=True)
 class Linear:
-    """x+ = F x + B u + f0, y = H x + D u + h0, sampled."""
+    """The sampled linear system x+ = F x + B u + f0, y = H x + D u + h0."""
 
     F: Array  # (n, n)
     B: Array  # (n, n_u)
@@ -24,7 +24,7 @@ class Linear:
     h0: Array | float = 0.0  # (m,)
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
-        """See System; dt is that of the sampling."""
+        """See System; dt must be the sampling time of the matrices."""
         held = u.mean(axis=0) if u.ndim == 2 else u
         moved: Array = X @ self.F.T + (self.B @ held + self.f0)
         return moved, carried
@@ -40,7 +40,7 @@ class Linear:
 
 
 def central(x: Array, scale: Array) -> tuple[Array, Array]:
-    """Points (2n + 1, n) about x, the mean first, and by how much they are off (n,)."""
+    """Points (2n + 1, n) for central differences about x, with x first, and their distances (n,) from x."""
     away = NUDGE * scale
     return np.vstack([x, x + np.diag(away), x - np.diag(away)]), away
 
@@ -55,9 +55,9 @@ def slopes(values: Array, away: Array) -> Array:
 def linearised(
     system: System, x: Array, u: Array, dt: float, scale: Array, t: float = 0.0, carried: Array = NONE
 ) -> Linear:
-    """Any system about x (n,) and u (n_u,), by central differences of a part of `scale` (n,).
+    """Linearisation of a system about x (n,) and u (n_u,), by central differences of NUDGE times `scale`.
 
-    Inputs are perturbed by the same part of their size, or of 1 where they are zero.
+    Inputs are changed by NUDGE times their magnitude, or by NUDGE if they are zero.
     """
     points, away = central(x, scale)
     moved, _ = system.f(points, u, t, dt, carried)

@@ -1,4 +1,4 @@
-"""Filters that an experiment asks for by name: the key `filter` of [estimate.options]."""
+"""Base class of the filters that an experiment can choose by the key `filter` of [estimate.options]."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Request:
-    """What an experiment says to a filter beside the system and its start.
+    """The settings of a filter from the experiment file.
 
-    R: measurement noise as a covariance (m, m); dt: usual step, s; u: inputs (n_u,) of the first sample;
-    gate, adapt: None where they are not wanted; spread: of sigma points.
+    R: covariance of the measurement noise, (m, m); dt: usual time step, s; u: inputs of the first sample,
+    (n_u,); gate, adapt: options of the filter, None if not used; spread: sigma points of a UKF.
     """
 
     R: Array
@@ -32,11 +32,11 @@ class Request:
 
 
 class Estimator(ABC):
-    """A filter that an experiment can ask for; `name` is the value of the key `filter`."""
+    """A filter that an experiment can choose; `name` is the value of the key `filter`."""
 
     name: ClassVar[str]
 
     @classmethod
     @abstractmethod
     def of(cls, joint: Joint, start: Estimate, asked: Request) -> Steps:
-        """The filter of an FMU as a joint system; BadInput for an option that it does not have."""
+        """The filter for an FMU as a joint system; raises BadInput for an option that it does not support."""

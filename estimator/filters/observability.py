@@ -1,4 +1,4 @@
-"""Which states of an FMU the measured outputs depend on at all."""
+"""The states of an FMU on which the measured outputs depend."""
 
 from collections.abc import Sequence
 
@@ -8,15 +8,15 @@ from estimator.access.copies import Copies
 from estimator.record import Array
 
 STEPS = 25
-NUDGE = 1e-3  # of a state's scale
+NUDGE = 1e-3  # change of a state, as share of its scale
 
 
 def needed(copies: Copies, values: Array, states: Sequence[str], outputs: Sequence[str], scale: Array,
            t: float, dt: float) -> list[str]:  # fmt: skip
-    """States whose change shows in an output, or in a state that does, within some steps.
+    """States whose change has an influence on an output within STEPS steps, and states that are outputs.
 
-    values: (n_put,) of what `copies` sets, the states first; scale: (n,) of the states. A state that shows
-    nowhere, such as an angle that nothing depends on, can be carried along and need not be estimated.
+    values: (n_put,) values that `copies` sets, the states first; scale: (n,) scales of the states. A state
+    without influence, such as an angle on which nothing depends, need not be estimated.
     """
     n = len(states)
     rows = np.tile(values, (n + 1, 1))

@@ -1,4 +1,4 @@
-"""Noise of states that nobody declared: how far the FMU is off from one sample to the next."""
+"""Process noise of the states if it is not declared, estimated by maximum likelihood of the innovations."""
 
 from collections.abc import Callable
 
@@ -7,16 +7,16 @@ from scipy.optimize import minimize_scalar
 
 from estimator.record import Array
 
-LEAST, MOST = -5.0, 0.5  # powers of ten of a state's own motion
-COARSE = 6  # values of the first search
-LEARNT_FROM = 800  # samples
+LEAST, MOST = -5.0, 0.5  # range of the search, as powers of ten of a state's own motion
+COARSE = 6  # values of the first grid
+LEARNT_FROM = 800  # number of samples from which the noise is estimated
 
 
 def motion(t: Array, x: Array, nominal: Array) -> Array:
-    """How fast states x (N, n) wander along a run at times t (N,), each in its unit per sqrt(s), (n,).
+    """Intensity of the motion of states x (N, n) at times t (N,), in units per sqrt(s), (n,).
 
-    The root of the mean squared step over its length; at least a millionth of what is usual of it, and
-    just that where the run failed.
+    It is the root of the mean of squared steps over their lengths, and at least a millionth of the nominal
+    value. If the simulation failed, the nominal values are returned.
     """
     if not np.isfinite(x).all():
         return nominal
@@ -25,9 +25,9 @@ def motion(t: Array, x: Array, nominal: Array) -> Array:
 
 
 def likeliest(log_likelihood: Callable[[float], float]) -> float:
-    """The part of the states' motion that is noise, by maximum likelihood of the innovations.
+    """The process noise, as a share of the states' motion, with the largest likelihood of the innovations.
 
-    log_likelihood(part) of a filter with that noise, -inf where it diverges.
+    log_likelihood: function of that share for a filter with that noise; -inf if the filter diverges.
     """
     known: dict[float, float] = {}
 

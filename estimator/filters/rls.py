@@ -1,4 +1,4 @@
-"""Recursive least squares with forgetting: y = phi theta + noise."""
+"""Recursive least squares with forgetting, for the model y = phi theta + noise."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from estimator.record import Array
 
 
 class Rls:
-    """Constant or slowly changing coefficients of a linear regression.
+    """Estimates constant or slowly changing coefficients of a linear regression.
 
-    names: of theta. start: theta and its covariance. R: (m, m) noise of y. forgetting: 1 keeps all;
-    0.999 forgets with a memory of 1000 samples. No direction is forgotten beyond the covariance at the
-    start, so that coefficients at rest do not wind up.
+    names: of theta; start: theta and its covariance; R: (m, m) covariance of the noise of y; forgetting: 1
+    keeps all data, 0.999 has a memory of 1000 samples. The covariance never exceeds that at the start, so
+    that it does not grow without bound while there is no excitation.
     """
 
     def __init__(self, names: tuple[str, ...], start: Estimate, R: Array, forgetting: float = 1.0) -> None:
@@ -42,7 +42,7 @@ class Rls:
         return self.now
 
     def _forgotten(self, P: Array) -> Array:
-        """Information (1 - lambda) of the start comes back for what is forgotten (stabilised forgetting)."""
+        """Stabilised forgetting: the share 1 - lambda of the information is replaced by that of the start."""
         if self.forgetting == 1.0:
             return P
         kept: Array = np.linalg.inv(self.forgetting * np.linalg.inv(P) + (1 - self.forgetting) * self._least)

@@ -1,4 +1,4 @@
-"""Rauch-Tung-Striebel smoothing of any filter's estimates."""
+"""Rauch-Tung-Striebel smoother for the estimates of any filter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from estimator.record import Array
 
 @dataclass(frozen=True)
 class Smoothed:
-    """What the whole record says about each sample."""
+    """Estimates at each sample from the whole record."""
 
     t: Array  # (N,) s
     x: Array  # (N, n)
@@ -20,10 +20,10 @@ class Smoothed:
 
 
 def smoothed(estimates: Sequence[Estimate]) -> Smoothed:
-    """Backwards through a filter's consecutive estimates.
+    """Smoothed estimates by a backward pass over the successive estimates of a filter.
 
-    Exact for a linear system. After a UKF it is the unscented smoother of Särkkä, IEEE Trans. Autom.
-    Control 53 (2008) 845: the covariances over a step are those of the sigma points that made it.
+    The smoother is exact for a linear system. For a UKF it is the unscented smoother of Särkkä, IEEE Trans.
+    Autom. Control 53 (2008) 845, which takes the covariances over a step from its sigma points.
     """
     t = np.array([e.t for e in estimates])
     x = np.array([e.x for e in estimates])

@@ -1,4 +1,4 @@
-"""An FMU as the system of a filter: x holds chosen states, parameters, and inputs that are not known."""
+"""An FMU as the system of a filter, whose x holds chosen states, parameters and unknown inputs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -22,14 +22,15 @@ from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 
-KEPT = 256  # lengths of steps of which transition and noise are kept
+KEPT = 256  # number of step lengths for which transition and noise are cached
 
 
 @dataclass(frozen=True)
 class UnknownParameter:
-    """A parameter to estimate: what is believed of it before, and how far it wanders.
+    """A parameter to estimate, with its prior and its random walk.
 
-    start, std in its unit; walk: what it gains in a second, in its unit.
+    start, std: prior mean and standard deviation, in its unit; walk: standard deviation of its change in one
+    second, in its unit.
     """
 
     name: str
@@ -40,17 +41,17 @@ class UnknownParameter:
 
     @property
     def z(self) -> float:
-        """Its coordinate at the start."""
+        """The filter's coordinate of the prior mean."""
         return self.transform.z(self.start)
 
     def in_z(self, std: float) -> float:
-        """A small deviation of the parameter at the start as one of its coordinate."""
+        """A small deviation of the parameter from the prior mean, converted to the filter's coordinate."""
         return std / self.transform.slope(self.z)
 
 
 @dataclass(frozen=True)
 class UnknownState:
-    """A state to estimate: what is believed of its start, and the noise that drives it, unit/sqrt(s)."""
+    """A state to estimate; start, std: prior of its start value; noise: process noise, unit/sqrt(s)."""
 
     name: str
     start: float
@@ -59,11 +60,11 @@ class UnknownState:
 
 
 class Joint:
-    """A System (see estimator.filters.estimator) through any FMU.
+    """A System (see estimator.filters.estimator) that simulates an FMU.
 
-    x = states, coordinates of the parameters (`transform`), states of the unknown inputs. The FMU's other
-    states are carried: they move with the mean. y = outputs. Close it after use.
-    way: forces an access that the probe would not choose, for comparison; compiled: False for Python only.
+    x = states, coordinates of the parameters (`transform`), states of the unknown inputs; y = outputs. The
+    other states of the FMU are not estimated; they follow the mean. Close the object after use.
+    way: an access to use instead of the one that the probe chooses; compiled: False avoids numba.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class Joint:
             raise
 
     def start(self, t: float = 0.0) -> Estimate:
-        """What is believed before the first sample at t."""
+        """The prior estimate before the first sample at t."""
         x = [*(s.start for s in self.states), *(p.z for p in self.parameters)]
         variance = [*(s.std**2 for s in self.states), *(p.in_z(p.std) ** 2 for p in self.parameters)]
         for w in self.unknown:
@@ -111,11 +112,11 @@ class Joint:
         return Estimate(t, np.array(x), np.diag(variance), carried=self._first_carried)
 
     def noise(self, dt: float) -> Array:
-        """Covariance (n, n) of what comes into x in a step of dt [s]."""
+        """Process noise covariance (n, n) of a step of dt [s]."""
         return self._over(dt)[1]
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
-        """See System. Unknown inputs act over a step with the mean of both its ends, as known ones do."""
+        """See System. Unknown inputs act with the mean of both ends of a step, like known ones."""
         if u.ndim == 2:
             for part, held in enumerate(u):
                 X, carried = self.f(X, held, t + part * dt / len(u), dt / len(u), carried)
@@ -127,22 +128,22 @@ class Joint:
         return after, found[0, n : n + len(self.others)].copy()
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
-        """See System; the FMU is asked only for what is not a state."""
+        """See System; the FMU is evaluated only if an output is not a state."""
         if self._direct is not None:
             return X[:, self._direct]
         values = self.rows(X, u, carried)
         return self._asked(self.copies.evaluate, values, t)[:, self._seen]
 
     def rows(self, X: Array, u: Array, carried: Array) -> Array:
-        """What the FMU is given at x of each row (k, n), unknown inputs of this moment, (k, n_put)."""
+        """Values to set in the FMU for each row (k, n) of X, with the present unknown inputs, (k, n_put)."""
         return self.layout.rows(X, u, carried, self._still)[0]
 
     def transition(self, dt: float) -> Array:
-        """Of the unknown inputs' states over dt [s], (n_w, n_w)."""
+        """Transition matrix of the states of the unknown inputs over dt [s], (n_w, n_w)."""
         return self._over(dt)[0]
 
     def settled(self, x: Array) -> Array:
-        """See System: cuts off what is bounded by clipping."""
+        """See System; clips parameters whose bounds are kept by clipping."""
         for i, p in enumerate(self.parameters, len(self.states)):
             if p.transform.kind == "clip":
                 x = x.copy()
@@ -150,7 +151,7 @@ class Joint:
         return x
 
     def values(self, x: Array, std: Array) -> tuple[Array, Array]:
-        """What x (N, n) and its deviations (N, n) mean in the FMU's units, (N, n) each."""
+        """x (N, n) and its standard deviations (N, n), converted to the FMU's units."""
         x, std = x.copy(), std.copy()
         for i, p in enumerate(self.parameters, len(self.states)):
             std[:, i] = p.transform.spread(x[:, i], std[:, i])
@@ -158,7 +159,7 @@ class Joint:
         return x, std
 
     def exchange(self) -> Exchange:
-        """An instance by model exchange, the caller's to close; BadInput where the FMU offers none."""
+        """A new instance by model exchange, which the caller must close; raises BadInput if there is none."""
         told = self._put, self._get, self._fixed
         access = self.access
         if access.way is not Way.EXCHANGE:
@@ -166,11 +167,11 @@ class Joint:
         return Exchange(self.archive, *told, self._t0, access.parts)
 
     def owns(self, close: Callable[[], None]) -> None:
-        """Call something when this is closed."""
+        """Register a function to call when this object is closed."""
         self._stack.callback(close)
 
     def close(self) -> None:
-        """Free the copies, and the unpacked file where it is this one's own."""
+        """Free the copies, and the unpacked FMU if this object unpacked it."""
         self._stack.close()
 
     def __enter__(self) -> Self:
@@ -182,7 +183,7 @@ class Joint:
         self.close()
 
     def _over(self, dt: float) -> tuple[Array, Array]:
-        """Transition of the unknown inputs and covariance of all noise over dt."""
+        """Transition matrix of the unknown inputs and process noise covariance over dt, cached."""
         if dt not in self._steps:
             if len(self._steps) >= KEPT:
                 self._steps.clear()
@@ -197,7 +198,7 @@ class Joint:
         return np.ascontiguousarray(F, dtype=float), np.ascontiguousarray(Q, dtype=float)
 
     def _places(self, get: list[str]) -> None:
-        """Where things stand in x, in the rows that go into the FMU and in those that come out of it."""
+        """Set up the positions of unknowns in x, in the rows set in the FMU and in the rows read from it."""
         n, transforms = len(self.states), [p.transform for p in self.parameters]
         self.layout = layout(n, len(self.others), transforms, len(self.inputs), self.unknown)
         self._still = np.eye(len(self.names) - n - len(transforms))
@@ -222,7 +223,7 @@ class Joint:
         late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
         if late:
             raise BadInput(
-                f"{self.archive.path}: output '{late[0]}' is worked out in steps only, not from the states; "
+                f"{self.archive.path}: output '{late[0]}' is computed in steps only, not from the states; "
                 "leave it out of [outputs] or measure a state"
             )
         if way is Way.EXCHANGE:
@@ -246,7 +247,9 @@ class Joint:
                 raise BadInput(f"{d.name}: has no variable '{name}'; {did_you_mean(name, d.variables)}")
         twice = sorted({n for n in put if put.count(n) > 1})
         if twice:
-            raise BadInput(f"{d.name}: '{twice[0]}' is named twice among what is set; name it once")
+            raise BadInput(
+                f"{d.name}: '{twice[0]}' is named twice among states, parameters and inputs; name it once"
+            )
 
     @staticmethod
     def _asked(call: Callable[..., Array], *arguments: Any) -> Array:

@@ -1,8 +1,8 @@
-"""Unscented Kalman filter with filterpy's sigma points, all of which move through the system at once.
+"""Unscented Kalman filter with the sigma points of filterpy, which are simulated in one call.
 
-filterpy 2.0 draws the sigma points anew after a prediction, so that they hold the process noise too;
-1.4 did not. What is done here does so with either version. filterpy's own filter calls the system point by
-point and subtracts covariances, which may leave one that is none; where it does not, both agree.
+Sigma points are drawn again after the prediction, so that they include the process noise, as in filterpy 2.0
+but not in 1.4. filterpy's own filter calls the system for each point separately and subtracts covariances,
+which may give an indefinite matrix; otherwise both filters agree.
 """
 
 from dataclasses import dataclass
@@ -32,9 +32,9 @@ from estimator.record import Array, BoolArray
 
 @dataclass(frozen=True)
 class Spread:
-    """Where the sigma points lie and what they weigh (van der Merwe 2004).
+    """Parameters of the sigma points and their weights (van der Merwe 2004).
 
-    With alpha = 1 and kappa = 0 no weight is negative, so that no covariance can break by them.
+    With alpha = 1 and kappa = 0 no weight is negative, so that covariances stay positive semidefinite.
     """
 
     alpha: float = 1.0
@@ -42,7 +42,7 @@ class Spread:
     kappa: float = 0.0
 
     def scale(self, n: int) -> float:
-        """How far points of n states lie off the mean, in deviations."""
+        """Distance of the sigma points of n states from the mean, in standard deviations."""
         return self.alpha * float(np.sqrt(n + self.kappa))
 
 
@@ -50,7 +50,7 @@ USUAL = Spread()
 
 
 class Ukf(Filter, Estimator):
-    """Joint unscented filter of whatever the system's x holds: states, parameters, unknown inputs."""
+    """Unscented filter for all unknowns in x jointly: states, parameters and unknown inputs."""
 
     name = "ukf"
 

@@ -1,4 +1,4 @@
-"""Unknown inputs as random processes: states of the filter, not of the FMU, that drive its inputs."""
+"""Unknown inputs as random processes, whose states are additional states of the filter."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,15 +9,16 @@ from scipy.linalg import expm
 
 from estimator.record import Array
 
-LONG = 0.3  # of a radian, a step from which on differences of variances keep their digits
-DAMPING = sqrt(0.5)  # flat up to the frequency, falling beyond it
+LONG = 0.3  # rad per step, above which a difference of variances is accurate enough
+DAMPING = sqrt(0.5)  # gives a spectrum that is flat up to the frequency and falls beyond it
 
 
 @dataclass(frozen=True)
 class Shaped:
-    """White noise through w_ddot + 2 zeta omega w_dot + omega^2 w = xi: std [unit], frequency [Hz].
+    """White noise xi through a second-order filter, w_ddot + 2 zeta omega w_dot + omega^2 w = xi.
 
-    The input is w; rate_input gets w_dot, where the FMU has an input for it.
+    std: standard deviation of w, in its unit; frequency: Hz. The input of the FMU is w; `rate_input`, if the
+    FMU has one, is w_dot.
     """
 
     name: str
@@ -33,22 +34,22 @@ class Shaped:
 
     @property
     def feeds(self) -> dict[str, int]:
-        """FMU input -> which of the states drives it."""
+        """Index of the state that drives each FMU input."""
         return {self.name: 0} | ({self.rate_input: 1} if self.rate_input else {})
 
     @property
     def variance(self) -> Array:
-        """In the stationary process, (2,)."""
+        """Variances of the states in the stationary process, (2,)."""
         return np.array([self.std**2, (2 * pi * self.frequency * self.std) ** 2])
 
     def discrete(self, dt: float) -> tuple[Array, Array]:
-        """Transition (2, 2) over dt [s] and covariance (2, 2) of what comes in, both exact."""
+        """Transition matrix (2, 2) and covariance of the added noise (2, 2) over dt [s], both exact."""
         return _sampled(2 * pi * self.frequency, self.damping, self.std, dt)
 
 
 @dataclass(frozen=True)
 class Wandering:
-    """A random walk: std [unit] is what it gains in a second; start_std what is known of its start."""
+    """A random walk; std: its standard deviation after one second; start_std: that of its start value."""
 
     name: str
     std: float
@@ -61,16 +62,16 @@ class Wandering:
 
     @property
     def feeds(self) -> dict[str, int]:
-        """FMU input -> which of the states drives it."""
+        """Index of the state that drives each FMU input."""
         return {self.name: 0}
 
     @property
     def variance(self) -> Array:
-        """At the start, (1,)."""
+        """Variance at the start, (1,)."""
         return np.array([(self.start_std or self.std) ** 2])
 
     def discrete(self, dt: float) -> tuple[Array, Array]:
-        """Transition (1, 1) over dt [s] and covariance (1, 1) of what comes in."""
+        """Transition matrix (1, 1) and covariance of the added noise (1, 1) over dt [s]."""
         return np.eye(1), np.array([[self.std**2 * dt]])
 
 
@@ -79,9 +80,9 @@ UnknownInput = Shaped | Wandering
 
 @lru_cache(maxsize=256)
 def _sampled(omega: float, damping: float, std: float, dt: float) -> tuple[Array, Array]:
-    """Short steps by Van Loan's method, IEEE Trans. Autom. Control 23 (1978) 395.
+    """Discrete transition and noise covariance, for short steps by Van Loan (IEEE TAC 23 (1978) 395).
 
-    Over long ones its exponential overflows; there the variance of the stationary process says what is lost.
+    The exponential of that method overflows for long steps, for which the stationary variance is used.
     """
     A = np.array([[0.0, 1.0], [-(omega**2), -2 * damping * omega]])
     if omega * dt * max(1.0, damping) > LONG:

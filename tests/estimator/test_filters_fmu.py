@@ -319,7 +319,7 @@ def test_an_output_that_is_no_function_of_the_state_is_refused(foreign):
 
     late = foreign("self.x += dt * (self.u - self.k * self.x)\nself.y = 3 * self.x", LATE)
     with pytest.raises(
-        BadInput, match=r"output 'y' is worked out in steps only, not from the states; leave it"
+        BadInput, match=r"output 'y' is computed in steps only, not from the states; leave it"
     ):
         Joint(late, ["y"], [UnknownState("x", 1.0, 1.0)], inputs=["u"], dt=0.01)
 

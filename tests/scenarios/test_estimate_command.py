@@ -278,7 +278,7 @@ def test_options_are_checked_against_what_is_estimated(vdp, tmp_path):
     file = write_vdp(tmp_path, vdp, n=60)
     with pytest.raises(BadInput, match=r"\[estimate.options\] walk 'nu' is not estimated; known are mu"):
         estimate(file, options=Options(walk={"nu": 0.1}))
-    with pytest.raises(BadInput, match="gate and adapt are not for filter = 'dual'"):
+    with pytest.raises(BadInput, match="filter = 'dual' does not support gate and adapt"):
         estimate(file, options=Options(filter="dual", gate=5.0, process_std={"x0": 1e-3, "x1": 1e-3}))
 
 
