@@ -1,4 +1,4 @@
-"""Sensor noise: its size, declared or estimated, and the size of a residual that counts as one."""
+"""Noise of the measured outputs, declared or estimated, and the weights of the residuals."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
 class Noise:
     """Noise of the outputs of a record.
 
-    std: (n_y,) standard deviation, declared or estimated; scale: (n_y,) size of a residual that counts as one
-    in fits and scores, which is the standard deviation where that is declared; declared: (n_y,).
+    std: (n_y,) standard deviation, declared or estimated; scale: (n_y,) unit of the residuals in fits and
+    scores, which is the standard deviation if that is declared; declared: (n_y,) whether it is.
     """
 
     std: Array
@@ -25,30 +25,30 @@ class Noise:
 
     @classmethod
     def of(cls, record: Record, residuals: Sequence[Array]) -> "Noise":
-        """Noise of a record, from what a fit leaves of each run (N, n_y)."""
+        """Noise of a record, from the residual (N, n_y) of a fit in each run."""
         return cls(noise_floor(record), weights(record, residuals), record.noise_declared)
 
     @property
     def known(self) -> bool:
-        """Whether it is declared for all outputs, so that a residual can be seen to be noise."""
+        """Whether it is declared for all outputs, so that a residual can be compared with it."""
         return bool(self.declared.all())
 
 
 def white_noise(pieces: Iterable[Array], quantised: bool = False) -> float:
     """Standard deviation of the white noise on pieces (N,) of a channel, by third differences.
 
-    Motion that is smooth over four samples counts little. quantised: differences of zero are left out, as a
-    slow channel with few digits has many of them.
+    A signal that is smooth over four samples has little influence. quantised: whether differences of zero are
+    left out, of which a slow channel with few digits has many.
     """
     rough = np.abs(np.concatenate([np.convolve(x, DIFFERENCE, "valid") for x in pieces]))
     if quantised:
         rough = rough[rough > 0]
-    # 1.4826 turns a median of absolute values into a standard deviation
+    # 1.4826 converts the median of absolute Gaussian values into their standard deviation
     return 1.4826 * float(np.median(rough)) / float(np.linalg.norm(DIFFERENCE)) if rough.size else 0.0
 
 
 def noise_floor(record: Record) -> Array:
-    """Standard deviation of each output's noise (n_y,): as declared, else what third differences leave."""
+    """Standard deviation of each output's noise (n_y,), declared or else estimated by third differences."""
     estimated = [white_noise(run.y[:, j] for run in record.runs) for j in range(len(record.outputs))]
     spread = np.std(np.vstack([run.y for run in record.runs]), axis=0)
     floor = np.where(record.noise_declared, record.noise_std, estimated)
@@ -57,9 +57,9 @@ def noise_floor(record: Record) -> Array:
 
 
 def correlation_time(residual: Array) -> float:
-    """Samples from one independent sample of a residual (N,) to the next: 1 for white noise.
+    """Number of samples of a residual (N,) per independent sample; 1 for white noise.
 
-    Integrated autocorrelation with Sokal's automatic window (five correlation times).
+    It is the integrated autocorrelation with Sokal's automatic window of five correlation times.
     """
     r = residual - residual.mean()
     n = len(r)
@@ -73,10 +73,10 @@ def correlation_time(residual: Array) -> float:
 
 
 def weights(record: Record, residuals: Sequence[Array]) -> Array:
-    """Size of a residual that counts as one, for each output (n_y,).
+    """The unit of each output's residual (n_y,), by which residuals are weighted.
 
-    Declared noise counts as it is. Otherwise the residual itself says how large it is and, by its
-    correlation time, how many of its samples are independent (a composite likelihood).
+    It is the declared noise. If noise is not declared, it is the rms of the residual times the root of its
+    correlation time, so that only independent samples count (a composite likelihood).
     """
     size = record.noise_std.copy()
     for j in np.flatnonzero(~record.noise_declared):

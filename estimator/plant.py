@@ -1,4 +1,4 @@
-"""Any FMU as a black box x+ = f(x, u, theta), y = h(x, u, theta), by restart from a state."""
+"""Simulation of an FMU through a record, and its response over one step from any state, by restarts."""
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 from estimator.record import Array, Run
 from fmus.host.fmu import Fmu
 
-PIECE, MOST = 1e-3, 10  # s, of a step, and the most of them
+PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
 
 
 class Plant:
@@ -20,7 +20,7 @@ class Plant:
     def __init__(self, fmu: Fmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
         self.states = tuple(fmu.description.states)
-        self._fine: tuple[Run, Array, dict[str, Array]] | None = None  # of the run simulated last
+        self._fine: tuple[Run, Array, dict[str, Array]] | None = None  # refined inputs of the last run
 
     def simulate(
         self,
@@ -29,10 +29,10 @@ class Plant:
         more: Sequence[str] = (),
         push: Mapping[str, Array] | None = None,
     ) -> Array:
-        """Free run through a record from its first sample: outputs, then `more`, (N, n_y + n_more).
+        """Simulate a run from its first sample: the outputs, then the variables `more`, (N, n_y + n_more).
 
-        start: states and parameters by name. Inputs act as samples of continuous signals, see Fmu.simulate;
-        one that comes with its rate goes between the samples as both say. push: samples (N,) added to inputs.
+        start: states and parameters by name; push: samples (N,) that are added to inputs. Inputs are samples
+        of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic.
         """
         t, inputs = self._given(run)
         pieces = (len(t) - 1) // max(1, len(run.t) - 1) or 1
@@ -43,7 +43,7 @@ class Plant:
         return self.fmu.simulate(t, inputs, (*self.outputs, *more), start)[::pieces]
 
     def _given(self, run: Run) -> tuple[Array, dict[str, Array]]:
-        """Times and inputs of a run as the FMU gets them; kept for the next simulation of the same."""
+        """Times and inputs of a run as set in the FMU, cached for the next simulation of the same run."""
         if self._fine is None or self._fine[0] is not run:
             inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
             pieces = self._pieces(run.t)
@@ -51,13 +51,13 @@ class Plant:
         return self._fine[1:]
 
     def _pieces(self, t: Array) -> int:
-        """Into how many a step is cut: what a mean over a step takes from a fast input is lost otherwise."""
+        """Number of pieces of a step, more than one for inputs with rates, whose means would lose detail."""
         if not any(f"{name}_dot" in self.inputs for name in self.inputs) or len(t) < 2:
             return 1
         return min(MOST, max(1, round(float(np.median(np.diff(t))) / PIECE)))
 
     def response(self, x: Array, given: Mapping[str, float], dt: float) -> tuple[Array, Array]:
-        """Restart in a state: the state after a step (n,), and the outputs before it (n_y,).
+        """The state (n,) after a step from state x, and the outputs (n_y,) before the step.
 
         given: inputs and parameters by name.
         """
@@ -68,9 +68,9 @@ class Plant:
 
 
 def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, dict[str, Array]]:
-    """Times and inputs with each step cut into pieces ((N - 1) pieces + 1,).
+    """Times and inputs with each step divided into pieces, ((N - 1) pieces + 1,).
 
-    A cubic where the rate of an input is given, as NAME_dot, a line elsewhere.
+    An input whose rate is given as NAME_dot is interpolated by a cubic, any other linearly.
     """
     share = np.arange(pieces) / pieces
     fine = np.append((t[:-1, None] + np.diff(t)[:, None] * share).ravel(), t[-1])
@@ -83,7 +83,7 @@ def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, 
 
 
 class Plants:
-    """Running FMUs of this process, opened when first asked for; the least used ones are closed."""
+    """The open FMUs of this process; those that were not used for the longest time are closed."""
 
     def __init__(self, most: int = 24) -> None:
         self.most = most

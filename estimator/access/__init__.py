@@ -1,1 +1,1 @@
-"""Access to any FMU as x+ = f(x, u, theta), y = h(x, u, theta), by what a probe found to be honest."""
+"""Access to any FMU as x+ = f(x, u, theta), y = h(x, u, theta), in a way that a probe has found correct."""

@@ -1,4 +1,4 @@
-"""Copies of an FMU that make one step each from states of their own: x+ = f(x, u, theta) for many x."""
+"""Copies of an FMU that each make one step from a given state: x+ = f(x, u, theta) for many x."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -22,14 +22,15 @@ from fmus.host.fmu import Fmu, FmuError
 
 
 class Refused(FmuError):
-    """An FMU refused a step or a value; the sentence says which and what it gave as the reason."""
+    """An FMU refused a step or a value; the message says which, with the reason that the FMU gave."""
 
 
 class Copies:
-    """Instances of one FMU and what is set and read in each.
+    """Instances of one FMU with the variables that are set and read in each.
 
-    way: how a state gets in. free_time: any step may begin at any time, so that one instance serves all
-    rows; otherwise each row has its own and time only moves on. constants: set once and for all.
+    way: how the state is set; put, get: names of the variables to set and to read; constants: values that are
+    set once; free_time: whether a step may begin at any time, so that one instance is enough for all rows.
+    Otherwise each row has its own instance, whose time only moves forward.
     """
 
     def __init__(
@@ -54,14 +55,14 @@ class Copies:
         self._stack = ExitStack()
 
     def advance(self, values: Array, t: float, dt: float) -> Array:
-        """What `get` names after a step from t by dt [s], (k, n_get), from values (k, n_put) of `put`.
+        """Values (k, n_get) of `get` after a step from t by dt [s], from values (k, n_put) of `put`.
 
-        Raises Refused where the FMU does not make the step.
+        Raises Refused if the FMU does not make the step.
         """
         return self._run(values, t, dt)
 
     def evaluate(self, values: Array, t: float) -> Array:
-        """What `get` names at the very values (k, n_put), without a step."""
+        """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step."""
         return self._run(values, t, 0.0)
 
     def close(self) -> None:
@@ -93,12 +94,12 @@ class Copies:
         return out
 
     def _ready(self, values: Array, t: float) -> Loop:
-        """The loop over as many instances as there are rows, at time t."""
+        """The loop over the instances for these rows, at time t."""
         late = not self._one and abs(t - self._now) > 1e-9 * max(1.0, abs(t))
         if self._loop is None or len(values) > self._rows or late:
             self._start(values, t)
         if self._loop is None:
-            raise RuntimeError("no loop was made")
+            raise RuntimeError("the loop over the instances was not created")
         return self._loop
 
     def _start(self, values: Array, t: float) -> None:
@@ -129,7 +130,7 @@ class Copies:
         return loop_of(f, recipe, self._saved * rows, self._compiled)
 
     def _refuse(self, row: Array, number: int, status: int, t: float) -> None:
-        """Raise Refused and begin anew at the next call: the copy that failed may be in any state."""
+        """Raise Refused; the instances are restarted at the next call, since the failed one is undefined."""
         fmu = self._fmus[0 if self._one else number]
         why = reason(fmu, status)
         at = ", ".join(f"{n} = {v:.4g}" for n, v in zip(self.put, row, strict=True))
@@ -138,7 +139,7 @@ class Copies:
 
 
 def loop_of(f: Functions, recipe: Recipe, saved: Sequence[int], compiled: bool) -> Loop:
-    """The compiled loop where numba is installed and it is asked for, else the one in Python."""
+    """The compiled loop if `compiled` is set and numba is installed, else the loop in Python."""
     if compiled:
         try:
             from estimator.access.jitted import JittedLoop

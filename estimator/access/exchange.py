@@ -1,4 +1,4 @@
-"""Model exchange: states are set, derivatives asked for and integrated here."""
+"""Access by model exchange: states are set, derivatives are read and integrated by railfmi."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -19,10 +19,11 @@ from fmus.integrators.rk4 import slopes, weighted
 
 
 class Exchange:
-    """One instance by model exchange, in the manner of Copies: any state at any time.
+    """One instance by model exchange with the interface of Copies: any state at any time.
 
-    put: what is set, all continuous states first among it; get: what is read. A step is made by the
-    classical Runge-Kutta method in `parts`. BadInput where the FMU does not offer it or has other states.
+    put: variables to set, among them all continuous states; get: variables to read. A step is integrated by
+    the classical Runge-Kutta method in `parts` equal parts. Raises BadInput if the FMU does not support model
+    exchange or has other states.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class Exchange:
         self.states = tuple(names[state] for _, state in pairs)
         missing = [n for n in self.states if n not in put]
         if missing:
-            raise BadInput(f"{archive.path}: its state '{missing[0]}' is not among what is set")
+            raise BadInput(f"{archive.path}: its state '{missing[0]}' is not among the variables to set")
         self._x = [self.put.index(n) for n in self.states]
         self._rest = [i for i, n in enumerate(self.put) if n not in self.states]
         self._tunes = any(variables[self.put[i]].causality == "parameter" for i in self._rest)
@@ -68,9 +69,9 @@ class Exchange:
         return np.array([self._guarded(self._row, row, t, 0.0) for row in values])
 
     def jacobians(self, values: Array, t: float, dt: float) -> tuple[Array, Array]:
-        """Of a step and of what is read before it, with respect to the states, from values (n_put,).
+        """Jacobians with respect to the states at values (n_put,): of a step, and of `get` before the step.
 
-        (n, n), (n_get, n): by the FMU's directional derivatives, through every stage of the method.
+        Both, (n, n) and (n_get, n), use the FMU's directional derivatives in every stage of the method.
         """
         found: tuple[Array, Array] = self._guarded(self._slopes, values, t, dt)
         return found
@@ -91,7 +92,7 @@ class Exchange:
         h = dt / self.parts
         for part in range(self.parts if dt else 0):
             x = x + h * self._mean_slope(x, t + part * h, h)
-        self._fmu.derivatives(x, t + dt)  # brings the outputs up to date
+        self._fmu.derivatives(x, t + dt)  # updates the outputs
         return self._fmu.read()
 
     def _mean_slope(self, x: Array, t: float, h: float) -> Array:
@@ -125,7 +126,7 @@ class Exchange:
 
 
 def continuous_states(archive: Archive) -> tuple[str, ...]:
-    """Names of the states of a model exchange FMU; none where it is not one."""
+    """Names of the continuous states of an FMU for model exchange; none for other FMUs."""
     told = read_model_description(str(archive.folder), validate=False)
     names = {v.reference: n for n, v in reversed(archive.description.variables.items())}
     found = [d.variable.derivative for d in told.derivatives] if told.modelExchange else []
@@ -133,7 +134,7 @@ def continuous_states(archive: Archive) -> tuple[str, ...]:
 
 
 class _Model(ABC):
-    """FMPy's object of an instance, with memory made once."""
+    """An instance in FMPy with preallocated C arrays."""
 
     def __init__(self, archive: Archive, told: Any, rest: list[int], read: list[int], n: int) -> None:
         self.rest, self.read_refs, self.n = rest, read, n
@@ -147,7 +148,7 @@ class _Model(ABC):
 
     @abstractmethod
     def started(self, **identity: str) -> Any:
-        """The instance."""
+        """The new instance."""
 
     @abstractmethod
     def begin(self, references: list[int], values: list[float], t0: float) -> None:
@@ -155,26 +156,26 @@ class _Model(ABC):
 
     @abstractmethod
     def set_rest(self, values: Array, t: float, tunes: bool) -> None:
-        """Set what is no state; parameters may change at an event only."""
+        """Set all variables that are not states; parameters may only change at an event."""
 
     @abstractmethod
     def derivatives(self, x: Array, t: float) -> Array:
-        """At states (n,)."""
+        """Derivatives (n,) at states x (n,)."""
 
     @abstractmethod
     def read(self) -> Array:
-        """What is read, (n_get,)."""
+        """Values of the variables to read, (n_get,)."""
 
     @abstractmethod
     def along(self, unknowns: list[int], known: int) -> list[float]:
-        """Derivatives of variables with respect to one, by references."""
+        """Derivatives of the unknowns with respect to one known variable, by references."""
 
     def directional(self, unknowns: list[int], knowns: list[int]) -> Array:
         """Jacobian (n_unknown, n_known)."""
         return np.array([self.along(unknowns, known) for known in knowns]).reshape(len(knowns), -1).T
 
     def close(self) -> None:
-        """Free it."""
+        """Free the instance."""
         self.fmu.freeInstance()
 
 

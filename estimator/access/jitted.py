@@ -1,6 +1,6 @@
-"""The same loop over copies, compiled by numba over raw function pointers: one call a step for all copies.
+"""The loop over copies compiled by numba with the FMU's function pointers, one call per step for all copies.
 
-Import fails where numba is not installed; PythonLoop does the same then.
+The import fails if numba is not installed; PythonLoop is used then, with the same results.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,13 +13,13 @@ from estimator.access.pointers import Functions
 from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 
-# by name because both come without types
+# imported by name because neither has type annotations
 numba: Any = import_module("numba")
 ir: Any = import_module("llvmlite.ir")
 types: Any = numba.types
 
 WHOLE, REAL, BOOL, INT = ir.IntType(64), ir.DoubleType(), ir.IntType(8), ir.IntType(32)
-# arguments after the address; pointers and sizes pass as whole numbers of 64 bits
+# arguments after the address; pointers and sizes are passed as 64-bit integers
 SIGNATURES: dict[str, tuple[Any, ...]] = {
     "one": (WHOLE,),
     "restore": (WHOLE, WHOLE),
@@ -80,7 +80,7 @@ def _initialise(fmi3, fn, component, t0):  # type: ignore[no-untyped-def]
 
 
 def _advance(fmi3, fn, component, t, dt, told):  # type: ignore[no-untyped-def]
-    """A step; one that an FMI 3.0 FMU cuts short counts as refused."""
+    """Make a step; a step that an FMI 3.0 FMU ends early counts as refused."""
     if not fmi3:
         return step2(fn[STEP], (component, t, dt, np.int32(1)))
     told[:] = 0
@@ -132,7 +132,7 @@ class JittedLoop:
         lost = recipe.way is Way.RESTART and len(recipe.constants) > 0
         refs = np.concatenate([recipe.set_refs, recipe.constant_refs]) if lost else recipe.set_refs
         self._n, k = len(recipe.set_refs), len(f.components)
-        # rows of their own only where constants stand behind the values
+        # separate rows are needed only if constants follow the values
         self._rows = np.tile(np.concatenate([np.zeros(self._n), recipe.constants]), (k, 1)) if lost else None
         states = np.array(list(saved) or [0] * k, dtype=np.int64)
         self._fixed = (

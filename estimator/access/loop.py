@@ -1,4 +1,4 @@
-"""The loop over copies in Python, by raw calls on C arrays made once."""
+"""The loop over copies of an FMU in Python, by direct calls of its functions on preallocated C arrays."""
 
 from collections.abc import Sequence
 from ctypes import c_double, c_void_p
@@ -19,17 +19,17 @@ from fmus.host.instance import WARNING
 
 
 class Loop(Protocol):
-    """Does a recipe to copies of an FMU, one row of values each."""
+    """Applies a recipe to copies of an FMU, one row of values for each copy."""
 
     def run(self, values: Array, out: Array, t: float, dt: float) -> int:
-        """Fill `out` (k, n_get) from `values` (k, n_set); dt = 0 reads without a step.
+        """Fill `out` (k, n_get) from `values` (k, n_set); with dt = 0 no step is made.
 
-        Returns -1, or 8 times the number of the copy that refused plus the status that it gave.
+        Returns -1, or 8 times the number of the copy that failed plus the FMI status that it returned.
         """
 
 
 class PythonLoop:
-    """One copy after the other; for FMUs that run in Python, and where numba is not installed."""
+    """Runs one copy after the other; for FMUs that run in Python, and if numba is not installed."""
 
     def __init__(self, f: Functions, recipe: Recipe, saved: Sequence[int] = ()) -> None:
         self._copies = [_Copy(f, recipe, i, saved) for i in range(len(f.components))]
@@ -44,7 +44,7 @@ class PythonLoop:
 
 
 class _Copy:
-    """One instance with its memory."""
+    """One instance with its C arrays."""
 
     def __init__(self, f: Functions, recipe: Recipe, number: int, saved: Sequence[int]) -> None:
         component = f.components[number]

@@ -1,4 +1,4 @@
-"""The functions of a running FMU as addresses: what the loops over copies call, for FMI 2.0 and 3.0 alike."""
+"""The C functions of a running FMU, for FMI 2.0 and 3.0, as the loops over copies call them."""
 
 from collections.abc import Callable, Mapping
 from ctypes import byref, c_bool, c_double, c_uint, c_void_p, cast
@@ -28,7 +28,7 @@ Call = Callable[..., int]
 
 @dataclass(frozen=True)
 class Functions:
-    """The functions of one FMU, by role, and the components of its instances."""
+    """The functions of one FMU by role, and the component pointers of its instances."""
 
     fmi3: bool
     calls: dict[str, Any]  # ctypes functions
@@ -37,7 +37,7 @@ class Functions:
 
 
 def functions(copies: list[Fmu]) -> Functions:
-    """The functions of instances of one FMU. The instances must outlive them."""
+    """The functions of instances of one FMU, which must exist as long as the functions are used."""
     instances = [fmu.instance for fmu in copies]
     names = NAMES[copies[0].description.fmi_version[:3]]
     library = instances[0].library
@@ -69,7 +69,7 @@ def getter(f: Functions, component: int, references: NDArray[np.uint32], values:
 
 
 def stepper(f: Functions, component: int) -> Call:
-    """A call (t, dt) that makes a step; a step cut short by an FMI 3.0 FMU counts as an error."""
+    """A call (t, dt) that makes a step; a step that an FMI 3.0 FMU ends early counts as an error."""
     raw = f.calls["step"]
     if not f.fmi3:
         return lambda t, dt: raw(c_void_p(component), c_double(t), c_double(dt), 1)
@@ -84,7 +84,7 @@ def stepper(f: Functions, component: int) -> Call:
 
 
 def entrance(f: Functions, component: int) -> Call:
-    """A call (t0) that begins initialisation."""
+    """A call (t0) that enters initialisation mode."""
     c, no = c_void_p(component), c_double(0.0)
     if f.fmi3:
         return lambda t0: f.calls["enter"](c, False, no, c_double(t0), False, no)
@@ -97,9 +97,9 @@ def entrance(f: Functions, component: int) -> Call:
 
 
 def saved_in_initialisation(fmu: Fmu, start: Mapping[str, float], t0: float) -> int:
-    """Reset an instance, begin initialisation at t0 and save its state there; the address of that state.
+    """Reset an instance, enter initialisation at t0 and save its state; returns the address of that state.
 
-    Raises FmuError where the FMU refuses one of it.
+    Raises FmuError if the FMU refuses one of these calls.
     """
     instance = fmu.instance
     try:
@@ -113,12 +113,12 @@ def saved_in_initialisation(fmu: Fmu, start: Mapping[str, float], t0: float) -> 
 
 
 def forget(fmu: Fmu, state: int) -> None:
-    """Free a state that was saved."""
+    """Free a saved state."""
     fmu.forget(c_void_p(state))
 
 
 def reason(fmu: Fmu, status: int) -> str:
-    """Why an instance refused a raw call; after a fatal failure it is not even freed."""
+    """The reason why an instance refused a direct call; after a fatal failure it is not freed."""
     fmu.instance.failed("a raw call", status)
     said = fmu.instance.messages
-    return said[-1] if said else f"it gave status {status} and no reason"
+    return said[-1] if said else f"the FMU returned status {status} without a reason"

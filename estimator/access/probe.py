@@ -1,6 +1,7 @@
-"""Which access an FMU honestly offers: each way is tried (perturb, step, undo) against plain restarts.
+"""Choice of the way to set the state of an FMU: every way is tested against plain restarts, to the bit.
 
-Nothing is taken from the flags of an FMU but whether a function may be called at all.
+Each test perturbs the state, makes a step and goes back. The flags of an FMU only decide whether a function
+may be called.
 """
 
 import time
@@ -18,23 +19,24 @@ from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
 from fmus.host.fmu import Fmu, FmuError
 
-CONTINUES = 1e-9  # relative; a restart may round where an uninterrupted run does not
-NUDGE = 0.01  # of a value, or of its nominal, by which it is perturbed
-LATER = 7.25  # s, a time at which a model that does not look at the clock does the same
+CONTINUES = 1e-9  # relative tolerance of a restart against an uninterrupted simulation, for rounding
+NUDGE = 0.01  # perturbation of a value, relative to itself or to its nominal value
+LATER = 7.25  # s, time shift of the test whether the equations depend on the time
 RUN = 24  # steps before the second point
-ALIKE = 1.3  # costs closer than this are no reason to leave the plainer way
+ALIKE = 1.3  # ratio of the computing times, above which a faster way is preferred to a simpler one
 CO_SIMULATION = (Way.SET, Way.RESUME, Way.RESTART)
-MOST_PARTS = 4096  # of a step by model exchange
-ORDERS = ((1, 2, 1), (2, 1, 2), (0, 1, 1), (1, 0, 2))  # of the points: what stays behind from one shows
-TIMED = 5  # evaluations of which the fastest counts
+MOST_PARTS = 4096  # largest number of parts of a step by model exchange
+ORDERS = ((1, 2, 1), (2, 1, 2), (0, 1, 1), (1, 0, 2))  # orders of the points, to detect remaining memory
+TIMED = 5  # number of evaluations, the fastest of which counts
 
 
 @dataclass(frozen=True)
 class Access:
-    """What the probe found.
+    """The result of the probe.
 
-    way: the plainest of the fastest honest ones. free_time: its steps may begin at any time. late: outputs
-    that are computed in steps only. refused: why each other way is not used. cost: s for one copy and step.
+    way: the simplest among the fastest correct ones; free_time: whether its steps may begin at any time;
+    late: outputs that are computed in steps only; refused: the reason against each other way; cost: computing
+    time of one copy and step, s.
     """
 
     way: Way
@@ -42,22 +44,23 @@ class Access:
     late: frozenset[str]
     refused: dict[Way, str]
     cost: float
-    parts: int = 1  # of a step by model exchange
+    parts: int = 1  # number of parts of a step by model exchange
 
     @property
     def sentence(self) -> str:
-        """What the result says about it."""
-        who = "one instance for all" if self.free_time or self.way is not Way.SET else "one instance each"
-        return f"{self.way.words}; {who}; {1e6 * self.cost:.2g} µs a state and step"
+        """The access as a sentence for the result."""
+        shared = self.free_time or self.way is not Way.SET
+        who = "one instance for all sigma points" if shared else "one instance per sigma point"
+        return f"{self.way.words}; {who}; {1e6 * self.cost:.2g} µs per state and step"
 
 
 @dataclass(frozen=True)
 class Point:
-    """Values of what is set, (n,), and the plain answer of a restart there, (n_get,) each."""
+    """Values that are set, (n,), and the values read after a plain restart with these, (n_get,) each."""
 
     values: Array
     before: Array  # outputs without a step
-    after: Array  # outputs after it
+    after: Array  # outputs after a step
 
 
 def probe(
@@ -70,9 +73,10 @@ def probe(
     dt: float,
     compiled: bool = True,
 ) -> Access:
-    """Try all ways. put: what is set for a step, states among it; start: its values; get: what is read.
+    """Test all ways and choose one.
 
-    Model exchange comes last: its steps are not the FMU's own. Raises BadInput where no way is honest.
+    put: variables to set for a step, among them the states; start: their values; get: variables to read.
+    Model exchange is tried last, as its steps are not those of the FMU. Raises BadInput if no way is correct.
     """
     try:
         return _by_co_simulation(archive, put, get, constants, start, t0, dt, compiled)
@@ -93,9 +97,9 @@ def by_exchange(
     t0: float,
     dt: float,
 ) -> Access:
-    """Model exchange with steps short enough, tried by perturbing and undoing.
+    """Test model exchange, and find the number of parts of a step that makes the integration accurate.
 
-    Raises BadInput where the FMU does not offer it, Refused or Dishonest where it does not work.
+    Raises BadInput if the FMU does not support it, Refused or Dishonest if it does not work.
     """
     exchange = Exchange(archive, put, get, constants, t0)
     try:
@@ -106,7 +110,7 @@ def by_exchange(
             exchange.parts *= 2
             fine = exchange.advance(np.array([row, moved, row]), t0, dt)
             if not np.array_equal(fine[0], fine[2]):
-                raise Dishonest("by model exchange something stays behind from one state to the next")
+                raise Dishonest("by model exchange a step depends on the state that was set before")
             if np.all(np.abs(fine - coarse) <= CONTINUES * np.maximum(np.abs(fine), 1e-3)):
                 break
         begun = time.perf_counter()
@@ -138,30 +142,30 @@ def _by_co_simulation(
     honest: dict[Way, tuple[float, bool]] = {}
     for way in CO_SIMULATION:
         if way is Way.RESUME and not (d.saves_state and timeless):
-            refused[way] = "it saves no state" if timeless else "its equations look at the clock"
+            refused[way] = "it saves no state" if timeless else "its equations depend on the time"
             continue
         try:
             honest[way] = _tried(archive, way, trial, answers, compiled, d.once_per_process)
         except (FmuError, Dishonest) as error:
             refused[way] = str(error)
     if not honest:
-        raise BadInput(f"{archive.path}: shows no state that can be set for a step; {refused[Way.RESTART]}")
+        raise BadInput(f"{archive.path}: has no state that can be set for a step; {refused[Way.RESTART]}")
     least = min(cost for cost, _ in honest.values())
     way = next(w for w in CO_SIMULATION if w in honest and honest[w][0] <= ALIKE * least)
-    refused |= {w: f"no faster ({1e6 * c:.2g} µs)" for w, (c, _) in honest.items() if w is not way}
+    refused |= {w: f"not faster ({1e6 * c:.2g} µs)" for w, (c, _) in honest.items() if w is not way}
     return Access(way, honest[way][1], frozenset(late), refused, honest[way][0])
 
 
-Answers = Sequence[Sequence[Point]]  # at each of some times, those at each point
+Answers = Sequence[Sequence[Point]]  # for each time, the results at each point
 
 
 class Dishonest(Exception):
-    """A way that is accepted by the FMU but gives other numbers than a restart."""
+    """A way that the FMU accepts but that gives other numbers than a restart."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """An instance that gives the plain answers."""
+    """An instance that gives the reference results by plain restarts."""
 
     fmu: Fmu
     put: tuple[str, ...]
@@ -171,16 +175,16 @@ class Trial:
     dt: float
 
     def answer(self, values: Array, t: float) -> Point:
-        """Restart at t from values (n,), read, step, read."""
+        """The values read before and after a step, from a restart at t with values (n,)."""
         self.fmu.restart(t, **{**self.constants, **dict(zip(self.put, values.tolist(), strict=True))})
         before = np.array(self.fmu.read(self.get))
         self.fmu.step(self.dt)
         return Point(values, before, np.array(self.fmu.read(self.get)))
 
     def points(self, start: dict[str, float], states: list[str]) -> tuple[list[Point], set[str]]:
-        """The start, a point further along the run, that point perturbed; and the outputs that lag.
+        """The start, a later point of the simulation, that point perturbed; and outputs updated in steps only.
 
-        Raises BadInput where a restart in the middle of the run does not go on as the run does.
+        Raises BadInput if a restart in the middle of the simulation does not reproduce its continuation.
         """
         name, fmu = self.fmu.name, self.fmu
         begin, later = np.array([start[n] for n in self.put]), self.t0 + RUN * self.dt
@@ -196,13 +200,14 @@ class Trial:
             straight = np.array(fmu.read(self.get))
             second = self.answer(middle, later)
         except FmuError as error:
-            raise BadInput(f"{name}: cannot be tried out from its start values: {error}") from error
+            raise BadInput(f"{name}: cannot be simulated from its start values: {error}") from error
         gaps = [(n, _gap(a, b)) for n, a, b in zip(self.get, straight, second.after, strict=True)]
         hidden = [n for n, gap in gaps if n in states and not gap <= CONTINUES]
         if hidden:
             raise BadInput(
-                f"{name}: restarted from the states it shows, '{hidden[0]}' does not go on as in the run; "
-                "it hides a state, so it cannot be estimated; export it with all states as outputs"
+                f"{name}: after a restart from its visible states, '{hidden[0]}' differs from the simulation "
+                "without a restart; it has a hidden state, so it cannot be estimated; export it with all states "
+                "as outputs"
             )
         late = {
             n for n, a, b in zip(self.get, along, second.before, strict=True) if not _gap(a, b) <= CONTINUES
@@ -211,11 +216,11 @@ class Trial:
         return [first, second, self.answer(moved, later)], late
 
     def again(self, points: Sequence[Point], steps: int) -> list[Point]:
-        """The answers at the same points some steps later."""
+        """The results at the same points some steps later."""
         return [self.answer(p.values, self.t0 + (RUN + steps) * self.dt) for p in points]
 
     def ignores_time(self, point: Point) -> bool:
-        """Whether a restart at another time gives the same bits."""
+        """Whether a restart at another time gives exactly the same results."""
         other = self.answer(point.values, self.t0 + LATER)
         return np.array_equal(other.after, point.after) and np.array_equal(other.before, point.before)
 
@@ -236,7 +241,7 @@ def _gap(a: float, b: float) -> float:
 def _tried(
     archive: Archive, way: Way, trial: Trial, answers: Answers, compiled: bool, alone: bool
 ) -> tuple[float, bool]:
-    """Cost of a way [s a copy] and whether its time is free; Dishonest or FmuError where it is not honest."""
+    """Computing time of a way per copy, s, and its `free_time`; raises Dishonest or FmuError if it fails."""
     for free in _times(way, alone):
         with Copies(
             archive, way, trial.put, trial.get, trial.constants, trial.t0, free_time=free, compiled=compiled
@@ -248,11 +253,11 @@ def _tried(
                     continue
                 raise
             return _cost(copies, trial, answers[0]), free
-    raise Dishonest("it needs an instance each and allows one only")
+    raise Dishonest("it needs several instances, but the FMU allows only one per process")
 
 
 def _times(way: Way, alone: bool) -> Iterator[bool]:
-    """Whether time is free matters only while an instance runs; an instance each comes second."""
+    """The values of `free_time` that are tried: first one instance for all rows, then one per row."""
     if way is Way.SET:
         yield True
     if not (way is Way.SET and alone):
@@ -260,7 +265,7 @@ def _times(way: Way, alone: bool) -> Iterator[bool]:
 
 
 def _compare(copies: Copies, trial: Trial, answers: Answers) -> None:
-    """Step after step from changing points, to the bit what restarts gave there."""
+    """Make steps from the points in changing order; the results must equal those of restarts to the bit."""
     for k, (order, points) in enumerate(zip(ORDERS, answers, strict=True)):
         values = np.array([points[i].values for i in order])
         t = trial.t0 + (RUN + k) * trial.dt
@@ -270,11 +275,11 @@ def _compare(copies: Copies, trial: Trial, answers: Answers) -> None:
             wrong = np.argwhere((rows != expected) & ~np.isnan(expected))
             if len(wrong):
                 name = trial.get[int(wrong[0][1])]
-                raise Dishonest(f"'{name}' {what} a step is not what a restart gives")
+                raise Dishonest(f"'{name}' {what} a step differs from that after a restart")
 
 
 def _cost(copies: Copies, trial: Trial, points: Sequence[Point]) -> float:
-    """Seconds for one copy and step: the fastest of some trials at increasing times."""
+    """Computing time of one copy and step in s, the fastest of several trials at increasing times."""
     values = np.array([p.values for p in points])
     t, times = trial.t0 + (RUN + len(ORDERS)) * trial.dt, []
     for _ in range(TIMED):

@@ -1,4 +1,4 @@
-"""What is done to an instance so that it makes a step from a given state: the ways that a probe tries."""
+"""The ways to set the state of an FMU instance before a step, among which a probe chooses."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -10,22 +10,22 @@ from estimator.record import Array
 
 
 class Way(IntEnum):
-    """How a state gets into an instance, the plainest first."""
+    """How a state is set in an instance, the simplest way first."""
 
-    SET = 0  # while it runs: what many FMUs allow though the standard does not ask for it
-    RESUME = 1  # back to its state saved during initialisation, set, end of initialisation
-    RESTART = 2  # reset, set, initialisation: what every FMU must allow
-    EXCHANGE = 3  # model exchange, integrated here: where co-simulation shows no way
+    SET = 0  # set while the FMU runs, which many FMUs allow although the standard does not require it
+    RESUME = 1  # restore a state saved during initialisation, set, end initialisation
+    RESTART = 2  # reset, set, initialise, which every FMU must allow
+    EXCHANGE = 3  # model exchange with an integrator of railfmi, if no way works in co-simulation
 
     @property
     def words(self) -> str:
-        """The way in a sentence's middle."""
+        """The way as a phrase for sentences."""
         return _WORDS[self]
 
 
 _WORDS = {
     Way.SET: "setting its states while it runs",
-    Way.RESUME: "going back to a state saved during initialisation and setting its start values",
+    Way.RESUME: "restoring a state saved during initialisation and setting its start values",
     Way.RESTART: "reset and initialisation from start values",
     Way.EXCHANGE: "model exchange, integrated by Runge-Kutta steps",
 }
@@ -33,9 +33,9 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Recipe:
-    """A way with what is set and read in it, by value references.
+    """A way with the variables that are set and read, by value references.
 
-    The columns of values are those of `set_refs`; constants are set beside them where a way loses them.
+    The columns of values are those of `set_refs`; constants are set too if a way resets them.
     """
 
     way: Way
@@ -43,4 +43,4 @@ class Recipe:
     get_refs: NDArray[np.uint32]
     constant_refs: NDArray[np.uint32]
     constants: Array
-    t0: float = 0.0  # s, where the saved states and every restart begin unless time matters
+    t0: float = 0.0  # s, time of the saved states, and of every restart if the equations ignore the time

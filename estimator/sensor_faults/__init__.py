@@ -1,4 +1,4 @@
-"""Sensor faults by kind. Each file here that defines a SensorFault is one; there is no other list."""
+"""Sensor faults by kind. Every file here that defines a SensorFault adds one; there is no other list."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -10,7 +10,7 @@ from fmus.registry import by_name, classes_in
 
 
 def _in_order(found: Mapping[str, type[SensorFault]]) -> dict[str, SensorFault]:
-    """Faults by kind in the order of their places; BadInput where one is not complete."""
+    """Faults by kind, sorted by `place`; raises BadInput if a fault is incomplete."""
     for kind, fault in found.items():
         lacking = [n for n in ("parameter", "unit") if not isinstance(getattr(fault, n, None), str)]
         if lacking:
@@ -20,14 +20,14 @@ def _in_order(found: Mapping[str, type[SensorFault]]) -> dict[str, SensorFault]:
     return {f.kind: f for f in sorted((fault() for fault in found.values()), key=lambda f: f.place)}
 
 
-# what is found is concrete
+# the classes that are found are concrete
 _FOUND = classes_in(sys.modules[__name__], SensorFault)  # type: ignore[type-abstract]
 FAULTS: dict[str, SensorFault] = _in_order(by_name(_FOUND, "kind"))
 _IN_A_CHANNEL = sorted(FAULTS.values(), key=lambda fault: fault.stage)
 
 
 def faulty(y: Array, t: Array, outputs: Sequence[str], theta: Mapping[str, float]) -> Array:
-    """What faulty sensors would show of the outputs y (N, n); parameters that are zero leave y as it is."""
+    """The outputs y (N, n) as measured by faulty sensors; faults with size zero leave y unchanged."""
     shown = y
     for j, output in enumerate(outputs):
         for fault in _IN_A_CHANNEL:

@@ -1,6 +1,6 @@
-"""A zero that is off: a wrong calibration, an amplifier's offset.
+"""A wrong zero point: a wrong calibration, an amplifier's offset.
 
-In data: an offset of one output alone.
+In data: a constant offset of one output only.
 """
 
 from estimator.record import Array

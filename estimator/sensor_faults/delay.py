@@ -1,6 +1,6 @@
-"""A channel that comes late: a filter, a bus, a clock of its own.
+"""A delayed channel: a filter, a data bus, a separate clock.
 
-In data: a residual in proportion to the output's rate.
+In data: a residual proportional to the output's rate.
 """
 
 import numpy as np

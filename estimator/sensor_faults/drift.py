@@ -1,6 +1,6 @@
-"""A zero that wanders steadily: a sensor that warms up, an integrator's offset.
+"""A zero point that drifts steadily: a sensor that warms up, an integrator's offset.
 
-In data: a residual of one output that grows with time.
+In data: a residual of one output only that grows with time.
 """
 
 from estimator.record import Array

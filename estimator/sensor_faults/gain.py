@@ -1,6 +1,6 @@
-"""A wrong sensitivity: a wrong calibration, a wrong factor on the way to the file.
+"""A wrong sensitivity: a wrong calibration, a wrong conversion factor.
 
-In data: a residual in proportion to one output.
+In data: a residual of one output that is proportional to it.
 """
 
 from estimator.record import Array

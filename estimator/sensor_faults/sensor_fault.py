@@ -1,4 +1,4 @@
-"""A sensor fault: what a sensor shows in place of an output. It competes with physics on equal terms."""
+"""Base class of sensor faults, which are candidates like the physical effects."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
@@ -7,17 +7,17 @@ import numpy as np
 
 from estimator.record import Array
 
-LATE, SCALED, ADDED = range(3)  # stages of a channel, in the order in which they change what is shown
+LATE, SCALED, ADDED = range(3)  # stages of a measuring channel, in the order in which faults are applied
 
 
 class SensorFault(ABC):
-    """A change of a simulated output by one parameter, its size. Zero is off and changes nothing.
+    """A change of a simulated output with one parameter, its size; with size zero the output is unchanged.
 
-    The first line of a class's docstring is the law, as docs/effects.md shows it.
-    kind: begins with "sensor_"; parameter: what its size is called in results; unit: of the size, {} stands
-    for the unit of the output; low, high: bounds of the size; place: among all faults, by which they are
-    listed; stage: by which several faults of one sensor act; splitting: the experiment that would tell it
-    from an effect.
+    The first line of the class docstring is the law, which docs/effects.md shows.
+    kind: begins with "sensor_"; parameter: name of the size in results; unit: of the size, {} stands for the
+    unit of the output; low, high: bounds of the size; place: position in lists of faults; stage: order in
+    which several faults of one sensor are applied; splitting: the experiment that would tell the fault from
+    an effect.
     """
 
     kind: ClassVar[str]
@@ -31,7 +31,7 @@ class SensorFault(ABC):
 
     @abstractmethod
     def size(self, spread: float, length: float, step: float) -> float:
-        """A realistic size: > 0.
+        """A realistic size, positive.
 
         spread: standard deviation of the output with its noise; length, step: of the record and between its
         samples, s.
@@ -39,28 +39,28 @@ class SensorFault(ABC):
 
     @abstractmethod
     def apply(self, y: Array, t: Array, value: float) -> Array:
-        """What a sensor with a fault of that size shows of an output y (N,) at times t (N,) [s]."""
+        """The output y (N,) at times t (N,) [s] as measured by a sensor with a fault of size `value`."""
 
     def name_at(self, output: str) -> str:
-        """Name of its parameter among the unknowns of a record."""
+        """Name of its size among the unknowns of a record."""
         return f"{self.kind}_{output}"
 
     @property
     def words(self) -> str:
-        """The fault in words, as in a list."""
+        """Name of the fault in lists."""
         return self.parameter.replace("_", " ")
 
     @property
     def phrase(self) -> str:
-        """The fault as it stands in a sentence."""
+        """Name of the fault with its article, for sentences."""
         return f"{'an' if self.words[0] in 'aeiou' else 'a'} {self.words}"
 
     @property
     def symbol(self) -> str:
-        """What a report calls the parameter."""
+        """Symbol of the size in the report."""
         return self.parameter
 
     @property
     def meaning(self) -> str:
-        """What the parameter is."""
+        """Meaning of the size, for the report."""
         return f"{self.words} of it"

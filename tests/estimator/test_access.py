@@ -79,7 +79,7 @@ def test_our_own_fmu_takes_its_states_while_it_runs(built, compiled):
 def test_an_fmu_that_looks_at_the_clock_is_not_resumed_from_another_time(foreign):
     path = foreign(CLOCK, canGetAndSetFMUstate=True)
     found = tried(path, FOREIGN, FOREIGN_START, t0=3.0)
-    assert found.refused[Way.RESUME] == "its equations look at the clock"
+    assert found.refused[Way.RESUME] == "its equations depend on the time"
     with Archive(path) as archive, Copies(archive, found.way, *FOREIGN, {}, 3.0, found.free_time) as copies:
         rows = np.array([[1.0, 2.0, 0.3], [0.5, 1.9, -0.2]])
         for t in (3.0, 3.0 + DT, 3.0 + 2 * DT):
@@ -87,7 +87,7 @@ def test_an_fmu_that_looks_at_the_clock_is_not_resumed_from_another_time(foreign
 
 
 def test_an_fmu_that_remembers_its_steps_is_found_out(foreign):
-    with pytest.raises(BadInput, match=r"hides a state, so it cannot be estimated; export it with all"):
+    with pytest.raises(BadInput, match=r"has a hidden state, so it cannot be estimated; export it with all"):
         tried(foreign(HIDDEN), FOREIGN, FOREIGN_START)
 
 
@@ -95,7 +95,7 @@ def test_a_memory_below_rounding_forbids_setting_but_not_restarting(foreign):
     """Restarts agree to the bit, and a run does so within rounding: only what is set while it runs is off."""
     found = tried(foreign(STICKY), FOREIGN, FOREIGN_START)
     assert found.way is Way.RESTART
-    assert "is not what a restart gives" in found.refused[Way.SET]
+    assert "differs from that after a restart" in found.refused[Way.SET]
 
 
 def test_an_output_that_lags_behind_the_state_is_named(foreign):
