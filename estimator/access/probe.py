@@ -182,7 +182,7 @@ class Trial:
         return Point(values, before, np.array(self.fmu.read(self.get)))
 
     def points(self, start: dict[str, float], states: list[str]) -> tuple[list[Point], set[str]]:
-        """The start, a later point of the simulation, that point perturbed; and outputs updated in steps only.
+        """The start, a later point of the simulation, that perturbed; and outputs updated in steps only.
 
         Raises BadInput if a restart in the middle of the simulation does not reproduce its continuation.
         """
@@ -206,8 +206,8 @@ class Trial:
         if hidden:
             raise BadInput(
                 f"{name}: after a restart from its visible states, '{hidden[0]}' differs from the simulation "
-                "without a restart; it has a hidden state, so it cannot be estimated; export it with all states "
-                "as outputs"
+                "without a restart; it has a hidden state, so it cannot be estimated; export it with all "
+                "states as outputs"
             )
         late = {
             n for n, a, b in zip(self.get, along, second.before, strict=True) if not _gap(a, b) <= CONTINUES
