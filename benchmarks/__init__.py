@@ -1,1 +1,1 @@
-"""Side-by-side measurements, run by hand."""
+"""Benchmarks, run by hand: computing times, measured records and the blind challenge."""

@@ -1,9 +1,9 @@
-"""What a step of the friction case costs: here, and the plain way, FMPy calls per sigma point and filterpy.
+"""Computing time of a filter step in the friction case, compared with FMPy per sigma point and filterpy.
 
-Run: python -m benchmarks.estimate. The wheelset at 40 m/s, 1 kHz: six states and mu0 with the alignment
-estimated along behind a shaping filter (nine unknowns, 19 sigma points), from four noisy outputs. Filters
-take turns in rounds, so that a drift of the machine's speed touches all of them; read the ratios. The last
-lines are the whole record by the filter that `railfmi estimate` uses, its history included.
+Run: python -m benchmarks.estimate. The case is the wheelset at 40 m/s and 1 kHz: six states, mu0 and the
+alignment, an unknown input with a shaping filter (nine unknowns, 19 sigma points), from four noisy outputs.
+The filters alternate in rounds, so that changes of the machine's speed affect all of them; the ratios are
+meaningful. The last lines are for the whole record with the filter of `railfmi estimate` and its history.
 """
 
 import argparse
@@ -45,15 +45,15 @@ STATES = [
 FRICTION = UnknownParameter("mu0", 0.4, 0.1, bounded((0.01, 0.6)), walk=0.005)
 ALIGNMENT = Shaped("y_irr", 0.8e-3, 1.5, "y_irr_dot", 1.0)
 R = np.diag(np.square([*NOISE.values()]))
-NOTHING = np.empty(0)  # inputs that are known beside V
+NOTHING = np.empty(0)  # there are no known inputs besides V
 
 
 def record(fmu: Path, seconds: float) -> Array:
-    """Noisy outputs (N, 4) of a run over waves of 6 to 60 m with random phases."""
+    """Noisy outputs (N, 4) of a simulation over waves of 6 to 60 m length with random phases."""
     rng, t = np.random.default_rng(1), np.arange(round(seconds / DT) + 1) * DT
     omega = 2 * np.pi * V / np.geomspace(6.0, 60.0, 40)
     waves = np.outer(t, omega) + rng.uniform(0, 2 * np.pi, 40)
-    size = ALIGNMENT.std * np.sqrt(2 / 40) * np.minimum(t, 1.0)[:, None]  # grows from nothing
+    size = ALIGNMENT.std * np.sqrt(2 / 40) * np.minimum(t, 1.0)[:, None]  # grows from zero in 1 s
     y_irr = (size * np.sin(waves)).sum(axis=1)
     inputs = {"y_irr": y_irr, "y_irr_dot": np.gradient(y_irr, DT)}
     with Fmu(fmu) as plant:
@@ -62,14 +62,14 @@ def record(fmu: Path, seconds: float) -> Array:
 
 
 class Ours:
-    """The filter of this repository."""
+    """The unscented filter of railfmi."""
 
     def __init__(self, fmu: Path, compiled: bool = True) -> None:
         self.joint = Joint(
             fmu, list(NOISE), STATES, [FRICTION], [ALIGNMENT], constants={"V": V}, dt=DT, compiled=compiled
         )
         self.filter = Ukf(self.joint, self.joint.start(), self.joint.noise, R, DT)
-        self.filter.step(NOTHING, np.full(len(NOISE), np.nan))  # the first one moves no time
+        self.filter.step(NOTHING, np.full(len(NOISE), np.nan))  # the first step does not advance the time
 
     def step(self, y: Array) -> Array:
         """Predict and correct."""
@@ -77,7 +77,7 @@ class Ours:
 
 
 class Plain:
-    """As a script would do it: one FMPy instance, a restart for each sigma point, filterpy as it is."""
+    """The filter of a simple script: one FMPy instance, a restart for each sigma point, filterpy's filter."""
 
     def __init__(self, fmu: Path, folder: Path, same: Joint) -> None:
         described = read_model_description(str(fmu))
@@ -99,7 +99,7 @@ class Plain:
         self.out = self._references(states)
 
     def move(self, x: Array, dt: float) -> Array:
-        """A sigma point by restart and step."""
+        """Propagate a sigma point by a restart and a step."""
         n, slave, after = len(STATES), self.slave, self.walk @ x[-2:]
         acting = (x[-2:] + after) / 2
         slave.reset()
@@ -123,7 +123,7 @@ class Plain:
 
 @dataclass(frozen=True)
 class Way:
-    """A filter with its label and that of what it is compared with."""
+    """A filter with its label and the label of the filter with which it is compared."""
 
     label: str
     plain: str
@@ -131,18 +131,18 @@ class Way:
 
 
 def builds(folder: Path) -> Iterator[tuple[str, Path]]:
-    """The FMUs that can be built here."""
+    """The FMUs that can be built on this machine."""
     yield "PythonFMU", build_python(Wheelset(), folder / "python")
     try:
         from fmus.export.builders.native.build import build_native
 
         yield "native", build_native(Wheelset(), folder / "native")
     except (ImportError, BadInput) as error:
-        print(f"no native FMU: {error}")
+        print(f"the native FMU is left out, it cannot be built: {error}")
 
 
 def ways(made: dict[str, Path], folder: Path) -> Iterator[Way]:
-    """All that can be run here."""
+    """All filters for the given FMUs."""
     for kind, fmu in made.items():
         ours, plain = Ours(fmu), f"plain, {kind}"
         yield Way(plain, plain, Plain(fmu, folder / f"unpacked_{kind}", ours.joint))
@@ -151,7 +151,7 @@ def ways(made: dict[str, Path], folder: Path) -> Iterator[Way]:
 
 
 def measured(found: list[Way], y: Array) -> tuple[dict[str, list[float]], float]:
-    """Microseconds of a step by label and round, and how far the estimates lie apart, in deviations."""
+    """Time of a step in µs by label and round, and the largest difference of estimates, in deviations."""
     times: dict[str, list[float]] = {way.label: [] for way in found}
     for rows in np.array_split(y[: STEPS * ROUNDS], ROUNDS):
         last = []
@@ -166,20 +166,20 @@ def measured(found: list[Way], y: Array) -> tuple[dict[str, list[float]], float]
 
 
 def report(found: list[Way], times: dict[str, list[float]], apart: float) -> None:
-    """Medians with their ratios, and the fastest round, which other programs disturbed least."""
+    """Print the medians with their ratios, and the fastest round, which other programs disturbed least."""
     print(f"friction case, 19 sigma points, {DT * 1e3:g} ms; medians of {ROUNDS} rounds of {STEPS} steps")
     for way in found:
         us, real = np.array(times[way.label]), DT * 1e6
         faster = np.median(np.array(times[way.plain]) / us)
         print(
-            f"{way.label:36} {np.median(us):7.0f} µs a step  {faster:6.1f} times the plain way's speed  "
+            f"{way.label:36} {np.median(us):7.0f} µs per step  {faster:6.1f} times the plain filter's speed  "
             f"{real / np.median(us):6.2f} times real time ({real / us.min():.2f} at best)"
         )
-    print(f"estimates at the end agree within {apart:.1g} deviations")
+    print(f"the final estimates agree within {apart:.1g} standard deviations")
 
 
 def whole(kind: str, fmu: Path, y: Array) -> str:
-    """The case from end to end."""
+    """Filter the whole record; the speed and the final estimate of mu0 as a sentence."""
     s = samples(np.arange(len(y)) * DT, np.empty((len(y), 0)), y)
     made = Ours(fmu)
     begun = time.perf_counter()
@@ -192,7 +192,7 @@ def whole(kind: str, fmu: Path, y: Array) -> str:
 
 
 def main(arguments: Any = None) -> None:
-    """Measure, check that all estimates agree, print."""
+    """Measure the times, compare the estimates and print both."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=SECONDS, help="length of the whole record")
     given = parser.parse_args(arguments)

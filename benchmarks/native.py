@@ -1,7 +1,7 @@
-"""What a step and a restart cost: CasADi's C code alone, native FMUs, the PythonFMU build; in loops in C.
+"""Computing time of a step and a restart, in C loops: CasADi's C code alone, native FMUs, PythonFMU builds.
 
-Run: python -m benchmarks.native. The ways take turns, and the least time of many rounds counts: other work
-on the machine only ever adds to a time.
+Run: python -m benchmarks.native. The variants alternate, and the shortest time of many rounds counts, because
+other programs on the machine can only increase a time.
 """
 
 import ctypes
@@ -26,7 +26,7 @@ from fmus.models import MODELS
 from fmus.variables import Input, Parameter, State
 
 STEPS, DT, COPIES, RESTARTS = 500, 1e-3, 15, 4
-ROUNDS, SECONDS = 400, 30.0  # at most, of each comparison
+ROUNDS, SECONDS = 400, 30.0  # limits of each comparison
 LOOP = """
 #include <math.h>
 #include <stdbool.h>
@@ -79,13 +79,13 @@ CALLS += ("SetupExperiment", "DoStep")
 
 
 def begin(model: Model) -> tuple[list[float], list[float], list[float]]:
-    """Start values of states, inputs and parameters, off the rest."""
+    """Start values of states, inputs and parameters, away from rest."""
     x = [v.start + 0.1 * (v.nominal or 1.0) for v in model.of(State)]
     return x, [v.start for v in model.of(Input)], [v.start for v in model.of(Parameter)]
 
 
 def loops(model: Model, folder: Path) -> ctypes.CDLL:
-    """The loops above, compiled with the model's generated code."""
+    """The C loops above, compiled together with the generated code of the model."""
     made = equations(model)
     for name, text in sources(table(model, made), made, 2, "{}").items():
         (folder / name).write_text(text)
@@ -140,7 +140,7 @@ def restarted(c: ctypes.CDLL, fmus: list[Fmu], start: dict[str, float]) -> Calla
 
 
 def measured(ways: dict[str, Callable[[], None]], per_run: int) -> dict[str, float]:
-    """Least time of one unit, µs, the ways taking turns."""
+    """Shortest time of one unit in µs for each variant; the variants alternate."""
     least = dict.fromkeys(ways, inf)
     over = time.perf_counter() + SECONDS
     for _ in range(ROUNDS):
@@ -154,7 +154,7 @@ def measured(ways: dict[str, Callable[[], None]], per_run: int) -> dict[str, flo
 
 
 def compare(name: str, folder: Path) -> None:
-    """Print one model's figures."""
+    """Print the computing times of one model."""
     model = MODELS[name]()
     start = dict(zip((v.name for v in model.of(State)), begin(model)[0], strict=True))
     c = loops(model, folder)
@@ -167,7 +167,7 @@ def compare(name: str, folder: Path) -> None:
         for fmus in copies.values():
             for fmu in fmus:
                 fmu.close()
-    print(f"{name}, communication step {DT * 1e3:g} ms, of which native = 1:")
+    print(f"{name}, communication step {DT * 1e3:g} ms; time, and ratio to the native FMU:")
     for way, us in once.items():
         print(f"  step, {way:32} {us:9.2f} µs {us / once['native']:8.2f}")
     for way, us in again.items():

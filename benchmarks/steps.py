@@ -1,7 +1,7 @@
-"""What a step of the test rig costs: CasADi alone, its FMU by names, its FMU in the host's loop.
+"""Computing time of a step of the test rig: CasADi alone, its FMU by variable names, and Fmu.simulate.
 
-Run: make bench. Figures are medians over rounds in which the ways take turns, so that a drift of the
-machine's speed touches all of them; read the ratios.
+Run: make bench. Figures are medians over rounds in which the variants alternate, so that changes of the
+machine's speed affect all of them. The ratios are meaningful, the absolute times depend on the machine.
 """
 
 import tempfile
@@ -24,7 +24,7 @@ START = {"omega_w": 12.16, "omega_r": 9.36}
 
 
 def plain() -> Callable[[], None]:
-    """The compiled step function alone, on memory that stays in place."""
+    """The compiled step function alone, on preallocated memory."""
     model = Testrig()
     x = array("d", [*START.values(), 0.0, 0.0])
     u, p = array("d", [300.0, 7.5, 0.0, 0.0]), array("d", [v.start for v in model.of(Parameter)])
@@ -38,7 +38,7 @@ def plain() -> Callable[[], None]:
 
 
 def by_name(rig: Fmu) -> Callable[[], None]:
-    """Fmu.step and Fmu.read, as a script would."""
+    """Fmu.step and Fmu.read, as a script would use them."""
 
     def run() -> None:
         rig.restart(**START)
@@ -50,7 +50,7 @@ def by_name(rig: Fmu) -> Callable[[], None]:
 
 
 def in_loop(rig: Fmu) -> Callable[[], None]:
-    """Fmu.simulate, as closing the loop does."""
+    """Fmu.simulate, as close-loop uses it."""
     t = np.arange(STEPS + 1) * DT
     inputs = {"T_P": np.full(STEPS, 300.0), "f_sync": np.full(STEPS, 7.5)}
 
@@ -61,7 +61,7 @@ def in_loop(rig: Fmu) -> Callable[[], None]:
 
 
 def restarts(rig: Fmu) -> Callable[[], None]:
-    """A restart and one step, as a filter's sigma point."""
+    """A restart and one step, as a filter needs for each sigma point."""
 
     def run() -> None:
         for _ in range(STEPS):
@@ -90,7 +90,7 @@ def main() -> None:
     print(f"test rig, communication step {DT * 1e3:g} ms, medians of {ROUNDS} rounds of {STEPS} steps")
     for name, us in times.items():
         ratio = np.median(np.array(us) / base)
-        print(f"{name:22} {np.median(us):7.1f} µs a step  {ratio:5.1f} times CasADi alone")
+        print(f"{name:22} {np.median(us):7.1f} µs per step  {ratio:5.1f} times CasADi alone")
 
 
 if __name__ == "__main__":

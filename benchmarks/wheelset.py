@@ -1,7 +1,7 @@
-"""What the wheelset costs by creep law: one internal step alone, and its PythonFMU in the host's loop.
+"""Computing time of the wheelset for each creep law: an internal step alone, and its PythonFMU simulated.
 
-Run: python -m benchmarks.wheelset. Times are of this process's own work, so that a busy machine counts less;
-medians of rounds. Simulated seconds per second at communication steps of 1 ms over a wavy track at 40 m/s.
+Run: python -m benchmarks.wheelset. Times are processor times of this process, as medians over rounds, for
+communication steps of 1 ms over a wavy track at 40 m/s.
 """
 
 import tempfile
@@ -24,13 +24,13 @@ OUTPUTS = ["y", "psi", "y_dot", "psi_dot"]
 
 
 def wavy() -> dict[str, np.ndarray]:
-    """Alignment of 2 mm and 12 m at 40 m/s, at each step."""
+    """Alignment with an amplitude of 2 mm and a wavelength of 12 m at 40 m/s, at each step."""
     t, w = np.arange(STEPS + 1) * DT, 2 * np.pi * 40 / 12
     return {"y_irr": 2e-3 * np.sin(w * t), "y_irr_dot": 2e-3 * w * np.cos(w * t)}
 
 
 def step_alone(law: float) -> list[float]:
-    """Seconds of a compiled step of 1 ms, by round."""
+    """Processor time of a compiled step of 1 ms in s, by round."""
     model = Wheelset()
     start = {"y": 2e-3, "psi": 1e-4, "creep_law": law}
     x, u, p = (
@@ -47,7 +47,7 @@ def step_alone(law: float) -> list[float]:
 
 
 def in_loop(fmu: Fmu, law: float) -> list[float]:
-    """Seconds of a communication step with two inputs and four outputs, by round."""
+    """Processor time of a communication step with two inputs and four outputs in s, by round."""
     t, inputs, found = np.arange(STEPS + 1) * DT, wavy(), []
     for _ in range(ROUNDS):
         begun = time.process_time()

@@ -1,1 +1,1 @@
-"""The challenge: a blind set of records from a seed, the chain's answers to them, and a scoreboard."""
+"""The challenge: a blind set of records from a seed, the answers of close-loop to them, and a scoreboard."""

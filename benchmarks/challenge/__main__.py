@@ -17,20 +17,22 @@ from benchmarks.challenge.truth import SHARES, SYSTEMS
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the challenge; interrupted, it goes on with the same command."""
+    """Run the challenge; after an interruption, the same command continues it."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.challenge", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/challenge"), help="folder of all sets")
-    parser.add_argument("--seed", type=int, help="of the set; a fresh one is drawn without")
-    parser.add_argument("--count", type=int, default=sum(SHARES.values()), help="records, shares kept")
-    parser.add_argument("--jobs", type=int, default=1, help="records at a time")
-    parser.add_argument("--cores", type=int, default=0, help="processes of one record; 0: all")
-    parser.add_argument("--limit", type=float, default=1800.0, help="s a record")
-    parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="leave out the others")
-    parser.add_argument("--only-make", action="store_true", help="make the records, answer none")
-    parser.add_argument("--so-far", action="store_true", help="the scoreboard of what is answered already")
-    parser.add_argument("--ablate", action="store_true", help="what each limit of the policy does, too")
+    parser.add_argument("--seed", type=int, help="seed of the set; by default a new one is drawn")
+    parser.add_argument(
+        "--count", type=int, default=sum(SHARES.values()), help="number of records, in the same shares"
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="records that are closed at the same time")
+    parser.add_argument("--cores", type=int, default=0, help="processes per record; 0: all cores")
+    parser.add_argument("--limit", type=float, default=1800.0, help="time limit per record, s")
+    parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="systems to include")
+    parser.add_argument("--only-make", action="store_true", help="write the records without closing them")
+    parser.add_argument("--so-far", action="store_true", help="the scoreboard of the records closed so far")
+    parser.add_argument("--ablate", action="store_true", help="also tell what each limit of the policy does")
     a = parser.parse_args(arguments)
-    for stopping in (signal.SIGINT, signal.SIGTERM):  # both end the record's process too
+    for stopping in (signal.SIGINT, signal.SIGTERM):  # both also end the process of the record
         signal.signal(stopping, signal.default_int_handler)
     seed = secrets.randbelow(10**6) if a.seed is None else a.seed
     chosen = [p for p in plans(seed, a.count) if p.system in a.systems]

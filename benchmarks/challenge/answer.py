@@ -1,6 +1,6 @@
-"""One record closed in a process of its own: `python -m benchmarks.challenge.answer RECORD ANSWER CORES`.
+"""Close the loop on one record: `python -m benchmarks.challenge.answer RECORD ANSWER CORES`.
 
-With a further argument `ablate` its fits are judged again by every policy of the ablation.
+With the further argument `ablate`, its fits are judged again by every policy of the ablation.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scenarios.closing.closing import Posed, builder_for, closed, experiment_of,
 
 
 def main() -> None:
-    """Close the loop on a record and write the result with the processor time that it took."""
+    """Close the loop on a record and write the result with its processor time."""
     record, answer, cores = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     begun, kept = time.monotonic(), {}
     declared = experiment_of(record)

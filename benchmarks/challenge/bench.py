@@ -1,4 +1,4 @@
-"""The three systems as benches: conditions of a run drawn, then simulated with and without effects."""
+"""The three systems with random conditions of a run, and their simulation with and without effects."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from tests.truth.vehicle_inputs import (
 from tests.truth.wheelset_track import random_alignment
 
 DURATION = 60.0  # s
-SLIDING = 1.0  # m/s between the rims: more is a wheel that locks or spins
-FLANGE = 6e-3  # m, shift from which a flange touches
+SLIDING = 1.0  # m/s, sliding speed above which the wheel locks or spins
+FLANGE = 6e-3  # m, lateral shift above which a flange touches
 Outputs = dict[str, Array]
 
 
 class Simulate(Protocol):
-    """Outputs without noise of a run with effects, from the start that a run with `like` has."""
+    """Outputs without noise of a simulation with effects, from the start state of one with `like`."""
 
     def __call__(self, more: More, like: More) -> Outputs: ...
 
 
 @dataclass(frozen=True)
 class Bench:
-    """One run's conditions: recorded inputs, noise, what is true, and how to simulate and declare it.
+    """The conditions of a run: inputs, noise, true parameters, and functions to simulate and declare it.
 
-    strength: stiffness and damping at a place; toml: text of the experiment file from its name and effects.
+    strength: stiffness and damping at a location; toml: text of the experiment file from name and effects.
     """
 
     t: Array
@@ -57,7 +57,7 @@ class Bench:
 
 
 def within(bounds: vehicle.Bounds, rng: np.random.Generator) -> dict[str, float]:
-    """True values in the inner three quarters of their bounds."""
+    """True values drawn from the inner three quarters of their bounds."""
     return {
         name: float(rng.uniform(low + (high - low) / 8, high - (high - low) / 8))
         for name, (low, high) in bounds.items()
@@ -65,14 +65,14 @@ def within(bounds: vehicle.Bounds, rng: np.random.Generator) -> dict[str, float]
 
 
 def noisy(usual: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
-    """Noise of 0.8 to 1.25 of the usual, by output."""
+    """Noise of each output, 0.8 to 1.25 times the usual value."""
     return {name: float(f"{value * rng.uniform(0.8, 1.25):.3g}") for name, value in usual.items()}
 
 
 def rig_bench(rng: np.random.Generator, conditions: Collection[str], lowest_mu0: float = 0.0) -> Bench:
-    """conditions: "plain" (one more parameter may be off), "one speed", "low torque".
+    """The test rig; conditions: "plain" (r_w may be off too, or one speed), "one speed", "low torque".
 
-    lowest_mu0: change of mu0 at its lowest, so that the torque asked for can still be held.
+    lowest_mu0: largest decrease of mu0, for which the requested torque must still be transmitted.
     """
     extra = str(rng.choice(["", *rig.UNCERTAIN], p=[0.4, 0.2, 0.2, 0.2]))
     bounds = dict(rig.MU0_BOUNDS)
@@ -111,7 +111,7 @@ def rig_bench(rng: np.random.Generator, conditions: Collection[str], lowest_mu0:
 
 
 def vehicle_bench(rng: np.random.Generator, conditions: Collection[str]) -> Bench:
-    """A run at 15 to 25 m/s over one of three kinds of track."""
+    """The vehicle at 15 to 25 m/s on one of three kinds of track."""
     true, noise = within(vehicle.UNCERTAIN, rng), noisy(vehicle.NOISE, rng)
     p, V = replace(vehicle.Vehicle(), **true), float(rng.uniform(15.0, 25.0))
     rails = (spectrum_rails, rough_rails, measured_rails)[rng.integers(3)](rng, V * DURATION)
@@ -147,7 +147,7 @@ def vehicle_bench(rng: np.random.Generator, conditions: Collection[str]) -> Benc
 
 
 def wheelset_bench(rng: np.random.Generator, conditions: Collection[str]) -> Bench:
-    """A run at 40 m/s over random alignment, the contact's form that of the model or a little other."""
+    """The wheelset at 40 m/s on random alignment, with the contact form of the model or a similar one."""
     true, noise = within(wheelset.UNCERTAIN, rng), noisy(wheelset.NOISE, rng)
     true["k_S"] = min(true["k_S"], true["k_A"])
     p, form = replace(wheelset.Wheelset(), **true), (wheelset.SAME, wheelset.OTHER)[rng.integers(2)]
@@ -186,7 +186,7 @@ BENCHES = {"vehicle": vehicle_bench, "wheelset": wheelset_bench}
 def bench(
     system: str, rng: np.random.Generator, conditions: Collection[str] = (), lowest_mu0: float = 0.0
 ) -> Bench:
-    """The bench of a system with conditions drawn."""
+    """The bench of a system with random conditions."""
     if system == "rig":
         return rig_bench(rng, conditions, lowest_mu0)
     return BENCHES[system](rng, conditions)

@@ -1,4 +1,4 @@
-"""From one seed: which record of the set holds what."""
+"""The plans of all records of a set, drawn from one seed: their groups, systems and effects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Thing = TypeVar("Thing")
 
 @dataclass(frozen=True)
 class Plan:
-    """What a record shall hold: entries with the location of each; sizes are drawn when it is made."""
+    """The plan of a record: effects with their locations; their sizes are drawn when the record is made."""
 
     index: int
     group: str
@@ -34,12 +34,12 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """The record's name, which tells nothing."""
+        """The name of the record, which does not reveal its effects."""
         return f"record-{self.index:03d}"
 
 
 def counts(count: int) -> dict[str, int]:
-    """How many of each group there are among `count`, by largest remainders."""
+    """Number of records of each group among `count`, by the method of largest remainders."""
     total = sum(SHARES.values())
     exact = {group: count * share / total for group, share in SHARES.items()}
     found = {group: int(value) for group, value in exact.items()}
@@ -50,7 +50,7 @@ def counts(count: int) -> dict[str, int]:
 
 
 def plans(seed: int, count: int) -> list[Plan]:
-    """The whole set; the same for the same seed and count."""
+    """The plans of the whole set, equal for equal seed and count."""
     rng = np.random.default_rng([seed, count])
     made: list[Plan] = []
     for group, n in counts(count).items():
@@ -64,7 +64,7 @@ def _numbered(plan: Plan, index: int) -> Plan:
 
 
 def deal(things: Sequence[Thing], rng: np.random.Generator) -> Iterator[Thing]:
-    """All of them in random order, then again."""
+    """All things in random order, again and again."""
     while True:
         for i in rng.permutation(len(things)):
             yield things[i]
@@ -81,33 +81,33 @@ def without(rng: np.random.Generator) -> Iterator[Plan]:
 
 
 def singles(rng: np.random.Generator) -> Iterator[Plan]:
-    """One effect: every kind, and every system in turn."""
+    """Records with one effect, for every entry and every system in turn."""
     own = {system: deal(MENU[system], rng) for system in SYSTEMS}
     for system in deal(SYSTEMS, rng):
         yield Plan(0, "single", system, (_placed(next(own[system]), rng),))
 
 
 def strangers(rng: np.random.Generator) -> Iterator[Plan]:
-    """Outside the vocabulary."""
+    """Records with a mechanism that is not in the library of effects."""
     own = {system: deal(OUTSIDE[system], rng) for system in SYSTEMS}
     for system in deal(SYSTEMS, rng):
         yield Plan(0, "outside", system, (_placed(next(own[system]), rng),))
 
 
 def lookalikes(rng: np.random.Generator) -> Iterator[Plan]:
-    """Known confusions."""
+    """Records with an effect that is known to be confused with another."""
     for c in deal(CONFUSABLE, rng):
         yield Plan(0, "confusable", c.system, (_placed(c.entry, rng),), c.conditions, c.quiet, c.note)
 
 
 def faults(rng: np.random.Generator) -> Iterator[Plan]:
-    """Faults of sensors: every kind on every system."""
+    """Records with a sensor fault, for every kind and every system."""
     for system, fault in deal([(s, f) for s in SYSTEMS for f in FAULTS], rng):
         yield Plan(0, "sensor", system, ((fault, str(rng.choice(OUTPUTS[system]))),))
 
 
 def doubles(rng: np.random.Generator) -> Iterator[Plan]:
-    """Two effects of different kinds."""
+    """Records with two effects of different kinds."""
     own = {system: deal(MENU[system], rng) for system in SYSTEMS}
     for system in deal(SYSTEMS, rng):
         one, other = next(own[system]), next(own[system])
@@ -116,7 +116,7 @@ def doubles(rng: np.random.Generator) -> Iterator[Plan]:
         yield Plan(0, "double", system, (_placed(one, rng), _placed(other, rng)))
 
 
-# what two effects cannot both change
+# inputs and parameters that only one of two effects may change
 OWNERS = {"T_P", "f_sync", "y_irr", "V", "mu0", "friction_condition", "R_2", "m1", "k1"}
 DRAWN: dict[str, Callable[[np.random.Generator], Iterator[Plan]]] = {
     "none": without,

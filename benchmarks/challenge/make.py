@@ -1,4 +1,4 @@
-"""A record made after its plan: simulated with and without its effects, disturbed, written, told apart."""
+"""Creation of a record from its plan: it is simulated with and without its effects, and noise is added."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from tests.truth.rig_effects import SensorFault
 from tests.truth.wheelset_effects import CONDITIONS, FRICTION
 from tests.truth.wheelset_motion import Wheelset
 
-LOWEST = 60.0  # s, over which a drift of mu0 goes on
+LOWEST = 60.0  # s, duration of a drift of mu0
 SHARE = {"limit_share": "limit", "slew_share": "slew"}
-WORSE = ("wet", "low", "very_low")  # than dry
+WORSE = ("wet", "low", "very_low")  # friction conditions with less friction than dry
 DIGITS = 8
 ATTEMPTS = 20
-FAINT = 2.0  # times the noise: less may be left alone by the rule of what matters
-IDENTIFY = 0.6  # of the record, as every bench splits it
-LATE = 0.1  # of the ratio over all of the record: an effect with less in the part to identify is not there
+FAINT = 2.0  # times the noise; close-loop may ignore a smaller sensor fault as too small to matter
+IDENTIFY = 0.6  # share of the record that is the part to identify
+LATE = 0.1  # smallest ratio of the effect's size in the part to identify to that in the whole record
 
 
 def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
-    """Write the record's folder, then the file of its truth; what is there already is kept.
+    """Write the folder of a record, then the file with its truth; an existing record is kept.
 
-    Sizes under which the system leaves what its model can say (a wheel locks, a flange climbs) are drawn
-    again, faults of a sensor alone that drown in its noise, and what acts first where the record is held out.
-    A sensor that moves too little for any fault of the kind is left for the system's next one.
-    Raises ValueError where that does not help.
+    Sizes are drawn again if the system leaves the range of its model (a wheel locks, a flange touches), if a
+    sensor fault is small against the noise, or if the effect hardly acts in the part to identify. If a sensor
+    moves too little for a fault of the kind, the next sensor of the system is used.
+    Raises ValueError if no draw is accepted.
     """
     told = truths / f"{plan.name}.json"
     if told.exists():
@@ -60,7 +60,7 @@ def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
 
 
 def elsewhere(plan: Plan) -> list[Plan]:
-    """The same fault at the system's other sensors, in order from its own; none where it is no sensor's."""
+    """Plans with the same fault at the other sensors of the system; none if the plan is no sensor fault."""
     if plan.group != "sensor":
         return []
     ((fault, at),) = plan.entries
@@ -70,7 +70,7 @@ def elsewhere(plan: Plan) -> list[Plan]:
 
 
 def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
-    """A record with one draw of conditions and sizes: truth, experiment.toml, columns of the data."""
+    """A record with one draw of conditions and sizes: its truth, experiment.toml and data columns."""
     raw = [(e, location, e.sizes(rng)) for e, location in plan.entries]
     here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
     items = tuple(Item(e.kind, p, settled(e.kind, p, sizes, here)) for e, p, sizes in raw)
@@ -81,13 +81,13 @@ def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
 
 
 def _lowest_mu0(sizes: list[tuple[str, dict[str, Any]]]) -> float:
-    """The lowest change of mu0 in a run."""
+    """The largest decrease of mu0 during a run, as a negative number."""
     at_mu0 = [s for place, s in sizes if place == "mu0"]
     return min((s.get("delta", 0.0) + LOWEST * s.get("rate", 0.0) for s in at_mu0), default=0.0)
 
 
 def settled(kind: str, location: str, sizes: dict[str, Any], here: Bench) -> dict[str, Any]:
-    """Parameters of an effect in the units of docs/effects.md, from sizes that depend on the run."""
+    """Parameters of an effect in the units of docs/effects.md, from drawn sizes relative to the run."""
     found = dict(sizes)
     for share, name in SHARE.items():
         if share in found:
@@ -99,14 +99,14 @@ def settled(kind: str, location: str, sizes: dict[str, Any], here: Bench) -> dic
         worse = CONDITIONS[WORSE[int(found.pop("condition")) - 1]]
         now = {n: here.true.get(n, getattr(Wheelset(), n)) for n in FRICTION}
         found |= {f"delta_{n}": v - now[n] for n, v in zip(FRICTION, worse, strict=True)}
-    if kind in FAULTS and "{}" in FAULTS[kind].unit:  # in multiples of the noise, by the end of the record
+    if kind in FAULTS and "{}" in FAULTS[kind].unit:  # sizes are in units of the noise, at the record's end
         part = here.noise[location] / (float(here.t[-1]) if FAULTS[kind].unit == "{}/s" else 1.0)
         found = {name: value * part for name, value in found.items()}
     return found
 
 
 def effect_of(items: tuple[Item, ...], here: Bench) -> More:
-    """All but the sensors' faults, as the truth models take them."""
+    """All effects except sensor faults, in the form of the truth models."""
     more = NO_MORE
     for item in items:
         if item.is_fault:
@@ -129,7 +129,7 @@ def effect_of(items: tuple[Item, ...], here: Bench) -> More:
 
 
 def fault_of(items: tuple[Item, ...], output: str) -> SensorFault:
-    """The fault of an output's sensor."""
+    """The sensor fault of an output."""
     found = {}
     for item in items:
         if item.is_fault and item.location == output:
@@ -138,13 +138,13 @@ def fault_of(items: tuple[Item, ...], output: str) -> SensorFault:
 
 
 def shown(here: Bench, clean: Outputs, items: tuple[Item, ...]) -> Outputs:
-    """What sensors without noise show."""
+    """The outputs as measured by the sensors without noise."""
     still = np.random.default_rng(0)
     return {o: measured(here.t, y, fault_of(items, o), 0.0, still) for o, y in clean.items()}
 
 
 def ratios(here: Bench, with_it: Outputs, without: Outputs, part: float = 1.0) -> dict[str, float]:
-    """Rms of the difference over the noise, by output; part: of the record, from its start."""
+    """Rms of the difference over the noise, by output; part: share of the record from its start."""
     seen = here.t <= part * here.t[-1]
     return {
         o: float(np.sqrt(np.mean((with_it[o] - without[o])[seen] ** 2)) / noise)
@@ -185,7 +185,7 @@ def measure(
 
 
 def write(home: Path, text: str, columns: Outputs) -> None:
-    """experiment.toml and data.csv, as of a measured record."""
+    """Write experiment.toml and data.csv, as for a measured record."""
     home.mkdir(parents=True, exist_ok=True)
     table = np.column_stack([*columns.values()])
     head = ",".join(columns)

@@ -1,7 +1,7 @@
-"""When an answer names what was there: the same kind and place, or another name of the same equation.
+"""Comparison of an answer with the truth: same kind and location, or another name of the same equation.
 
-Other names are identities of the models, not lacks of a record: whatever the record, the two cannot differ.
-What one record cannot tell apart is for the answer to say, by naming a class.
+Two names are accepted for one effect only if the models make them identical for every record. Effects that
+one particular record cannot tell apart must be named as a class by the answer.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from tests.truth.wheelset_effects import FRICTION
 NAMING = ("traced", "several", "ambiguous", "sensor_fault")
 CONFIDENT = ("traced", "several", "sensor_fault")
 SILENT = ("no_discrepancy", "insufficient_excitation")
-OF_NO_MOTION = ("constant_force", "step_force", "harmonic_excitation")  # laws without q and v
+OF_NO_MOTION = ("constant_force", "step_force", "harmonic_excitation")  # forces that depend on no motion
 SUSPENSIONS = ("secondary", "primary")
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the chain said of a record; failure: why it said nothing."""
+    """The answer of close-loop to a record; failure: the reason why there is none."""
 
     verdict: str = ""
     names: tuple[Pair, ...] = ()
@@ -33,11 +33,11 @@ class Answer:
     seconds: float = 0.0
     cpu_seconds: float = 0.0
     failure: str = ""
-    split: dict[str, float] = field(default_factory=dict)  # seconds by stage
+    split: dict[str, float] = field(default_factory=dict)  # wall time of each step, s
 
     @classmethod
     def of(cls, kept: dict[str, Any]) -> Answer:
-        """From what is kept of a record's run."""
+        """The answer from the file that is kept for a record."""
         times = {"seconds": kept["seconds"], "cpu_seconds": kept.get("cpu_seconds", 0.0)}
         if "failure" in kept:
             return cls(failure=kept["failure"], **times)
@@ -55,13 +55,13 @@ class Answer:
 
     @property
     def label(self) -> str:
-        """Verdict and what it names."""
+        """The verdict with the effects that it names."""
         said = ", ".join(f"{k}@{p}" for k, p in self.names)
         return self.failure.splitlines()[0] if self.failure else f"{self.verdict} {said}".strip()
 
 
 def other_names(system: str, item: Item) -> set[Pair]:
-    """Kind and location of an effect with all that are the same equation there."""
+    """Kind and location of an effect, and of all effects with the same equation."""
     kind, at = item.pair
     found = {item.pair}
     if system == "wheelset" and kind in LAWS:
@@ -71,31 +71,31 @@ def other_names(system: str, item: Item) -> set[Pair]:
             found |= {(kind, "wheelset_lateral"), (kind, "contact")}  # both push the wheelset aside
     if system in ("vehicle", "wheelset") and at.startswith(SUSPENSIONS):
         if kind == "viscous_damping":
-            found.add(("damping_change", at))  # the damper with more of it
+            found.add(("damping_change", at))  # the same as a stronger damper
         whole = not item.parameters.get("t0")
         if kind == "damping_change" and whole and float(item.parameters["change"]) > 0:  # type: ignore[arg-type]
             found |= other_names(system, Item("viscous_damping", at))
     if system == "rig" and kind.startswith("parameter_") and at in ("mu0", "N"):
-        found |= {(kind, "mu0"), (kind, "N")}  # nearly: Polach's force depends on their product
+        found |= {(kind, "mu0"), (kind, "N")}  # nearly the same: Polach's force depends on their product
     if system == "wheelset" and kind.startswith("parameter_"):
         if at == "friction_condition":
-            found.add((kind, "mu0"))  # the member that changes most
+            found.add((kind, "mu0"))  # the parameter of the group that changes most
         if at in FRICTION:
-            found.add((kind, "friction_condition"))  # the group that it belongs to
+            found.add((kind, "friction_condition"))  # the group of the parameter
     return found
 
 
 def named(truth: Truth, names: Iterable[Pair]) -> list[bool]:
-    """Of each effect that was there, whether it is among the names."""
+    """For each true effect, whether it is among the names."""
     said = set(names)
     return [bool(other_names(truth.system, item) & said) for item in truth.items]
 
 
 def judged(truth: Truth, a: Answer) -> str:
-    """One word on an answer: right, part, abstained, wrong or failed.
+    """The grade of an answer: right, part, abstained, wrong or failed.
 
-    part: the effect with one too many, or one of two; abstained: nothing named, nothing wrongly (or for a
-    record that cannot show its effect, right); wrong: something named that was not there.
+    part: the true effect with an additional one, or one of two true effects; abstained: no effect was named,
+    which is right if the record cannot show its effect; wrong: an effect was named that is not true.
     """
     if a.failure:
         return "failed"

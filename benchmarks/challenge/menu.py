@@ -1,8 +1,8 @@
-"""What can be the matter with each system: kinds, locations and spreads of sizes.
+"""The effects that the challenge draws for each system: kinds, locations and ranges of their sizes.
 
-Left out is what makes no sense: forces at the rig's contact (inside a pair that rolls together they show in
-nothing), forces between the vehicle's bodies and the ground other than pushes, static forces on a vehicle
-that only accelerometers and gyros see.
+Effects without a meaning are left out: forces at the contact of the rig, which show in no output while wheel
+and roller roll together; forces between the vehicle's bodies and the ground other than excitations; static
+forces on a vehicle that is measured by accelerometers and gyroscopes only.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from benchmarks.challenge.sizes import (
 )
 
 CORNERS = ("fl", "fr", "rl", "rr")
-T0 = flat(8.0, 28.0)  # s, within the part that is fitted
+T0 = flat(8.0, 28.0)  # s, onset time within the part to identify
 SECONDARY = ("secondary", *(f"secondary_{c}" for c in CORNERS))
 PRIMARY = ("primary", *(f"primary_{c}" for c in CORNERS))
 ANY = (*SECONDARY, *PRIMARY)
@@ -37,7 +37,7 @@ BODIES = ("wheelset_lateral", "suspended_mass")
 
 @dataclass(frozen=True)
 class Entry:
-    """A kind with the locations at which these sizes are usual."""
+    """A kind of effect with its possible locations and a function that draws its parameters."""
 
     kind: str
     locations: Sequence[str]
@@ -46,13 +46,13 @@ class Entry:
 
 
 def entry(kind: str, locations: str | Sequence[str], **ranges: Draw) -> Entry:
-    """An entry whose parameters are drawn each on its own."""
+    """An entry whose parameters are drawn independently."""
     at = (locations,) if isinstance(locations, str) else locations
     return Entry(kind, at, lambda rng: drawn(ranges, rng))
 
 
 def waves(kind: str, locations: Sequence[str], low: float, high: float, **more: Draw) -> Entry:
-    """An entry with a sine and a cosine part."""
+    """An entry with a sine and a cosine coefficient of random phase."""
     return Entry(kind, locations, wave(low, high, **more))
 
 
@@ -91,7 +91,7 @@ VEHICLE = (
         "stribeck_friction", ANY, F_c=log(30, 300), F_b=log(100, 900), v_b=log(0.005, 0.03), v_s=one_of(1e-3)
     ),
     entry("viscous_damping", CORNER, c=log(500, 12e3)),
-    entry("viscous_damping", "secondary", c=log(9e3, 3e4)),  # more than the calibration of b1 takes up
+    entry("viscous_damping", "secondary", c=log(9e3, 3e4)),  # more than the calibration of b1 can explain
     entry("viscous_damping", "primary", c=log(5e3, 2e4)),
     entry("quadratic_damping", SECONDARY, c=log(1e4, 4e5)),
     entry("quadratic_damping", PRIMARY, c=log(2e4, 6e5)),
@@ -175,7 +175,7 @@ OUTPUTS = {
     "vehicle": ("z1_ddot", "phi_y1_dot", "phi_x1_dot", "z2_ddot", "phi_x2_dot", "z3_ddot", "phi_x3_dot"),
     "wheelset": ("y", "psi", "y_dot", "psi_dot"),
 }
-FAULTS = (  # bias, and drift by the end of the record, in multiples of the noise
+FAULTS = (  # bias, and drift at the end of the record, are in units of the noise
     entry("sensor_bias", "", bias=either(0.7, 50)),
     entry("sensor_gain", "", gain=either(0.003, 0.25)),
     entry("sensor_delay", "", delay=log(0.008, 0.1)),

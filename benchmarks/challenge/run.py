@@ -1,4 +1,4 @@
-"""The chain on each record, in a process of its own with a time limit; answers are kept one file a record."""
+"""Runs close-loop on each record in a separate process with a time limit; answers are kept in files."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ from benchmarks.challenge.make import make
 from benchmarks.challenge.truth import Truth
 
 Tell = Callable[[str], None]
-LAST = 400  # characters of a crash that are kept
-GLANCE = 0.5  # s, between looks at a process
+LAST = 400  # last characters of an error output that are kept
+GLANCE = 0.5  # s, polling interval of a process
 STOP = Event()
 Kept = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Challenge:
-    """A set of records in a folder: records, truth apart, and answers. limit: s a record."""
+    """A set in a folder, with subfolders for records, truths and answers; limit: time per record, s."""
 
     folder: Path
     seed: int
     limit: float = 1800.0
-    cores: int = 0  # of one record, 0: all
+    cores: int = 0  # processes per record, 0: all cores
     ablate: bool = False  # judge the fits of each record again by the policies of the ablation
 
     def truth(self, plan: Plan) -> Truth:
-        """The record's truth; both are made where they are not there yet."""
+        """The truth of a record; record and truth are made if they do not exist."""
         return make(plan, self.seed, self.folder / "records", self.folder / "truth")
 
     def one(self, plan: Plan) -> tuple[Truth, Kept]:
-        """The record's truth and answer."""
+        """Truth and answer of a record."""
         return self.truth(plan), self.answer(plan)
 
     def answer(self, plan: Plan) -> Kept:
-        """The record's answer: what was kept, or the chain's, or how it failed."""
+        """The answer to a record: the kept one, else that of close-loop, or the reason of its failure."""
         kept = self._kept(plan)
         if not kept.exists():
             kept.parent.mkdir(parents=True, exist_ok=True)
@@ -66,18 +66,18 @@ class Challenge:
         return self.folder / "answers" / f"{plan.name}.json"
 
     def command(self, record: Path, answer: Path) -> list[str]:
-        """What closes one record."""
+        """The command that closes one record."""
         own = [sys.executable, "-m", "benchmarks.challenge.answer"]
         return [*own, str(record), str(answer), str(self.cores), *(["ablate"] if self.ablate else [])]
 
 
 def closed(command: Sequence[str], answer: Path, limit: float, stop: Event = STOP) -> Kept:
-    """The answer that a command writes, or {"failure": why}, with the seconds that it took.
+    """The answer that a command writes, or {"failure": reason}, with its wall time in seconds.
 
-    Raises InterruptedError where `stop` is set meanwhile; nothing is kept then.
+    Raises InterruptedError if `stop` is set meanwhile; no answer is kept then.
     """
     begun = time.monotonic()
-    # a session of its own, so that workers end with it
+    # in a separate session, so that its worker processes can be ended together
     process = subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -94,7 +94,7 @@ def closed(command: Sequence[str], answer: Path, limit: float, stop: Event = STO
 
 
 def _waited(process: subprocess.Popen[str], until: float, stop: Event) -> str | None:
-    """What a process that failed said, "" where it went well, None where it took too long."""
+    """The error of a process, "" if it succeeded, None if it exceeded its time."""
     while time.monotonic() < until:
         if stop.is_set():
             raise InterruptedError("stopped")
@@ -109,7 +109,7 @@ def _waited(process: subprocess.Popen[str], until: float, stop: Event) -> str | 
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a process with all that it started."""
+    """End a process with all its child processes."""
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -120,7 +120,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 def run(
     challenge: Challenge, plans: Sequence[Plan], jobs: int, tell: Tell = print
 ) -> list[tuple[Truth, Kept]]:
-    """Truth and answer of each plan, in their order; goes on where it was interrupted."""
+    """Truth and answer of each plan, in their order; records with an answer are not closed again."""
     found: dict[int, tuple[Truth, Kept]] = {}
     with ThreadPoolExecutor(jobs) as pool:
         waiting = {pool.submit(challenge.one, plan): plan for plan in plans}

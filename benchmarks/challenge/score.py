@@ -1,4 +1,4 @@
-"""The scoreboard: counts over truths and answers."""
+"""The scoreboard: counts of the grades of answers, and figures of errors, intervals and times."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from benchmarks.challenge.truth import SHARES, Truth
 
 Marked = tuple[Truth, Answer]
 BINS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, inf)  # signal-to-noise ratio
-WIDTH = 1.96  # standard errors to either side: 95 %
+WIDTH = 1.96  # standard errors of a 95 % interval to either side
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the scoreboard: what, how many of how many, and what was asked for."""
+    """A line of the scoreboard: the quantity, its value and its target."""
 
     what: str
     value: str
@@ -32,7 +32,7 @@ class Row:
 
 
 def scoreboard(marked: Sequence[Marked]) -> list[Row]:
-    """All figures that can be given for these records."""
+    """All lines of the scoreboard that these records allow."""
     rows = [Row("records", str(len(marked)))]
     rows += false_finds(of(marked, "none"))
     rows += recognised(of(marked, "single"))
@@ -45,33 +45,33 @@ def scoreboard(marked: Sequence[Marked]) -> list[Row]:
 
 
 def of(marked: Sequence[Marked], group: str) -> list[Marked]:
-    """Those of a group."""
+    """The records of a group."""
     return [(t, a) for t, a in marked if t.group == group]
 
 
 def share(hits: int, total: int) -> str:
-    """So many of so many."""
+    """A count with its total and percentage, as text."""
     return f"{hits} of {total}" + (f" ({100 * hits / total:.0f} %)" if total else "")
 
 
 def count(marked: Sequence[Marked], *words: str) -> int:
-    """How many answers are judged so."""
+    """Number of answers with one of these grades."""
     return sum(judged(t, a) in words for t, a in marked)
 
 
 def false_finds(marked: Sequence[Marked]) -> list[Row]:
-    """Records without an effect that were given one, or called unexplained."""
+    """Records without an effect for which an effect was named, or whose verdict is unexplained."""
     if not marked:
         return []
     n = len(marked)
     return [
         Row("false finds: an effect named where there is none", share(count(marked, "wrong"), n), "2 of 100"),
-        Row("called unexplained where there is nothing", share(count(marked, "abstained"), n)),
+        Row("unexplained where there is no effect", share(count(marked, "abstained"), n)),
     ]
 
 
 def recognised(marked: Sequence[Marked]) -> list[Row]:
-    """Single effects right in kind and location, over the signal-to-noise ratio."""
+    """Single effects named with the right kind and location, by signal-to-noise ratio."""
     rows = []
     for low, high in pairwise(BINS):
         here = [(t, a) for t, a in marked if low <= t.largest_snr < high]
@@ -89,41 +89,41 @@ def recognised(marked: Sequence[Marked]) -> list[Row]:
         rows.append(Row("of these alone in the answer, not in a class", share(alone, len(clear))))
         rows.append(Row("of these first in the answer", share(top, len(clear))))
     if marked:
-        rows.append(Row("single effects given a wrong name", share(confident(marked), len(marked))))
+        rows.append(Row("single effects with a definite wrong name", share(confident(marked), len(marked))))
     return rows
 
 
 def confident(marked: Sequence[Marked]) -> int:
-    """Wrong names given without a doubt."""
+    """Number of wrong names that were given as definite, not as a class."""
     return sum(judged(t, a) == "wrong" and a.verdict in CONFIDENT for t, a in marked)
 
 
 def strangers(marked: Sequence[Marked]) -> list[Row]:
-    """Effects outside the vocabulary."""
+    """Mechanisms that are not in the library of effects."""
     if not marked:
         return []
     n = len(marked)
     quiet = sum(a.verdict in ("no_discrepancy", "insufficient_excitation") for _, a in marked)
     return [
-        Row("outside the vocabulary: wrong name without a doubt", share(confident(marked), n), "1 of 30"),
-        Row("outside, called by what is nearly the same", share(count(marked, "part"), n)),
-        Row("outside, unexplained", share(count(marked, "right"), n)),
-        Row("outside, taken for noise", share(quiet, n)),
+        Row("outside the vocabulary: definite wrong name", share(confident(marked), n), "1 of 30"),
+        Row("outside the vocabulary: nearly equivalent effect", share(count(marked, "part"), n)),
+        Row("outside the vocabulary: unexplained", share(count(marked, "right"), n)),
+        Row("outside the vocabulary: taken for noise", share(quiet, n)),
     ]
 
 
 def lookalikes(marked: Sequence[Marked]) -> list[Row]:
-    """Known confusions."""
+    """Effects that are known to be confused."""
     if not marked:
         return []
     return [
-        Row("confusable: true name given, alone or in its class", share(count(marked, "right"), len(marked))),
-        Row("confusable: wrong name without a doubt", share(confident(marked), len(marked))),
+        Row("confusable: true name given, alone or in a class", share(count(marked, "right"), len(marked))),
+        Row("confusable: definite wrong name", share(confident(marked), len(marked))),
     ]
 
 
 def sensors(marked: Sequence[Marked]) -> list[Row]:
-    """Sensor faults: called so, of the right sensor, and of the right kind."""
+    """Sensor faults: recognised as such at the right sensor, and with the right kind."""
     if not marked:
         return []
     n = len(marked)
@@ -131,13 +131,13 @@ def sensors(marked: Sequence[Marked]) -> list[Row]:
         a.verdict == "sensor_fault" and t.items[0].location in {p for _, p in a.names} for t, a in marked
     )
     return [
-        Row("sensor faults called so, of the right sensor", share(so, n), "18 of 20"),
+        Row("sensor faults recognised, at the right sensor", share(so, n), "18 of 20"),
         Row("sensor faults right in kind and sensor, alone or in a class", share(count(marked, "right"), n)),
     ]
 
 
 def doubles(marked: Sequence[Marked]) -> list[Row]:
-    """Two effects at once."""
+    """Records with two effects."""
     if not marked:
         return []
     both = [(t, a) for t, a in marked if min(t.each, default=0.0) >= 1]
@@ -149,7 +149,7 @@ def doubles(marked: Sequence[Marked]) -> list[Row]:
 
 
 def closed(a: Answer) -> float:
-    """Share of the gap closed on the output that missed its noise by most before, nan without one."""
+    """Share of the gap closed on the output with the largest error before over its noise; nan if none."""
     missed = {o: e["before"] / e["noise"] for o, e in a.error.items() if o in a.gap_closed and e["noise"]}
     if not missed or max(missed.values()) <= 1:
         return float("nan")
@@ -157,18 +157,18 @@ def closed(a: Answer) -> float:
 
 
 def gaps(marked: Sequence[Marked]) -> list[Row]:
-    """How far the named effects bring the error down to the noise."""
+    """How much of the gap between error and noise the named effects close."""
     shares = [closed(a) for t, a in marked if t.group != "none" and a.names and t.largest_snr >= 1]
     found = [s for s in shares if isfinite(s)]
     return (
-        [Row("gap closed where something is named, median", f"{np.median(found):.1%}", "95 %")]
+        [Row("gap closed where an effect is named, median", f"{np.median(found):.1%}", "95 %")]
         if found
         else []
     )
 
 
 def intervals(t: Truth, a: Answer) -> list[tuple[str, float]]:
-    """Error over standard error of each parameter of the effects that are named as they were, by name."""
+    """Error over standard error of each parameter of the rightly named effects, by name."""
     found = []
     for item in t.items:
         for e in a.effects:
@@ -182,7 +182,7 @@ def intervals(t: Truth, a: Answer) -> list[tuple[str, float]]:
 
 
 def coverage(marked: Sequence[Marked]) -> list[Row]:
-    """How often the 95 % interval of a parameter holds the true one, where the effect was named rightly."""
+    """How often the 95 % interval of a parameter contains its true value, for rightly named effects."""
     good = [(t, a) for t, a in marked if judged(t, a) in ("right", "part") and len(a.names) <= len(t.items)]
     misses = [z for t, a in good for _, z in intervals(t, a)]
     if not misses:
@@ -190,7 +190,7 @@ def coverage(marked: Sequence[Marked]) -> list[Row]:
     inside = sum(abs(z) <= WIDTH for z in misses)
     return [
         Row(
-            "95 % intervals of effects' parameters that hold the true value",
+            "95 % intervals of effects' parameters that contain the true value",
             share(inside, len(misses)),
             "88 to 99 %",
         )
@@ -198,7 +198,7 @@ def coverage(marked: Sequence[Marked]) -> list[Row]:
 
 
 def times(marked: Sequence[Marked]) -> list[Row]:
-    """Wall and processor time, and what failed."""
+    """Wall time, processor time and failures."""
     rows = []
     for what, values in (
         ("wall time", [a.seconds for _, a in marked]),
@@ -209,14 +209,17 @@ def times(marked: Sequence[Marked]) -> list[Row]:
             target = "60 s on two cores" if what == "wall time" else ""
             rows.append(
                 Row(
-                    f"{what} a record: median, 90 %, longest", f"{q[0]:.0f}, {q[1]:.0f}, {q[2]:.0f} s", target
+                    f"{what} per record: median, 90 %, longest",
+                    f"{q[0]:.0f}, {q[1]:.0f}, {q[2]:.0f} s",
+                    target,
                 )
             )
     splits = [a.split for _, a in marked if a.split]
     if splits:
         stages = dict.fromkeys(stage for split in splits for stage in split)
         mean = {stage: sum(split.get(stage, 0.0) for split in splits) / len(splits) for stage in stages}
-        rows.append(Row("of it on average", ", ".join(f"{stage} {s:.1f} s" for stage, s in mean.items())))
+        steps = ", ".join(f"{stage} {s:.1f} s" for stage, s in mean.items())
+        rows.append(Row("mean wall time of the steps", steps))
     rows.append(
         Row("no answer (crash or time limit)", share(sum(bool(a.failure) for _, a in marked), len(marked)))
     )
@@ -224,7 +227,7 @@ def times(marked: Sequence[Marked]) -> list[Row]:
 
 
 def failures(marked: Sequence[Marked]) -> list[Marked]:
-    """All whose answer is not right, in the order of groups and ratios; those too small to see left out."""
+    """Records whose answer is not right, by group and signal-to-noise ratio, without invisible effects."""
     wrong = [
         (t, a)
         for t, a in marked

@@ -1,4 +1,4 @@
-"""Mechanisms outside the vocabulary, and pairs of effects that are known to be taken for each other."""
+"""Mechanisms that are not in the library of effects, and effects that are known to be confused."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from benchmarks.challenge.sizes import (
 
 
 def bursts(low: float, high: float, v_s: float) -> Callable[[np.random.Generator], dict[str, Any]]:
-    """Dry friction that grips for 0.5 to 4 s, at random, through 60 s."""
+    """Dry friction that acts in random intervals of 0.5 to 4 s during 60 s."""
 
     def of(rng: np.random.Generator) -> dict[str, Any]:
         times, now = [], rng.uniform(1, 5)
@@ -40,7 +40,7 @@ def bursts(low: float, high: float, v_s: float) -> Callable[[np.random.Generator
 
 
 def kinks(low: float, high: float, speed: float) -> Callable[[np.random.Generator], dict[str, Any]]:
-    """Six to twelve kinks of one depth [m] along 60 s at about `speed` [m/s]."""
+    """Six to twelve rail kinks of the same depth [m] along 60 s at about `speed` [m/s]."""
 
     def of(rng: np.random.Generator) -> dict[str, Any]:
         where = sorted(round(float(s), 2) for s in rng.uniform(60, 55 * speed, rng.integers(6, 13)))
@@ -50,7 +50,7 @@ def kinks(low: float, high: float, speed: float) -> Callable[[np.random.Generato
 
 
 def linked(source: str, target: str, **ranges: Draw) -> Entry:
-    """Motion at the source pulls at the target."""
+    """A force at the target that depends on the motion at the source."""
     return Entry("cross_coupling", (target,), lambda rng: {"source": source, **drawn(ranges, rng)})
 
 
@@ -107,7 +107,7 @@ OUTSIDE: Mapping[str, tuple[Entry, ...]] = {
 
 @dataclass(frozen=True)
 class Confusable:
-    """An effect under conditions that hide which it is; conditions: see rig.py; quiet: see Truth."""
+    """An effect in a record that hardly identifies it; conditions: see `rig_bench`; quiet: see Truth."""
 
     system: str
     entry: Entry
@@ -121,7 +121,7 @@ ONE_SPEED = "one speed: Coulomb, constant, viscous or quadratic"
 RADIUS = "wheel RADIUS or gain of a speed sensor"
 MASS = "MASS or stiffness and damping together"
 LATE = "delay or damping"
-# both ways round
+# every pair is drawn with either effect as the true one
 CONFUSABLE: tuple[Confusable, ...] = (
     Confusable("rig", entry("coulomb_friction", SHAFTS, F_c=log(4, 40), v_s=one_of(0.05)), note=NO_REVERSAL),
     Confusable("rig", entry("constant_force", SHAFTS, F_0=log(4, 40)), note=NO_REVERSAL),

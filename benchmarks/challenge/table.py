@@ -9,26 +9,27 @@ from benchmarks.challenge.score import Marked, failures, scoreboard
 
 
 def text(marked: Sequence[Marked], seed: int, count: int) -> str:
-    """For a terminal."""
+    """The scoreboard for a terminal."""
     rows = scoreboard(marked)
     wide = max(len(r.what) for r in rows)
     lines = [f"challenge of {count} records, seed {seed}", ""]
-    lines += [f"{r.what:<{wide}}  {r.value}" + (f"   (asked: {r.target})" if r.target else "") for r in rows]
+    lines += [f"{r.what:<{wide}}  {r.value}" + (f"   (target: {r.target})" if r.target else "") for r in rows]
     lost = failures(marked)
     if lost:
-        lines += ["", "not right:"]
+        lines += ["", "answers that are not right:"]
         lines += [" | ".join(line) for line in map(_line, lost)]
     return "\n".join(lines)
 
 
 def markdown(marked: Sequence[Marked], seed: int, count: int, every: bool = False) -> str:
-    """For the documentation; every: all records, not only those that are not right."""
-    lines = [f"Seed {seed}, {len(marked)} of {count} records.", "", "| | found | asked |", "|---|---|---|"]
+    """The scoreboard for the documentation; every: whether all records are listed, or those not right."""
+    lines = [f"Seed {seed}, {len(marked)} of {count} records.", "", "| | found | target |", "|---|---|---|"]
     lines += [f"| {r.what} | {r.value} | {r.target} |" for r in scoreboard(marked)]
     listed = sorted(marked, key=lambda m: m[0].name) if every else failures(marked)
     if listed:
-        head = "| record | group | truth | SNR | judged | answer | s |"
-        lines += ["", "All:" if every else "Not right:", "", head, "|---|---|---|---|---|---|---|"]
+        head = "| record | group | truth | SNR | grade | answer | s |"
+        lines += ["", "All records:" if every else "Answers that are not right:", "", head]
+        lines.append("|---|---|---|---|---|---|---|")
         lines += ["| " + " | ".join(_line(m)) + " |" for m in listed]
     return "\n".join(lines) + "\n"
 

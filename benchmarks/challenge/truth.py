@@ -1,4 +1,4 @@
-"""What a record of the challenge was made with: kept in a file apart from the record."""
+"""The truth of a record of the challenge, which is kept in a separate file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from estimator.sensor_faults import FAULTS
 Pair = tuple[str, str]  # kind, location
 Scalars = Mapping[str, float | list[float] | str]
 
-# group: share of the set in 240
+# number of records of each group in a set of 240
 SHARES = {"none": 100, "single": 60, "outside": 30, "confusable": 20, "sensor": 20, "double": 10}
 SYSTEMS = ("rig", "vehicle", "wheelset")
 
@@ -32,17 +32,17 @@ class Item:
 
     @property
     def is_fault(self) -> bool:
-        """A fault of a sensor."""
+        """Whether it is a sensor fault."""
         return self.kind in FAULTS
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Truth of one record.
+    """The truth of one record.
 
-    items: the effects, none of a record without; snr: rms change of each output by them over its noise;
-    near: pairs that are nearly what happened, where it is outside the vocabulary; quiet: whether
-    no_discrepancy is a right answer, since the data cannot show the effect.
+    items: its effects, possibly none; snr: rms change of each output by the effects over its noise; near:
+    kind and location of effects that are nearly equivalent, if the true one is not in the library; quiet:
+    whether no_discrepancy is a right answer because the data cannot show the effect.
     """
 
     name: str
@@ -55,20 +55,20 @@ class Truth:
     near: tuple[Pair, ...] = ()
     quiet: bool = False
     note: str = ""
-    each: tuple[float, ...] = ()  # of several effects, the largest ratio of each alone
+    each: tuple[float, ...] = ()  # for several effects, the largest signal-to-noise ratio of each alone
 
     @property
     def largest_snr(self) -> float:
-        """The largest of the outputs' ratios, 0 without an effect."""
+        """The largest signal-to-noise ratio of an output, 0 without an effect."""
         return max(self.snr.values(), default=0.0)
 
     @property
     def label(self) -> str:
-        """kind@location of each, joined."""
+        """kind@location of each effect, joined."""
         return " + ".join(f"{i.kind}@{i.location}" for i in self.items) or "none"
 
     def write(self, path: Path) -> None:
-        """Write as JSON, whole or not at all."""
+        """Write as JSON, by a temporary file so that the file is always complete."""
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_suffix(".part")
         part.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
@@ -76,7 +76,7 @@ class Truth:
 
     @classmethod
     def read(cls, path: Path) -> Truth:
-        """Read what `write` wrote."""
+        """Read a truth written by `write`."""
         d = json.loads(path.read_text(encoding="utf-8"))
         items = tuple(Item(**i) for i in d.pop("items"))
         near = tuple((k, p) for k, p in d.pop("near"))

@@ -1,1 +1,1 @@
-"""Closing the loop on public measured benchmarks, each with a base FMU that lacks the effect."""
+"""Close-loop on public measured benchmarks, each with an FMU that lacks a known effect."""

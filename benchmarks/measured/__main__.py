@@ -1,7 +1,7 @@
-"""Close the loop on the measured benchmarks whose data are at hand, and tabulate.
+"""Close the loop on the measured benchmarks whose data are available, and print a table of the results.
 
-Run: python -m benchmarks.measured DATA_FOLDER --out DIR [--only NAME ...]. Exit 0 done, 1 where an effect was
-misnamed or an error is above its target, 2 for bad input.
+Run: python -m benchmarks.measured DATA_FOLDER --out DIR [--only NAME ...]. The exit code is 0 if done, 1 if
+an effect was misnamed or an error is above its target, 2 for bad input.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from scenarios import close_loop
 
 
 def benchmarks_here() -> dict[str, Benchmark]:
-    """All measured benchmarks by name, most important first: each module of this package may have one."""
+    """All measured benchmarks by name, most important first; every module of this package may define one."""
     package = benchmarks.measured
     names = [m.name for m in iter_modules(package.__path__) if not m.name.startswith("_")]
     found = [vars(import_module(f"{package.__name__}.{name}")).get("BENCHMARK") for name in names]
@@ -30,7 +30,7 @@ def benchmarks_here() -> dict[str, Benchmark]:
 
 
 def measure(benchmark: Benchmark, data: Path, out: Path) -> Outcome:
-    """Prepare a benchmark in `out`/NAME and close the loop on it, in this process alone."""
+    """Prepare a benchmark in `out`/NAME and close the loop on it in one process."""
     work = out / benchmark.name
     begun = time.process_time()
 
@@ -44,7 +44,7 @@ def measure(benchmark: Benchmark, data: Path, out: Path) -> Outcome:
 
 
 def chosen(names: Sequence[str]) -> list[Benchmark]:
-    """Benchmarks by name, all where none is named; BadInput for a name that is not known."""
+    """Benchmarks by name, all if none is given; raises BadInput for an unknown name."""
     known = benchmarks_here()
     for name in names:
         if name not in known:
@@ -53,9 +53,9 @@ def chosen(names: Sequence[str]) -> list[Benchmark]:
 
 
 def run(data: Path, out: Path, names: Sequence[str]) -> list[Outcome]:
-    """Close the loop on the benchmarks chosen whose data are there; writes table.md and table.json.
+    """Close the loop on the chosen benchmarks whose data are available; writes table.md and table.json.
 
-    BadInput where there are none, or where one that is named has no data.
+    Raises BadInput if there are none, or if a named one has no data.
     """
     wanted = chosen(names)
     here = [b for b in wanted if names or not b.missing_files(data)]
@@ -71,13 +71,13 @@ def run(data: Path, out: Path, names: Sequence[str]) -> list[Outcome]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command; its exit code."""
+    """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.measured", description=__doc__)
     parser.add_argument("data", type=Path, help="folder with the CSV files of the benchmarks")
     parser.add_argument(
         "--out", type=Path, required=True, help="folder for experiments, results and the table"
     )
-    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these benchmarks alone")
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="benchmarks to run")
     given = parser.parse_args(arguments)
     try:
         outcomes = run(given.data, given.out, given.only)

@@ -1,4 +1,4 @@
-"""What a measured benchmark is: a base model without the effect, an experiment, and where its data lie."""
+"""A measured benchmark: a model without the effect, an experiment file, and the conversion of its data."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from fmus.export.builders.native.build import build_native
 from fmus.model import Model
 
 Array = NDArray[np.float64]
-Columns = Mapping[str, Array]  # of a data file, by name, (N,) each
+Columns = Mapping[str, Array]  # columns of a data file by name, (N,) each
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """A measured record with a model of a few lines that knows nothing of what the record shows.
+    """A measured record with a small model that lacks an effect of the record.
 
-    model: the base; it is used through its FMU alone. declaration: the experiment.toml; files: of the data
-    folder, with what makes the columns that the experiment names from those there. missing: what the
-    literature says that the base lacks; known: the effects (kind, location) of the library that stand for it;
-    target: the largest error after, by output, in the FMU's unit, where one was set. rank: of importance.
+    model: the model, which is used as an FMU only; declaration: the experiment.toml; files: data files with
+    the functions that convert their columns; missing: the missing effect according to the literature; known:
+    kind and location of the library's effects that describe it; target: largest error after by output, in the
+    FMU's unit, if one is set; rank: order by importance.
     """
 
     name: str
@@ -42,9 +42,9 @@ class Benchmark:
         return [name for name in self.files if not (data / name).is_file()]
 
     def prepare(self, data: Path, work: Path) -> Path:
-        """Write base FMU, experiment.toml and converted data into a folder; the path of the experiment.
+        """Write FMU, experiment.toml and converted data into a folder; returns the path of the experiment.
 
-        Raises BadInput where the data folder lacks a file.
+        Raises BadInput if a file is missing in the data folder.
         """
         absent = self.missing_files(data)
         if absent:
@@ -60,16 +60,16 @@ class Benchmark:
 
 
 def columns(file: Path) -> Columns:
-    """The columns of a CSV file with names in line 1, (N,) each."""
+    """The columns of a CSV file with names in its first line, (N,) each."""
     table = pd.read_csv(file)
     return {str(name): table[name].to_numpy(float) for name in table}
 
 
 def of_held(name: str) -> Callable[[Columns], Columns]:
-    """Makes of a column that is held from sample to sample the samples of its staircase.
+    """A conversion of a column that was held constant from sample to sample.
 
-    At a jump that is the mean of both sides. The means of neighbours, which act over a step, are then
-    centred on what was held; as they are they would come half a step early.
+    Each sample becomes the mean of its value and the one before. An input acts over a step with the mean of
+    its ends, so that unconverted samples would act half a step too early.
     """
 
     def convert(data: Columns) -> Columns:

@@ -1,4 +1,4 @@
-"""Coupled electric drives: two motors drive a pulley by a belt on springs; here without dry friction."""
+"""Coupled electric drives: two motors drive a pulley by an elastic belt; the model lacks dry friction."""
 
 from math import pi
 from pathlib import Path
@@ -14,15 +14,16 @@ from fmus.variables import (
     State,
 )
 
-STILL = 1e-3  # speed at which the magnitude is rounded, well below the counter's step
+STILL = 1e-3  # speed below which the magnitude is rounded, well below the resolution of the counter
 
 
 class ElectricDrives(Model):
-    """Speeds omega_m of the motors and omega of the pulley, which a belt couples by its stretch.
+    """Two inertias, the motors (speed omega_m) and the pulley (speed omega), coupled by an elastic belt.
 
     omega_m' = (gain v - omega_m) / tau - share w² twist + T_m, omega' = w² twist - d omega + T,
-    twist' = omega_m - omega, w = 2 pi f: both sides over their inertia. tau_e v' = u - v is the motors'
-    current. The pulley's sensor counts pulses, for a while of tau_s: it sees the magnitude alone.
+    twist' = omega_m - omega, w = 2 pi f, each divided by its inertia. tau_e v' = u - v describes the current
+    of the motors. The sensor of the pulley counts pulses over a time of about tau_s and measures only the
+    magnitude of the speed.
     """
 
     name = "ElectricDrives"
@@ -68,7 +69,7 @@ BENCHMARK = Benchmark(
     declaration=Path(__file__).with_suffix(".toml"),
     files=dict.fromkeys(("ced_prbs1.csv", "ced_prbs3.csv"), of_held("motor_voltage_sum_V")),
     missing="dry friction of the drives",
-    # hysteresis that slips within a small part of the motion is dry friction (Dahl's)
+    # hysteresis that slips after a small part of the motion is dry friction (Dahl's model)
     known=frozenset(
         (kind, at)
         for kind in ("coulomb_friction", "stribeck_friction", "hysteresis")

@@ -1,4 +1,4 @@
-"""EMPS: a carriage on a line moved by a motor; here with viscous friction only (fmus.drive)."""
+"""EMPS: a linear drive with a motor and a carriage; the model (fmus.drive) has viscous friction only."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What closing the loop made of a measured benchmark, and the table of all."""
+"""The result of close-loop on a measured benchmark, and the table of all results."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -14,7 +14,7 @@ HEAD = ("benchmark", "output", *ERRORS, "target", "verdict", "found", "answer", 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A benchmark's result beside what is known of it; seconds: of this process's own work."""
+    """The result of a benchmark with what the literature knows; seconds: processor time."""
 
     benchmark: Benchmark
     result: Result
@@ -22,12 +22,12 @@ class Outcome:
 
     @property
     def named(self) -> set[tuple[str, str]]:
-        """Kind and location of the effects that were given a name."""
+        """Kind and location of the effects in the answer."""
         return {(e.kind, e.location) for e in self.result.effects}
 
     @property
     def answer(self) -> Answer:
-        """What the finding is worth: only names that the literature gives count, and no name is no error."""
+        """The grade of the answer: only effects known from the literature are right; no name is no error."""
         if not self.named:
             return "left open"
         if not self.named & self.benchmark.known:
@@ -42,7 +42,7 @@ class Outcome:
         return [o for o, most in self.benchmark.target.items() if self.result.error[o]["after"] > most]
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Lines of the table, one an output."""
+        """Lines of the table, one per output."""
         found = ", ".join(f"{k} at {at}" for k, at in sorted(self.named)) or "none"
         return [
             (
@@ -59,7 +59,7 @@ class Outcome:
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The result with what is known."""
+        """The result with what the literature knows, for JSON."""
         b = self.benchmark
         about = {"missing": b.missing, "source": b.source, "target": dict(b.target), "answer": self.answer}
         return {**about, "cpu_seconds": round(self.seconds, 1), "result": asdict(self.result)}

@@ -1,4 +1,4 @@
-"""A wheel drive of a robot under a speed controller without integral part; here without dry friction."""
+"""A wheel drive of a robot with a speed controller without integral part; the model lacks dry friction."""
 
 from pathlib import Path
 
@@ -15,10 +15,11 @@ from fmus.variables import (
 
 
 class WheelDrive(Model):
-    """omega_dot = K (omega_set(t - T) - omega) - b omega + F_ext, over an inertia that nothing here tells.
+    """omega_dot = K (omega_set(t - T) - omega) - b omega + F_ext; all terms are divided by the inertia.
 
-    T is the dead time of bus and controller, by Padé's approximation [5/6] as in `fmus.effects.input_delay`;
-    s_1 is the set speed through its denominator, s_2 to s_6 the derivatives of s_1 by t/T.
+    The inertia is unknown. T is the dead time of bus and controller, by Padé's approximation [5/6] as in
+    `fmus.effects.input_delay`; s_1 is the set speed filtered by its denominator, s_2 to s_6 are the
+    derivatives of s_1 with respect to t/T.
     """
 
     name = "WheelDrive"

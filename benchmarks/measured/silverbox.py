@@ -1,4 +1,4 @@
-"""Silverbox: a circuit that behaves as a mass on a hardening spring; here without the hardening."""
+"""Silverbox: a circuit that behaves as a mass on a hardening spring; the model has a linear spring."""
 
 from math import pi
 from pathlib import Path
@@ -15,9 +15,9 @@ from fmus.variables import (
     rate,
 )
 
-BAND = 250.0  # Hz; the excitation ends at 200 Hz, and what is above is not raised further
-IDENTIFIED = 10000  # samples of the multisines, one period and more: the test record is kept whole
-MIRRORED = 2000  # samples before and after, since a filter in the frequency domain takes a record as a loop
+BAND = 250.0  # Hz; the correction is constant above this, the excitation ends at 200 Hz
+IDENTIFIED = 10000  # samples of the multisines that are used, more than one period
+MIRRORED = 2000  # samples that are mirrored at both ends, since the spectral filter assumes a periodic record
 
 
 class Oscillator(Model):
@@ -44,10 +44,11 @@ class Oscillator(Model):
 
 
 def through_means(u: Array, dt: float) -> Array:
-    """Samples (N,) that move a mass as the band-limited force with samples u does, exactly at the samples.
+    """Samples (N,) with which a mass moves, at the samples, as with the band-limited force with samples u.
 
-    Over a step an input acts with the mean of its ends. A mass then moves by (x / tan x)² of what it should,
-    x = pi f dt: by 0.39 at 200 Hz here. What is taken there is given here; no phase is lost.
+    An input acts over a step with the mean of its ends. A mass then moves by (x / tan x)² of the right
+    amount, x = pi f dt, which is 0.39 at 200 Hz here. The force is divided by this factor, which is real, so
+    that phases are kept.
     """
     ends = 2 * u[0] - u[MIRRORED:0:-1], 2 * u[-1] - u[-2 : -MIRRORED - 2 : -1]
     spectrum = np.fft.rfft(np.concatenate([ends[0], u, ends[1]]))
@@ -59,13 +60,13 @@ def through_means(u: Array, dt: float) -> Array:
 
 
 def convert(data: Columns) -> Columns:
-    """The force as it must be given to act as it was measured; the position untouched."""
+    """The force corrected for the averaging of inputs over a step; the position is unchanged."""
     dt = float(np.median(np.diff(data["time_s"])))
     return {**data, "force_V": through_means(data["force_V"], dt)}
 
 
 def convert_identify(data: Columns) -> Columns:
-    """The same of the record to identify, its first part: each fit simulates it dozens of times."""
+    """The same for the first part of the record to identify, since each fit simulates it many times."""
     return {name: column[:IDENTIFIED] for name, column in convert(data).items()}
 
 

@@ -1,4 +1,4 @@
-"""Cascaded tanks: a pump fills the upper one, which runs into the lower one; here they never overflow."""
+"""Cascaded tanks: a pump fills the upper tank, which drains into the lower one; the model lacks overflow."""
 
 from pathlib import Path
 
@@ -15,17 +15,17 @@ from fmus.variables import (
     rate,
 )
 
-CLOCK = 1e-3  # ks a second: laws around an FMU are worked out each thousandth of its unit of time
-EMPTY = 1e-6  # V, a level below which nothing runs out
+CLOCK = 1e-3  # ks per second; laws around an FMU are integrated with a thousandth of its unit of time
+EMPTY = 1e-6  # V, level below which the outflow is zero
 
 
 class Tanks(Model):
     """x_1' = c max(u + u_0, 0) - Q_1 + F_1 + F_12, x_2' = Q_1 - Q_2 + F_2 - F_12, Q = k sqrt(x).
 
-    Two tanks and outlets alike. Levels in volts of the sensor, both on one scale, and time in ks. A port is a
-    flow: into either tank from outside, or into the upper out of the lower one beside the pipe. The pump does
-    not suck. Of the upper tank, which nothing measures, the state is the rise since the start; the level
-    there is a parameter, since both records are taken to begin with the same one.
+    Both tanks and outlets are equal. Levels are in volts of the sensor and time is in ks. The ports are
+    flows: into either tank from outside, and from the lower into the upper tank. The pump cannot reverse. The
+    level of the upper tank is not measured; its state is the rise since the start, and its level at the start
+    is a parameter, because both records are assumed to start with the same level.
     """
 
     name = "Tanks"

@@ -408,19 +408,19 @@ def test_counts_are_those_of_the_judgements():
         ]
     )
     assert found["false finds: an effect named where there is none"] == "1 of 3 (33 %)"
-    assert found["called unexplained where there is nothing"] == "1 of 3 (33 %)"
+    assert found["unexplained where there is no effect"] == "1 of 3 (33 %)"
     assert found["single effects right, SNR 0.3 to 1"] == "0 of 1 (0 %)"
     assert found["single effects right, SNR 30 and more"] == "1 of 2 (50 %)"
     assert found["single effects right, SNR 1 and more"] == "2 of 3 (67 %)"
     assert found["of these alone in the answer, not in a class"] == "1 of 3 (33 %)"
     assert found["of these first in the answer"] == "1 of 3 (33 %)"
-    assert found["single effects given a wrong name"] == "1 of 4 (25 %)"
-    assert found["outside the vocabulary: wrong name without a doubt"] == "1 of 2 (50 %)"
-    assert found["sensor faults called so, of the right sensor"] == "1 of 2 (50 %)"
+    assert found["single effects with a definite wrong name"] == "1 of 4 (25 %)"
+    assert found["outside the vocabulary: definite wrong name"] == "1 of 2 (50 %)"
+    assert found["sensor faults recognised, at the right sensor"] == "1 of 2 (50 %)"
     assert found["sensor faults right in kind and sensor, alone or in a class"] == "0 of 2 (0 %)"
     assert found["two of SNR 1 and more each, both named"] == "1 of 1 (100 %)"
-    assert found["gap closed where something is named, median"] == "98.0%"
-    assert found["wall time a record: median, 90 %, longest"] == "10, 10, 10 s"
+    assert found["gap closed where an effect is named, median"] == "98.0%"
+    assert found["wall time per record: median, 90 %, longest"] == "10, 10, 10 s"
 
 
 def test_intervals_cover_by_their_errors():
@@ -432,7 +432,8 @@ def test_intervals_cover_by_their_errors():
     marked.append((truth("single", ROLLER), answer("traced", OTHER, c=[9.0, 0.01])))
     marked.append((truth("single", ROLLER), answer("traced", ROLLER.pair, c=[9.0, float("inf")])))
     assert (
-        figures(marked)["95 % intervals of effects' parameters that hold the true value"] == "2 of 3 (67 %)"
+        figures(marked)["95 % intervals of effects' parameters that contain the true value"]
+        == "2 of 3 (67 %)"
     )
 
 
@@ -442,7 +443,7 @@ def test_standard_errors_that_are_right_cover_95_percent():
         (truth("single", ROLLER), answer("traced", ROLLER.pair, c=[0.3 + 0.02 * rng.normal(), 0.02]))
         for _ in range(2000)
     ]
-    text_ = figures(marked)["95 % intervals of effects' parameters that hold the true value"]
+    text_ = figures(marked)["95 % intervals of effects' parameters that contain the true value"]
     assert_allclose(int(text_.split()[0]) / 2000, 0.95, atol=0.015)  # three standard errors
 
 
@@ -468,7 +469,7 @@ def test_the_split_of_the_time_is_the_mean_over_answers_that_tell_it():
         (truth("none"), Answer("no_discrepancy", split={"calibrate": 2.0, "pairs": 5.0})),
         (truth("none"), Answer(failure="time limit of 3 s", seconds=3.0)),
     ]
-    assert figures(marked)["of it on average"] == "calibrate 1.5 s, pairs 2.5 s"
+    assert figures(marked)["mean wall time of the steps"] == "calibrate 1.5 s, pairs 2.5 s"
 
 
 # running
