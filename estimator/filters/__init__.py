@@ -15,5 +15,5 @@ def filters() -> dict[str, type["Estimator"]]:
     """All filters by name. They are imported at the first call, because that takes about a second."""
     from estimator.filters.named import Estimator
 
-    # what is found is concrete
+    # the classes that are found are concrete
     return by_name(classes_in(sys.modules[__name__], Estimator), "name")  # type: ignore[type-abstract]

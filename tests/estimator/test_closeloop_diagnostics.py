@@ -116,9 +116,9 @@ def test_a_wave_of_the_stated_size_is_shown_in_every_phase(seed: int) -> None:
     rates = []
     for angle in np.linspace(0, np.pi, 7):
         record = (g / 2.0) @ (v.smallest * np.array([np.cos(angle), np.sin(angle)]))
-        noisy = record[:, None] + rng.standard_normal((M, 400))
+        noisy = record[:, None] + rng.standard_normal((M, 2000))
         rates.append(np.mean(np.abs(unit.T @ noisy).max(axis=0) > limit))
-    assert 0.72 < min(rates) < 0.9
+    assert 0.78 < min(rates) < 0.9  # 0.84 in the mean, which 2000 draws show to 0.01
     assert max(rates) > 0.95  # in phase with what shows most
 
 
