@@ -93,6 +93,7 @@ def test_a_sensor_fault_is_one_file(mine):
     assert float(size) == pytest.approx(0.5, abs=0.05)  # s/m, ten standard errors of the fit
 
 
+@pytest.mark.slow
 def test_a_sensor_fault_gets_its_tests_for_free(mine):
     mine.write(SQUARE_FILE, SQUARE)
     assert mine.passes("tests/estimator/test_sensor_faults.py", "-k", "square") >= 5

@@ -115,7 +115,13 @@ def mine(tmp_path):
     return Further(tmp_path)
 
 
-@pytest.mark.parametrize("package", [True, False], ids=["with __init__", "without __init__"])
+@pytest.mark.parametrize(
+    "package",
+    [
+        pytest.param(True, marks=pytest.mark.slow, id="with __init__"),
+        pytest.param(False, id="without __init__"),
+    ],
+)
 def test_a_model_is_one_file_with_or_without_a_package_around_it(mine, package):
     mine.write("fmus/pendulum/model.py", PENDULUM)
     if package:
@@ -130,6 +136,7 @@ def test_a_model_is_one_file_with_or_without_a_package_around_it(mine, package):
         assert pendulum["phi"] == pytest.approx(0.01 * np.cos(np.sqrt(9.81)), abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_model_gets_the_contract_tests_for_free(mine):
     mine.write("fmus/pendulum/model.py", PENDULUM)
     assert mine.passes("tests/contracts/test_models.py", "-k", "pendulum") >= 3
@@ -302,11 +309,10 @@ def test_an_effect_is_one_file(mine):
     assert found[1] - found[0] == pytest.approx(-1e9 * 0.1**5, rel=1e-9)
 
 
-SLOWER = (("effects", 5), ("effects_guesses", 2), ("effects_builds", 4))
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("file", "least"), [("effects_laws", 8), *(pytest.param(*p, marks=pytest.mark.slow) for p in SLOWER)]
+    ("file", "least"),
+    [("effects_laws", 8), ("effects", 5), ("effects_guesses", 2), ("effects_builds", 4)],
 )
 def test_an_effect_gets_the_contract_tests_for_free(mine, file, least):
     mine.write("fmus/effects/fifth_stiffness.py", FIFTH)
