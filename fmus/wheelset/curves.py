@@ -11,8 +11,6 @@ import casadi as cs
 import numpy as np
 
 from fmus.contact.arguments import Array
-from fmus.contact.geometry.table import SEARCHES, contact_table
-from fmus.contact.normal import hertz, virtual_penetration
 from fmus.variables import Expr
 from fmus.wheelset.track import Track
 
@@ -35,6 +33,8 @@ def contact_curves(track: Track) -> cs.Function:
     penetration, for LOAD, G and NU, and their geometric means over the USUAL shifts. Cubic B-splines, twice
     continuously differentiable. Beyond the table the last contact holds.
     """
+    from fmus.contact.geometry.table import SEARCHES  # loads SciPy and pandas, which other models do without
+
     curves = [_curves(track, search) for search in SEARCHES]
     return cs.Function.conditional("contact", curves[:-1], curves[-1])
 
@@ -74,6 +74,9 @@ def _spline_coefficients(rows: Array) -> Array:
 
 def _tabulated(track: Track, search: str) -> tuple[Array, Array]:
     """Shifts (n,), m, and FIELDS without the slope there (n, 7), of the left wheel."""
+    from fmus.contact.geometry.table import contact_table
+    from fmus.contact.normal import hertz, virtual_penetration
+
     where = {**asdict(track), "N": LOAD, "search": search, "E": E, "nu": NU}
     reach = contact_table(**where).index[-1]
     steps = int(reach / SPACING)

@@ -19,7 +19,6 @@ from fmus.contact.forces.conditions import CONDITIONS, PARAMETERS
 from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws import LAWS, law_codes, selected_law
 from fmus.contact.forces.laws.polach import Polach
-from fmus.contact.geometry.search import FLANGE_ANGLE
 from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.option import Choice
@@ -225,6 +224,8 @@ class Wheelset(Model):
 
     def outputs(m) -> dict[str, Expr]:
         """See Model.outputs."""
+        from fmus.contact.geometry.search import FLANGE_ANGLE  # loads SciPy, which other models do without
+
         found = {
             f"{name}_{side}": value
             for side, wheel in m._wheels.items()

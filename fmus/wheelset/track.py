@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fmus.contact.geometry.exact import exact_names
-from fmus.contact.geometry.measured import load_profile
-from fmus.contact.geometry.pair import TAPE, Pair
-from fmus.contact.geometry.search import check_touches
 from fmus.option import BuildOption, Choice, chosen
+
+if TYPE_CHECKING:
+    from fmus.contact.geometry.pair import Pair
 
 
 @dataclass(frozen=True)
@@ -35,6 +34,8 @@ class Track:
         given: values of OPTIONS by name, sizes as numbers or as fractions such as "1/20". BadInput tells what
         is wrong with a number, a name, a file or the pair.
         """
+        from fmus.contact.geometry.search import check_touches  # loads SciPy, as all of the geometry does
+
         values: Any = chosen("wheelset", OPTIONS, given)  # read as the types of the fields
         track = Track(**values)
         check_touches(track.pair)
@@ -43,18 +44,25 @@ class Track:
     @property
     def pair(self) -> Pair:
         """The profiles, read, and how they stand; BadInput tells what is wrong with them."""
+        from fmus.contact.geometry.measured import load_profile
+        from fmus.contact.geometry.pair import Pair
+
         wheel, rail = load_profile(self.wheel, "wheel"), load_profile(self.rail, "rail")
         return Pair(wheel, rail, self.cant, self.gauge, self.r0, self.back_to_back)
 
     @property
     def notes(self) -> list[str]:
         """How the point files were read: what was turned round, how they were smoothed."""
+        from fmus.contact.geometry.exact import exact_names
+
         pair, exact = self.pair, exact_names()
         return [f"{p.kind} {p.name}: {p.found}" for p in (pair.wheel, pair.rail) if p.name not in exact]
 
     @property
     def half_distance(self) -> float:
         """Half the distance of the tape circles, m."""
+        from fmus.contact.geometry.pair import TAPE
+
         return self.back_to_back / 2 + TAPE
 
     def __str__(self) -> str:

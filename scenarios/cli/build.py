@@ -48,10 +48,9 @@ def build(
 
 
 def _writer(kind: str, fmi: int, platforms: list[str], compiler: str | None) -> Callable[[Model, Path], Path]:
-    from fmus.export.builders.native.build import build_native
-    from fmus.export.builders.pythonfmu import build_python
-
     if kind == "native":
+        from fmus.export.builders.native.build import build_native
+
         return lambda model, out: build_native(model, out, fmi, platforms or ("host",), compiler)
     if kind != "python":
         raise BadInput(f"--kind {kind}: 'python' and 'native' are built")
@@ -59,4 +58,6 @@ def _writer(kind: str, fmi: int, platforms: list[str], compiler: str | None) -> 
         raise BadInput(f"--fmi {fmi}: PythonFMU builds are FMI 2; use --kind native")
     if platforms or compiler:
         raise BadInput("--platform and --compiler: of native builds; use --kind native")
+    from fmus.export.builders.pythonfmu import build_python
+
     return build_python

@@ -207,6 +207,22 @@ def test_help_loads_nothing_that_simulates(arguments, words):
     assert done.stderr == ""
 
 
+def test_the_help_of_a_command_loads_only_what_it_shows():
+    script = (
+        "import sys\n"
+        "from scenarios.cli.app import COMMANDS, run_safely\n"
+        "for name in sorted(COMMANDS, key='build'.__eq__):\n"
+        "    assert run_safely([name, '--help']) == 0\n"
+        f"    print(name, *(n for n in {HEAVY!r} if n in sys.modules), file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    loaded = {name: found for name, *found in map(str.split, done.stderr.splitlines())}
+    # the options of build are those of the models, whose equations are CasADi's
+    assert loaded.pop("build") == ["casadi", "numpy", "fmus.models"]
+    assert loaded == {name: [] for name in COMMANDS if name != "build"}
+
+
 def test_all_commands_are_listed_with_what_they_do():
     for name in COMMANDS:
         assert len(_told(name).split()) > 2, name
