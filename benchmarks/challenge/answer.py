@@ -16,7 +16,7 @@ from pathlib import Path
 from benchmarks.challenge.ablation import ablated
 from estimator.closeloop.checkpoints import Stages
 from estimator.plant import PLANTS
-from scenarios.closing.closing import Posed, builder_for, closed, experiment_of, pose
+from scenarios.closing.closing import Posed, closed, experiment_of
 
 
 def main() -> None:
@@ -25,8 +25,7 @@ def main() -> None:
     begun, kept = time.monotonic(), {}
     declared = experiment_of(record)
     with tempfile.TemporaryDirectory() as work:
-        builder = builder_for(declared, Path(work))
-        posed = Posed(declared, builder, pose(declared, builder))
+        posed = Posed.of(declared, Path(work))
         found, result = closed(posed, None, lambda _: None, cores or None, 0, begun, Stages())
         if "ablate" in sys.argv[4:]:
             kept["ablation"] = ablated(found)

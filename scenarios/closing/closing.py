@@ -61,8 +61,7 @@ def close_loop(
     begun = time.monotonic()
     declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
-        builder = builder_for(declared, Path(work))
-        posed = Posed(declared, builder, pose(declared, builder))
+        posed = Posed.of(declared, Path(work))
         folder = None if out is None else writable(Path(out))
         stages = stages_of(declared, folder, seed, resume)
         result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]
@@ -77,6 +76,12 @@ class Posed:
     declared: Experiment
     builder: Builder
     problem: Problem
+
+    @classmethod
+    def of(cls, declared: Experiment, work: Path) -> "Posed":
+        """The question of an experiment; work: folder for the builds of its FMU."""
+        builder = builder_for(declared, work)
+        return cls(declared, builder, pose(declared, builder))
 
 
 def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Experiment:

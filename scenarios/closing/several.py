@@ -18,10 +18,8 @@ from fmus.export.provenance import checksum
 from scenarios.closing.closing import (
     Posed,
     Tell,
-    builder_for,
     closed,
     experiment_of,
-    pose,
     stages_of,
 )
 from scenarios.closing.page.glossary import glossary
@@ -99,8 +97,7 @@ def _posed(e: Experiment, work: Path) -> Posed:
     """Read all files of an experiment; experiments with the same model share one folder of builds."""
     folder = work if e.model is None else work.parent / e.model
     folder.mkdir(exist_ok=True)
-    builder = builder_for(e, folder)
-    return Posed(e, builder, pose(e, builder))
+    return Posed.of(e, folder)
 
 
 def fmu_of(e: Experiment) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import permutations
+from itertools import combinations
 
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.hypotheses.baseline import Baseline
@@ -48,7 +48,7 @@ def splitting(members: Sequence[Hypothesis]) -> str:
     kinds = {c.kind for m in members for c in m.candidates}
     where = " and ".join(places := sorted({c.location for m in members for c in m.candidates}))
     advice = []
-    if any(reversal(a, b) for a, b in permutations(kinds, 2)):
+    if any(reversal(a, b) for a, b in combinations(kinds, 2)):
         advice.append(f"a record in which the velocity at {where} changes its sign")
     curves = {kind for kind in kinds & set(EFFECTS) if EFFECTS[kind].over == "velocity"}
     if any(b != a and not reversal(a, b) for a in curves for b in kinds):
