@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fmus.effects.effect import Effect
 from fmus.integrators.rk4 import runge_kutta
 from fmus.port import UNITS, Port
+from fmus.sampled import Sampled
 from fmus.variables import Expr
 
 if TYPE_CHECKING:
@@ -84,13 +85,15 @@ class ForceLaw(Effect):
         """
         law = _compiled(cls)
         here = {p.name: p.start for p in cls.parameters("translation")} | dict(values)
-        given = np.vstack([t, q, v, np.tile([[here[n]] for n in law.parameters], len(t))])
-        x = np.zeros((0, len(t)))
+        values_here = [here[n] for n in law.parameters]
+        x: list[Array] = []
         if law.states:
+            given = np.vstack([t, q, v, np.tile(np.array(values_here)[:, None], len(t))])
             x0 = np.array([s.start for s in cls.states("translation")])
             x1 = law.steps(len(t) - 1)(x0, given[:, :-1], given[:, 1:]).full()
-            x = np.column_stack([x0, x1])
-        return np.array(law.forces(len(t))(given, x)).ravel()
+            x = [*np.column_stack([x0, x1])]
+        force: Array = law.force([t, q, v, *values_here, *x], len(t))[0]
+        return force
 
     @classmethod
     def units(cls, of: str) -> Mapping[str, str]:
@@ -134,7 +137,7 @@ class ForceLaw(Effect):
 class _Compiled:
     """A law as functions: force(w, x), step(x, w at both ends) -> x; w is (t, q, v, parameters).
 
-    forces(n), steps(n): the same over n samples, kept since they take longer to make than to call.
+    steps(n): the steps between n samples, kept since they take longer to make than to call.
     """
 
     def __init__(self, law: type[ForceLaw]) -> None:
@@ -145,7 +148,8 @@ class _Compiled:
         memory = {name: x[i] for i, name in enumerate(self.states)}
         values = {name: w[3 + i] for i, name in enumerate(self.parameters)}
         made = law({**values, **memory, "clock": w[0]})
-        self.forces = lru_cache(KEPT)(cs.Function("force", [w, x], [made.force(w[1], w[2])]).map)
+        arguments = [*cs.vertsplit(w), *cs.vertsplit(x)]
+        self.force = Sampled(cs.Function("force", arguments, [made.force(w[1], w[2])]))
         rates = made.rates(w[1], w[2])
         f = cs.Function("f", [w, x], [cs.vertcat(*(rates[name] for name in self.states))])
         a, b = cs.SX.sym("a", n), cs.SX.sym("b", n)

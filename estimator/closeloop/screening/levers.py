@@ -6,7 +6,7 @@ effects can be screened without building an FMU for each.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import ceil
 
 import casadi as cs
@@ -16,6 +16,7 @@ from estimator.record import Array
 from fmus.effects.site import CLOCK, WAY
 from fmus.export.around.outside import Around, straight
 from fmus.integrators.rk4 import runge_kutta
+from fmus.sampled import Row
 from fmus.variables import Expr
 
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
@@ -35,21 +36,26 @@ class Course:
     given: Array
     way: Array  # (N,) distance travelled, m; zeros if there is no speed input
 
+    @cached_property
+    def rows(self) -> list[Row]:
+        """`given` by columns; those that do not change as numbers."""
+        same = np.ptp(self.given, axis=0) == 0
+        return [float(v[0]) if still else v for v, still in zip(self.given.T.copy(), same, strict=True)]
+
 
 def shifts(made: Around, course: Course, moved: Mapping[str, float]) -> dict[str, Array]:
     """Change (N,) of each input and parameter by an effect with the parameter values `moved`.
 
     Parameters that are not named have their start values; without amplitudes the effect is off.
     """
-    own = np.array([moved.get(p.name, p.start) for p in made.parameters])
-    z = np.vstack([course.given.T, np.tile(own[:, None], len(course.t))])
+    z = [*course.rows, *(moved.get(p.name, p.start) for p in made.parameters)]
     m = course.motion.T
-    values = made.slim_values.along((m, _states(made, course, m, z), z))
+    values = made.slim_values.along((m, _states(made, course, m, z), z), len(course.t))
     rest = course.given[:, [made.given.index(name) for name in made.told]].T
     return dict(zip(made.told, values - rest, strict=True))
 
 
-def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
+def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
     """States of the effects along the course, (n_x, N)."""
     known = {CLOCK.name: course.t, WAY.name: course.way}
     names = [s.name for s in made.states]
@@ -57,7 +63,7 @@ def _states(made: Around, course: Course, m: Array, z: Array) -> Array:
         return np.array([known[name] for name in names]).reshape(len(names), len(course.t))
     step, seen = _step(made)
     start = np.array([s.start for s in made.states])
-    w = np.array([(m if i == 0 else z)[row] for i, row in seen])
+    w = np.array([np.broadcast_to((m if i == 0 else z)[row], len(course.t)) for i, row in seen])
     n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / LONGEST_STEP - ROUNDING)))
     at = np.arange((len(course.t) - 1) * n + 1) / n
     t, w = (_between(at, rows) for rows in (course.t[None, :], w))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 
 import casadi as cs
@@ -17,6 +17,7 @@ from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable, PortNames
 from fmus.integrators.rk4 import runge_kutta
 from fmus.port import UNITS, Port, alike
+from fmus.sampled import Row, Sampled
 from fmus.variables import (
     Expr,
     Input,
@@ -108,7 +109,7 @@ class Around:
         return slim(self.values)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Slim:
     """A function of those of its arguments alone that it depends on, as scalars.
 
@@ -117,14 +118,14 @@ class Slim:
 
     function: cs.Function
     rows: list[tuple[int, int]]
-    _maps: dict[int, cs.Function] = field(default_factory=dict, repr=False)
 
-    def along(self, parts: Sequence[Array]) -> Array:
-        """Its values (n_out, N) for samples of m, x and z, (n, N) each."""
-        n = parts[0].shape[1]
-        if n not in self._maps:
-            self._maps[n] = self.function.map(n)  # which takes longer than to call it
-        return np.asarray(self._maps[n].call([parts[i][row][None, :] for i, row in self.rows])[0])
+    @cached_property
+    def _sampled(self) -> Sampled:
+        return Sampled(self.function)
+
+    def along(self, parts: Sequence[Sequence[Row] | Array], samples: int) -> Array:
+        """Its values (n_out, samples) for m, x and z, each a list of numbers or of samples (samples,)."""
+        return self._sampled([parts[i][row] for i, row in self.rows], samples)
 
 
 def slim(function: cs.Function) -> Slim:

@@ -55,8 +55,7 @@ class ModelBuilder:
     @property
     def ports(self) -> tuple[PortNames, ...]:
         """The model's locations by the names of their probes."""
-        names = _bare(self.model).ports()
-        return tuple(PortNames(n, f"{n}_force", f"{n}_velocity", f"{n}_displacement") for n in names)
+        return _ports(self.model)
 
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
@@ -142,6 +141,12 @@ class ForeignBuilder:
 @cache
 def _bare(model: str) -> Model:
     return model_class(model)()
+
+
+@cache
+def _ports(model: str) -> tuple[PortNames, ...]:
+    names = _bare(model).ports()
+    return tuple(PortNames(n, f"{n}_force", f"{n}_velocity", f"{n}_displacement") for n in names)
 
 
 @cache
