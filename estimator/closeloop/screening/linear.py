@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.question.problem import Problem
+from estimator.filters.algebra import compiled
 from estimator.plant import PLANTS
 from estimator.record import Array
 
@@ -137,18 +138,35 @@ def responses(
     local: Linearised, levers: Mapping[str, Influence], moved: Sequence[Mapping[str, Array]], samples: int
 ) -> Array:
     """Change of the outputs (samples, n_y, k) by each of k sets of lever changes (samples,)."""
-    near = local.near(samples)
     n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
-    force, direct = np.zeros((k, samples, n)), np.zeros((k, samples, n_y))
-    for f, d, changes in zip(force, direct, moved, strict=True):
+    force, found = np.zeros((samples, n, k)), np.zeros((samples, n_y, k))
+    for i, changes in enumerate(moved):
         for name, change in changes.items():
-            w = change[:samples, None]
-            f += levers[name].states * np.vstack([(w[1:] + w[:-1]) / 2, w[-1:]])
-            d += levers[name].outputs * w
-    steps = np.ascontiguousarray(np.moveaxis(force, 0, 2))
-    x, states = np.zeros((n, k)), np.empty((samples, n, k))
-    for s in range(samples):
-        states[s] = x
-        x = local.A[near[s]] @ x + steps[s]
-    found: Array = local.C[near] @ states + np.moveaxis(direct, 0, 2)
+            lever = levers[name]
+            _act(change[:samples], lever.states, lever.outputs, force[:, :, i], found[:, :, i])
+    _respond(local.A, local.C, local.near(samples), force, found)
     return found
+
+
+@compiled
+def _act(w: Array, states: Array, outputs: Array, force: Array, direct: Array) -> None:
+    """Add the influence of a lever's change w (N,) to the change of the states per step, and to the outputs."""
+    last = len(w) - 1
+    for s in range(len(w)):
+        mean = (w[s] + w[s + 1]) / 2 if s < last else w[s]
+        for j in range(states.shape[1]):
+            force[s, j] += states[s, j] * mean
+        for j in range(outputs.shape[1]):
+            direct[s, j] += outputs[s, j] * w[s]
+
+
+@compiled
+def _respond(A: Array, C: Array, near: NDArray[np.intp], force: Array, found: Array) -> None:
+    """Add y = C x to found (N, n_y, k), with x+ = A x + force (N, n, k) and x = 0 at the start.
+
+    A: (p, n, n), C: (p, n_y, n), of which `near` (N,) names one for each sample.
+    """
+    x = np.zeros(force.shape[1:])
+    for s in range(len(force)):
+        found[s] += C[near[s]] @ x
+        x = A[near[s]] @ x + force[s]

@@ -42,7 +42,7 @@ NEARLY_PARALLEL = 1e-2  # ridge, as share of a regressor's length; nearly equal 
 TRUSTED = 5.0  # scales: largest change for which the linear regression is trusted
 
 
-CHANGES_AT_ONCE = 128  # number of responses that are computed together
+CHANGES_AT_ONCE = 32  # number of responses that are computed together
 
 
 RUNAWAY = 1e9  # weighted residual above which the linearised response is taken as diverged
