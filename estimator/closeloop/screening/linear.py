@@ -150,7 +150,7 @@ def responses(
 
 @compiled
 def _act(w: Array, states: Array, outputs: Array, force: Array, direct: Array) -> None:
-    """Add the influence of a lever's change w (N,) to the change of the states per step and to the outputs."""
+    """Add the influence of a lever's change w (N,) to the states per step and to the outputs."""
     last = len(w) - 1
     for s in range(len(w)):
         mean = (w[s] + w[s + 1]) / 2 if s < last else w[s]
