@@ -16,6 +16,7 @@ from fmus.export.around.effects_alone import EffectsAlone
 from fmus.export.around.outside import Outside
 from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
 from fmus.export.provenance import Origin
 from fmus.host.archive import describe
@@ -117,11 +118,12 @@ class ForeignBuilder:
     def __call__(self, effects: Effects) -> Path:
         """Path of the FMU with these effects, all off at their start values.
 
-        Without an effect too it runs in the coupled build, so that all hypotheses take the same steps.
+        Without an effect too it runs inside another FMU, so that all hypotheses take the same steps: a native
+        one where a C compiler is at hand, a PythonFMU otherwise.
         """
         if not self.ports and not effects:
             return self.fmu
-        return _once(self.folder, effects, lambda path: build_coupled(self.fmu, self.ports, effects, path))
+        return _once(self.folder, effects, lambda path: _carried(self.fmu, self.ports, effects, path))
 
     def final(
         self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
@@ -159,6 +161,13 @@ def _fastest(model: Model, path: Path) -> Path:
         return build_native(model, path, differentiable=False)  # which the search does not ask for
     except BadInput:  # no compiler
         return build_python(model, path)
+
+
+def _carried(fmu: Path, ports: tuple[PortNames, ...], effects: Effects, path: Path) -> Path:
+    try:
+        return build_carrier(fmu, ports, effects, path)
+    except BadInput:  # no compiler
+        return build_coupled(fmu, ports, effects, path)
 
 
 def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:

@@ -37,23 +37,8 @@ def build_coupled(
     """
     description = describe(base)
     made = laws(description, ports, effects)
-    groups = _groups(description)
-    rows = [[_foreign_row(v) for v in group] for group in groups]
-    rows[0] += [row(s) for s in made.states]
-    rows[2] += [row(p) for p in made.parameters]
-    table = [r for group in rows for r in group]
-    for r in table:
-        r["start"] = float((starts or {}).get(r["name"], r["start"]))
-    order, names = [r["name"] for r in table], [f"{kind}@{location}" for kind, location in effects]
-    restarted = [order.index(n) for n in starts or {} if n in description.variables]
-    card = {
-        "description": f"{description.name} with {', '.join(names) or 'no effect'}",
-        "step_size": COUPLING_STEP,
-        "sizes": [len(group) for group in rows],
-        "units": unit_table(r["unit"] for r in table if r["unit"]),
-        "variables": table,
-        "base": {**_base_card(description, ports, order, made), "restarted": restarted},
-    }
+    card = carrying(description, ports, effects, made, starts or {})
+    table, names = card["variables"], [f"{kind}@{location}" for kind, location in effects]
     functions = {"push": made.push, "go_on": made.go_on}
     files = {f"{name}.casadi": f.serialize().encode() for name, f in functions.items()}
     files["base.fmu"] = base.read_bytes()
@@ -63,6 +48,33 @@ def build_coupled(
     values = {r["name"]: (r["start"], r["unit"]) for r in table if r["causality"] == "parameter"}
     about = record_around(base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
     return pack(Content(title, card, ("coupled", "carried"), files, page, False, about), out)
+
+
+def carrying(
+    description: FmuDescription,
+    ports: Sequence[PortNames],
+    effects: Sequence[tuple[str, str]],
+    made: Laws,
+    starts: Mapping[str, float],
+) -> dict[str, Any]:
+    """The card of a build: its variables, and what it sets and reads in the carried FMU."""
+    groups = _groups(description)
+    rows = [[_foreign_row(v) for v in group] for group in groups]
+    rows[0] += [row(s) for s in made.states]
+    rows[2] += [row(p) for p in made.parameters]
+    table = [r for group in rows for r in group]
+    for r in table:
+        r["start"] = float(starts.get(r["name"], r["start"]))
+    order, names = [r["name"] for r in table], [f"{kind}@{location}" for kind, location in effects]
+    restarted = [order.index(n) for n in starts if n in description.variables]
+    return {
+        "description": f"{description.name} with {', '.join(names) or 'no effect'}",
+        "step_size": COUPLING_STEP,
+        "sizes": [len(group) for group in rows],
+        "units": unit_table(r["unit"] for r in table if r["unit"]),
+        "variables": table,
+        "base": {**_base_card(description, ports, order, made), "restarted": restarted},
+    }
 
 
 def _groups(description: FmuDescription) -> list[list[FmuVariable]]:

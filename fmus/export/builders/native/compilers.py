@@ -86,11 +86,16 @@ def command(compiler: str | None, wanted: Sequence[Platform]) -> dict[str, list[
     return {p.name: [compiler, *STRICT, *p.linked] for p in wanted}
 
 
-def compile_library(call: Sequence[str], sources: Path, target: Path, where: Platform) -> None:
-    """Compile `sources`/fmu.c to the library `target`; BadInput with the compiler's first error."""
+def compile_library(
+    call: Sequence[str], source: Path, target: Path, where: Platform, linked: Sequence[str] = ()
+) -> None:
+    """Compile a C file to the library `target`; BadInput with the compiler's first error.
+
+    linked: libraries of the platform beside that of mathematics.
+    """
     target.parent.mkdir(parents=True)
     # a relative name, for the linker writes it into the library
-    files = [*DEFINED, str(sources / "fmu.c"), "-o", target.name, "-lm"]
+    files = [*DEFINED, str(source), "-o", target.name, "-lm", *linked]
     try:
         done = subprocess.run([*call, *files], cwd=target.parent, capture_output=True, text=True, check=False)
     except OSError as error:

@@ -1,0 +1,455 @@
+/* An FMI 2.0 co-simulation FMU that carries another FMU and laws around it, without Python.
+
+   It takes the coupling steps of the slave in Python (runtime/coupled.py): read the motion at the ports, set
+   what the laws give for the middle of the step, step, update the memory of the laws. */
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef _WIN32
+#include <windows.h>
+#define OPEN(path) ((void *)LoadLibraryA(path))
+#define SYMBOL(library, name) ((void *)GetProcAddress((HMODULE)(library), name))
+#define CLOSE(library) FreeLibrary((HMODULE)(library))
+#else
+#include <dlfcn.h>
+#define OPEN(path) dlopen(path, RTLD_NOW | RTLD_LOCAL)
+#define SYMBOL(library, name) dlsym(library, name)
+#define CLOSE(library) dlclose(library)
+#endif
+
+#include "carrier.h"
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+#define CASADI_SYMBOL_EXPORT static
+#include "laws.c"
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
+
+#include "fmi2Functions.h"
+#include "fmi3FunctionTypes.h"
+
+#define AT_LEAST_1(n) ((n) > 0 ? (n) : 1)
+#define TIME_TOLERANCE 1e-9 /* of a coupling step, so that a whole number of them is seen as one */
+enum { WARNING = 1, PATH = 4096 };
+
+typedef struct {
+    void *library, *base;
+    const fmi2CallbackFunctions *host;
+    char name[128];
+    double values[N_VALUES];
+    bool touched[N_VALUES]; /* settable variables whose value the carried FMU must be told */
+    bool failed, stale, running, entered;
+    double start;
+    double before[AT_LEAST_1(N_MOTION)], motion[AT_LEAST_1(N_MOTION)], told[AT_LEAST_1(N_TOLD)];
+    double memory[AT_LEAST_1(N_MEMORY)];
+    const double *arg[AT_LEAST_1(WORK_ARG)];
+    double *res[AT_LEAST_1(WORK_RES)];
+    int iw[AT_LEAST_1(WORK_IW)];
+    double w[AT_LEAST_1(WORK_W)];
+#if BASE_FMI == 2
+    fmi2GetRealTYPE *get;
+    fmi2SetRealTYPE *set;
+    fmi2DoStepTYPE *step;
+    fmi2ResetTYPE *reset;
+    fmi2SetupExperimentTYPE *setup;
+    fmi2EnterInitializationModeTYPE *enter;
+    fmi2ExitInitializationModeTYPE *leave;
+    fmi2InstantiateTYPE *instantiate;
+    fmi2FreeInstanceTYPE *free;
+#else
+    fmi3GetFloat64TYPE *get;
+    fmi3SetFloat64TYPE *set;
+    fmi3DoStepTYPE *step;
+    fmi3ResetTYPE *reset;
+    fmi3EnterInitializationModeTYPE *enter;
+    fmi3ExitInitializationModeTYPE *leave;
+    fmi3InstantiateCoSimulationTYPE *instantiate;
+    fmi3FreeInstanceTYPE *free;
+#endif
+} Instance;
+
+#define ME(c) ((Instance *)(c))
+
+static void *LIBRARY; /* of the carried FMU, the same for all instances */
+
+static fmi2Status refuse(Instance *m, fmi2Status status, const char *format, ...) {
+    char said[800];
+    va_list given;
+    va_start(given, format);
+    vsnprintf(said, sizeof said, format, given);
+    va_end(given);
+    m->host->logger(m->host->componentEnvironment, m->name, status, "logStatusError", "%s", said);
+    return status;
+}
+
+/* ---- calls of the carried FMU ---- */
+
+static int get_base(Instance *m, const unsigned *references, size_t n, double *values) {
+#if BASE_FMI == 2
+    return n ? (int)m->get(m->base, references, n, values) : 0;
+#else
+    return n ? (int)m->get(m->base, references, n, values, n) : 0;
+#endif
+}
+
+static int set_base(Instance *m, const unsigned *references, size_t n, const double *values) {
+#if BASE_FMI == 2
+    return n ? (int)m->set(m->base, references, n, values) : 0;
+#else
+    return n ? (int)m->set(m->base, references, n, values, n) : 0;
+#endif
+}
+
+static int step_base(Instance *m, double t, double dt) {
+#if BASE_FMI == 2
+    return (int)m->step(m->base, t, dt, fmi2True);
+#else
+    fmi3Boolean event = false, ends = false, early = false;
+    fmi3Float64 reached = t;
+    int status = (int)m->step(m->base, t, dt, fmi3True, &event, &ends, &early, &reached);
+    return ends || early ? (int)fmi2Error : status;
+#endif
+}
+
+static int enter_base(Instance *m) {
+#if BASE_FMI == 2
+    int status = (int)m->setup(m->base, fmi2False, 0.0, m->start, fmi2False, 0.0);
+    return status > WARNING ? status : (int)m->enter(m->base);
+#else
+    return (int)m->enter(m->base, fmi3False, 0.0, m->start, fmi3False, 0.0);
+#endif
+}
+
+#if BASE_FMI == 3
+static void heard(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message) {
+    Instance *m = environment;
+    (void)category;
+    m->host->logger(m->host->componentEnvironment, m->name, (fmi2Status)status, "logStatusError", "%s",
+                    message ? message : "");
+}
+#endif
+
+/* The folder of the carried FMU from the URI of the resources; false where it is too long. */
+static bool folder_of(const char *uri, char *folder) {
+    size_t n = 0;
+    const char *from = strncmp(uri, "file://", 7) ? uri : uri + 7;
+#ifdef _WIN32
+    if (from != uri && from[0] == '/' && from[1] && from[2] == ':') from++;
+#endif
+    for (; *from && n < PATH - 1; from++) {
+        unsigned code;
+        if (*from == '%' && sscanf(from + 1, "%2x", &code) == 1) {
+            folder[n++] = (char)code;
+            from += 2;
+        } else {
+            folder[n++] = *from;
+        }
+    }
+    folder[n] = '\0';
+    return !*from && n + sizeof "/base/" BASE_LIBRARY + sizeof "/base/resources/" < PATH;
+}
+
+/* ---- the laws ---- */
+
+/* Set what the laws give, for the middle of a step of length dt. */
+static int by_the_laws(Instance *m, double dt) {
+    if (!N_TOLD) return 0;
+    m->arg[0] = m->motion;
+    m->arg[1] = m->values;
+    m->arg[2] = &dt;
+    m->res[0] = m->told;
+    if (push(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
+    return set_base(m, TOLD, N_TOLD, m->told);
+}
+
+static int remember(Instance *m, double dt) {
+    if (!N_MEMORY) return 0;
+    m->arg[0] = m->before;
+    m->arg[1] = m->motion;
+    m->arg[2] = m->values;
+    m->arg[3] = &dt;
+    m->res[0] = m->memory;
+    if (go_on(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
+    memcpy(m->values + FIRST_MEMORY, m->memory, N_MEMORY * sizeof(double));
+    return 0;
+}
+
+static int look(Instance *m) {
+    int status = get_base(m, REFERENCES, FIRST_MEMORY, m->values);
+    if (status <= WARNING) status = get_base(m, REFERENCES + N_SET, N_VALUES - N_SET, m->values + N_SET);
+    return status;
+}
+
+/* Tell the carried FMU the values of some of the settable variables. */
+static int pass_on(Instance *m, const bool *some) {
+    unsigned references[AT_LEAST_1(N_SET)];
+    double values[AT_LEAST_1(N_SET)];
+    size_t n = 0;
+    for (size_t i = 0; i < N_SET; i++)
+        if (some[i] && PASSED[i]) {
+            references[n] = REFERENCES[i];
+            values[n++] = m->values[i];
+        }
+    return set_base(m, references, n, values);
+}
+
+/* ---- FMI 2.0 ---- */
+
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+
+const char *fmi2GetVersion(void) { return fmi2Version; }
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]) {
+    (void)c, (void)on, (void)n, (void)categories;
+    return fmi2OK;
+}
+
+static void begin(Instance *m) {
+    memcpy(m->values, START, sizeof START);
+    memcpy(m->touched, RESTARTED, sizeof RESTARTED);
+    memset(m->motion, 0, sizeof m->motion);
+    m->failed = m->running = false;
+    m->stale = true;
+}
+
+#define FIND(role, type, function)                                                      \
+    if (!(m->role = (type *)SYMBOL(m->library, function))) {                            \
+        refuse(m, fmi2Error, "the carried FMU has no function %s", function);           \
+        return false;                                                                   \
+    }
+
+static bool found(Instance *m) {
+#if BASE_FMI == 2
+    FIND(get, fmi2GetRealTYPE, "fmi2GetReal")
+    FIND(set, fmi2SetRealTYPE, "fmi2SetReal")
+    FIND(step, fmi2DoStepTYPE, "fmi2DoStep")
+    FIND(reset, fmi2ResetTYPE, "fmi2Reset")
+    FIND(setup, fmi2SetupExperimentTYPE, "fmi2SetupExperiment")
+    FIND(enter, fmi2EnterInitializationModeTYPE, "fmi2EnterInitializationMode")
+    FIND(leave, fmi2ExitInitializationModeTYPE, "fmi2ExitInitializationMode")
+    FIND(instantiate, fmi2InstantiateTYPE, "fmi2Instantiate")
+    FIND(free, fmi2FreeInstanceTYPE, "fmi2FreeInstance")
+#else
+    FIND(get, fmi3GetFloat64TYPE, "fmi3GetFloat64")
+    FIND(set, fmi3SetFloat64TYPE, "fmi3SetFloat64")
+    FIND(step, fmi3DoStepTYPE, "fmi3DoStep")
+    FIND(reset, fmi3ResetTYPE, "fmi3Reset")
+    FIND(enter, fmi3EnterInitializationModeTYPE, "fmi3EnterInitializationMode")
+    FIND(leave, fmi3ExitInitializationModeTYPE, "fmi3ExitInitializationMode")
+    FIND(instantiate, fmi3InstantiateCoSimulationTYPE, "fmi3InstantiateCoSimulation")
+    FIND(free, fmi3FreeInstanceTYPE, "fmi3FreeInstance")
+#endif
+    return true;
+}
+
+static bool carried(Instance *m, const char *uri) {
+    char path[PATH], resources[PATH];
+    if (!folder_of(uri, path)) return refuse(m, fmi2Error, "the path of its resources is too long"), false;
+    size_t n = strlen(path);
+#if BASE_FMI == 2
+    snprintf(resources, sizeof resources, "%s/base/resources", uri);
+#else
+    snprintf(resources, sizeof resources, "%s/base/resources/", path);
+#endif
+    snprintf(path + n, sizeof path - n, "/base/%s", BASE_LIBRARY);
+    if (!(m->library = LIBRARY = OPEN(path)))
+        return refuse(m, fmi2Error, "the carried FMU cannot be loaded: %s", path), false;
+    if (!found(m)) return false;
+#if BASE_FMI == 2
+    m->base = m->instantiate(m->name, fmi2CoSimulation, BASE_TOKEN, resources, m->host, fmi2False, fmi2True);
+#else
+    m->base = m->instantiate(m->name, BASE_TOKEN, resources, fmi3False, fmi3True, fmi3False, fmi3False, NULL, 0, m,
+                             heard, NULL);
+#endif
+    if (!m->base) refuse(m, fmi2Error, "the carried FMU cannot be instantiated");
+    return m->base != NULL;
+}
+
+void fmi2FreeInstance(fmi2Component c) {
+    if (c && ME(c)->base) ME(c)->free(ME(c)->base);
+    free(c); /* the library of the carried FMU stays loaded: its other instances may use it */
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
+    (void)visible, (void)logging;
+    if (!functions || !functions->logger || !name || !guid || !resources) return NULL;
+    Instance *m = calloc(1, sizeof(Instance));
+    if (!m) return NULL;
+    m->host = functions;
+    snprintf(m->name, sizeof m->name, "%s", name);
+    begin(m);
+    bool fits = type == fmi2CoSimulation && !strcmp(guid, TOKEN);
+    if (!fits) refuse(m, fmi2Error, "the guid or the type is not that of this FMU");
+    if (!fits || !carried(m, resources)) {
+        fmi2FreeInstance(m);
+        return NULL;
+    }
+    return m;
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
+                               fmi2Boolean stop_defined, fmi2Real stop) {
+    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
+    ME(c)->start = start;
+    return fmi2OK;
+}
+
+static fmi2Status answer(Instance *m, int status, const char *call) {
+    if (status <= WARNING) return fmi2OK;
+    m->failed = true;
+    return refuse(m, fmi2Error, "%s: the carried FMU answers with status %d", call, status);
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    Instance *m = c;
+    int status = m->entered ? (int)m->reset(m->base) : 0; /* no state but that of a new instance before */
+    m->entered = true;
+    if (status <= WARNING) status = pass_on(m, m->touched);
+    if (status <= WARNING) status = by_the_laws(m, 0.0);
+    if (status <= WARNING) status = enter_base(m);
+    return answer(m, status, __func__);
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    Instance *m = c;
+    int status = pass_on(m, INPUTS);
+    if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
+    if (status <= WARNING) status = by_the_laws(m, 0.0);
+    if (status <= WARNING) status = (int)m->leave(m->base);
+    m->running = status <= WARNING;
+    return answer(m, status, __func__);
+}
+
+fmi2Status fmi2Terminate(fmi2Component c) {
+    (void)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    begin(ME(c));
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    Instance *m = c;
+    if (m->stale && m->running) {
+        int status = look(m);
+        if (status > WARNING) return answer(m, status, __func__);
+        m->stale = false;
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] >= N_VALUES) return refuse(m, fmi2Error, "there is no variable with reference %u", vr[i]);
+        value[i] = m->values[vr[i]];
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    Instance *m = c;
+    bool some[AT_LEAST_1(N_SET)] = {false}, laws = false;
+    m->stale = true;
+    for (size_t k = 0; k < n; k++) {
+        unsigned i = vr[k];
+        if (i >= N_SET) return refuse(m, fmi2Error, "the variable with reference %u is computed and cannot be set", i);
+        if (!(value[k] >= LEAST[i] && value[k] <= MOST[i]))
+            return refuse(m, fmi2Error, "%s = %g is outside %g to %g", NAMES[i], value[k], LEAST[i], MOST[i]);
+        m->values[i] = value[k];
+        m->touched[i] = some[i] = true;
+        laws = laws || !PASSED[i];
+    }
+    if (!m->running || m->failed) return fmi2OK;
+    int status = pass_on(m, some);
+    if (laws) {
+        if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
+        if (status <= WARNING) status = by_the_laws(m, 0.0);
+    }
+    return answer(m, status, __func__);
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real duration, fmi2Boolean no_state_before) {
+    Instance *m = c;
+    (void)no_state_before;
+    if (m->failed) return refuse(m, fmi2Discard, "it failed before; reset it");
+    if (!(duration > 0 && duration < HUGE_VAL)) return refuse(m, fmi2Discard, "step size %g s is not positive", duration);
+    double steps = fmax(1.0, ceil(duration / LONGEST_STEP - TIME_TOLERANCE)), dt = duration / steps;
+    int status = get_base(m, MOTION, N_MOTION, m->motion);
+    for (double k = 0; k < steps && status <= WARNING; k++) {
+        status = by_the_laws(m, dt);
+        if (status <= WARNING) status = step_base(m, t + k * dt, dt);
+        memcpy(m->before, m->motion, sizeof m->motion);
+        if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
+        if (status <= WARNING) status = remember(m, dt);
+    }
+    if (status <= WARNING) status = look(m);
+    m->stale = false;
+    if (status > WARNING) {
+        m->failed = true;
+        return refuse(m, fmi2Discard, "the carried FMU cannot make the step at t = %g s (status %d)", t, status);
+    }
+    for (size_t i = 0; i < N_VALUES; i++)
+        if (!isfinite(m->values[i]))
+            return refuse(m, fmi2Discard, "the carried FMU is no longer finite after t = %g s", t);
+    return fmi2OK;
+}
+
+#define NONE_OF_TYPE(type)                                                                                    \
+    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2##type value[]) {  \
+        (void)vr, (void)value;                                                                                \
+        return n ? refuse(ME(c), fmi2Error, "there are Real variables only") : fmi2OK;                        \
+    }                                                                                                         \
+    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t n,                        \
+                             const fmi2##type value[]) {                                                      \
+        (void)vr, (void)value;                                                                                \
+        return n ? refuse(ME(c), fmi2Error, "there are Real variables only") : fmi2OK;                        \
+    }
+
+NONE_OF_TYPE(Integer)
+NONE_OF_TYPE(Boolean)
+NONE_OF_TYPE(String)
+
+#define NOT_HERE(name, ...)                                                    \
+    fmi2Status name(fmi2Component c, __VA_ARGS__) {                            \
+        return refuse(ME(c), fmi2Error, "this FMU does not offer " #name);     \
+    }
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+NOT_HERE(fmi2GetFMUstate, fmi2FMUstate *state)
+NOT_HERE(fmi2SetFMUstate, fmi2FMUstate state)
+NOT_HERE(fmi2FreeFMUstate, fmi2FMUstate *state)
+NOT_HERE(fmi2SerializedFMUstateSize, fmi2FMUstate state, size_t *size)
+NOT_HERE(fmi2SerializeFMUstate, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+NOT_HERE(fmi2DeSerializeFMUstate, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+NOT_HERE(fmi2GetDirectionalDerivative, const fmi2ValueReference unknowns[], size_t n_unknown,
+         const fmi2ValueReference knowns[], size_t n_known, const fmi2Real in[], fmi2Real out[])
+NOT_HERE(fmi2SetRealInputDerivatives, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+         const fmi2Real value[])
+NOT_HERE(fmi2GetRealOutputDerivatives, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+         fmi2Real value[])
+NOT_HERE(fmi2GetStatus, const fmi2StatusKind kind, fmi2Status *value)
+NOT_HERE(fmi2GetRealStatus, const fmi2StatusKind kind, fmi2Real *value)
+NOT_HERE(fmi2GetIntegerStatus, const fmi2StatusKind kind, fmi2Integer *value)
+NOT_HERE(fmi2GetBooleanStatus, const fmi2StatusKind kind, fmi2Boolean *value)
+NOT_HERE(fmi2GetStringStatus, const fmi2StatusKind kind, fmi2String *value)
+
+fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(ME(c), fmi2Error, "there is no step to cancel"); }
+
+/* A carried PythonFMU drops its interpreter when the host says so. */
+void finalizePythonInterpreter(void) {
+    if (LIBRARY) {
+        void (*release)(void) = (void (*)(void))SYMBOL(LIBRARY, "finalizePythonInterpreter");
+        if (release) release();
+    }
+}

@@ -1,0 +1,153 @@
+"""Pack a foreign FMU with effects around it as a native FMU, for runs in this process.
+
+It takes the same steps as the container in Python (see coupled.py), which is what users get: that one needs
+no compiler and runs on every platform that PythonFMU supports.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+import casadi as cs
+import fmpy
+from jinja2 import Environment, FileSystemLoader
+
+from fmus.export.around.outside import Laws, laws
+from fmus.export.builders.native.code import STANDARD, Work
+from fmus.export.builders.native.compilers import command, compile_library, host
+from fmus.export.builders.native.description import flag, text
+from fmus.export.builders.pythonfmu import ZIP_DATE
+from fmus.export.container.coupled import carrying
+from fmus.host.archive import Archive
+from fmus.host.description import FmuDescription, PortNames
+
+HERE = Path(__file__).parent
+NAME = "Carrier"
+LARGEST = sys.float_info.max
+ABILITIES = {
+    "needsExecutionTool": "true",
+    "canHandleVariableCommunicationStepSize": "true",
+    "canNotUseMemoryManagementFunctions": "true",
+}
+
+
+def build_carrier(
+    base: Path, ports: Sequence[PortNames], effects: Sequence[tuple[str, str]], out: Path
+) -> Path:
+    """Write an FMU with `base` inside and effects (kind, location) around it to `out`, and return it.
+
+    BadInput where there is no compiler, or the base has no library for this platform.
+    """
+    call, where = command(None, [host()])[host().name], host()
+    with Archive(base) as archive, tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
+        description, inside = archive.description, archive.folder
+        version = int(description.fmi_version[0])
+        library = f"binaries/{where.folder(version)}/{description.identifier}{where.suffix}"
+        made = laws(description, ports, effects)
+        card = carrying(description, ports, effects, made, {})
+        files = _sources(card, made, description, library)
+        for name, content in files.items():
+            (Path(folder) / name).write_text(content, encoding="utf-8")
+        binary = Path(folder) / "binary" / f"{NAME}{where.suffix}"
+        compile_library(
+            call, Path(folder) / "carrier.c", binary, where, ("-ldl",) if where.suffix == ".so" else ()
+        )
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as packed:
+            packed.writestr(zipfile.ZipInfo("modelDescription.xml", ZIP_DATE), _described(card, description))
+            packed.write(binary, f"binaries/{where.folder(2)}/{binary.name}")
+            for path in sorted(p for p in inside.rglob("*") if p.is_file()):
+                packed.write(path, f"resources/base/{path.relative_to(inside).as_posix()}")
+    return out
+
+
+def _token(card: dict[str, Any], description: FmuDescription) -> str:
+    said = repr((card["description"], description.guid, card["variables"]))
+    return f"{{{uuid.UUID(hashlib.sha256(said.encode()).hexdigest()[:32])}}}"
+
+
+def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, library: str) -> dict[str, str]:
+    """Text of the files to compile, by name."""
+    generator = cs.CodeGenerator("laws.c", {"casadi_int": "int"})
+    functions = [made.push, made.go_on]
+    for function in functions:
+        generator.add(function)
+    sizes = ([getattr(f, f"sz_{part}")() for f in functions] for part in ("arg", "res", "iw", "w"))
+    rows, base = card["variables"], card["base"]
+    n_states, n_inputs, n_parameters, _ = card["sizes"]
+    settable = n_states + n_inputs + n_parameters
+    told, references = set(base["told"]), base["references"]
+    facts = {
+        "title": card["description"],
+        "token": _token(card, description),
+        "fmi": description.fmi_version[0],
+        "base_token": description.guid,
+        "library": library,
+        "longest": repr(card["step_size"]),
+        "work": Work(*(max(size) for size in sizes)),
+        "rows": rows,
+        "settable": settable,
+        "memory": base["states"],
+        "first_memory": n_states - base["states"],
+        "starts": [repr(float(r["start"])) for r in rows],
+        "least": [_limit(r, "min", -LARGEST) for r in rows[:settable]],
+        "most": [_limit(r, "max", LARGEST) for r in rows[:settable]],
+        "references": [max(reference, 0) for reference in references],
+        "motion": [references[i] for i in base["motion"]],
+        "told": [references[i] for i in base["told"]],
+        "passed": [int(references[i] >= 0 and i not in told) for i in range(settable)],
+        "inputs": [int(n_states <= i < n_states + n_inputs) for i in range(settable)],
+        "restarted": [int(i in base["restarted"]) for i in range(len(rows))],
+    }
+    templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
+    headers = Path(fmpy.__file__).parent / "c-code"
+    standard = {n: (headers / n).read_text(encoding="utf-8") for n in (*STANDARD[2], *STANDARD[3])}
+    return {
+        **standard,
+        "carrier.c": (HERE / "carrier.c").read_text(encoding="utf-8"),
+        "carrier.h": templates.get_template("carrier.h.j2").render(facts),
+        "laws.c": generator.dump(),
+    }
+
+
+def _limit(row: dict[str, Any], key: str, without: float) -> str:
+    """Least or largest value that a variable takes; see runtime/common.py."""
+    given = row[key] if row["causality"] in ("parameter", "input") else None
+    return repr(without if given is None else min(max(float(given), -LARGEST), LARGEST))
+
+
+def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
+    """modelDescription.xml."""
+    token = _token(card, description)
+    root = Element(
+        "fmiModelDescription", fmiVersion="2.0", modelName=NAME, guid=token, description=card["description"],
+        variableNamingConvention="structured",
+    )  # fmt: skip
+    once = {"canBeInstantiatedOnlyOncePerProcess": flag(description.once_per_process)}
+    SubElement(root, "CoSimulation", {"modelIdentifier": NAME, **once, **ABILITIES})
+    units = SubElement(root, "UnitDefinitions")
+    for name, exponents in card["units"].items():
+        SubElement(SubElement(units, "Unit", name=name), "BaseUnit", exponents)
+    variables, outputs = SubElement(root, "ModelVariables"), []
+    for i, v in enumerate(card["variables"]):
+        keys = ("name", "causality", "variability", "initial", "description")
+        about = {k: v[k] for k in keys if v[k]} | {"valueReference": str(i)}
+        numbers = {k: repr(float(v[k])) for k in ("min", "max", "nominal") if v[k] is not None}
+        start = {"start": repr(v["start"])} if v["starts"] else {}
+        unit = {"unit": v["unit"]} if v["unit"] else {}
+        SubElement(SubElement(variables, "ScalarVariable", about), "Real", unit | numbers | start)
+        if v["causality"] == "output":
+            outputs.append(i)
+    structure = SubElement(root, "ModelStructure")
+    node = SubElement(structure, "Outputs")
+    for i in outputs:
+        SubElement(node, "Unknown", index=str(i + 1))
+    return text(root)
