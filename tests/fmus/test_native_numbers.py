@@ -7,7 +7,6 @@ import casadi as cs
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 from numpy.testing import assert_allclose, assert_array_equal
@@ -51,23 +50,6 @@ def history(path, model, dt, seed, steps=30):
             fmu.step(dt, **row)
             found.append(fmu.read(names(model, (State, Output))))
     return np.array(found)
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_without_partial_derivatives_the_motion_is_the_same_and_they_are_refused(fmi, tmp_path):
-    model = MODELS["testrig"]()
-    bare = build_native(model, tmp_path, fmi=fmi, differentiable=False)
-    assert_array_equal(history(bare, model, DT, 5), history(native("testrig", fmi=fmi), model, DT, 5))
-    with Archive(bare) as archive:
-        offered = archive.folder.joinpath("modelDescription.xml").read_text(encoding="utf-8")
-    assert "Derivative" in offered
-    assert "providesDirectionalDerivative" + "s" * (fmi == 3) + '="false"' in offered
-    assert "Derivative" + "s" * (fmi == 3) + '="true"' not in offered
-    with Fmu(bare) as fmu:
-        fmu.restart()
-        out, into = fmu.references(["omega_w_dot"]), fmu.references(["omega_w"])
-        with pytest.raises(FMICallException, match="GetDirectionalDerivative"):
-            fmu.instance._slave.getDirectionalDerivative(out, into, [1.0])
 
 
 @every_native

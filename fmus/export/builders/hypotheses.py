@@ -158,7 +158,7 @@ def _described(fmu: Path) -> FmuDescription:
 
 def _fastest(model: Model, path: Path) -> Path:
     try:
-        return build_native(model, path, differentiable=False)  # which the search does not ask for
+        return build_native(model, path)
     except BadInput:  # no compiler
         return build_python(model, path)
 

@@ -50,22 +50,20 @@ def build_native(
     platforms: str | Sequence[str] = ("host",),
     compiler: str | None = None,
     origin: Origin | None = None,
-    differentiable: bool = True,
 ) -> Path:
     """Write `out`/NAME.fmu, or `out` itself where it ends in .fmu, and return its path.
 
     platforms: FMI 3.0's names ("x86_64-linux"), "host" or "all". compiler: a C compiler's command for this
     machine instead of ziglang's. origin: what estimates in the model rest on, for its record of provenance.
-    differentiable: False leaves partial derivatives out, which are three quarters of the code to compile.
-    The same source and compiler give the same bytes. BadInput where the FMI version or a platform is not
-    known, or the compiler is missing or fails; nothing is written then.
+    The same source and compiler give the same bytes. BadInput where the
+    FMI version or a platform is not known, or the compiler is missing or fails; nothing is written then.
     """
     if fmi not in DESCRIBED:
         raise BadInput(f"FMI {fmi} is not built; 2 and 3 are")
     wanted = chosen(platforms)
     calls = command(compiler, wanted)
     made = equations(model)
-    files = _content(model, made, table(model, made, differentiable), fmi)
+    files = _content(model, made, table(model, made), fmi)
     about = record(model, "native", fmi, origin)
     files[PAGE] = on_page(files[PAGE].decode(), about).encode()
     target = out if out.suffix == ".fmu" else out / f"{model.name}.fmu"

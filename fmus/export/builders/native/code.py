@@ -34,18 +34,18 @@ class Work:
 
 def sources(table: Table, made: Equations, fmi: int, token: str) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others."""
-    code, work = _equations(table, made)
+    code, work = _equations(table.name, made)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
     return {**wrapper, **standard, "equations.c": code, "model.h": _header(table, work, fmi, token)}
 
 
-def _equations(table: Table, made: Equations) -> tuple[str, Work]:
+def _equations(name: str, made: Equations) -> tuple[str, Work]:
     """C code of f, h, step and of the derivatives of [x', y] by [x, u, p] along a direction and back."""
-    functions = [made.f, made.h, made.step, *(_derivatives(made) if table.differentiable else ())]
+    functions = [made.f, made.h, made.step, *_derivatives(made)]
     # the name begins that of every helper, so that two models can be linked together
-    generator = cs.CodeGenerator(f"{table.name}_equations.c", {"casadi_int": "int"})
+    generator = cs.CodeGenerator(f"{name}_equations.c", {"casadi_int": "int"})
     for function in functions:
         generator.add(function)
     sizes = ([getattr(f, f"sz_{part}")() for f in functions] for part in ("arg", "res", "iw", "w"))

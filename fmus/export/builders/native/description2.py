@@ -6,7 +6,6 @@ from fmus.export.builders.native.description import (
     add_categories,
     add_experiment,
     add_units,
-    flag,
     needs,
     numbers,
     root,
@@ -20,6 +19,7 @@ BOTH = {
     "canNotUseMemoryManagementFunctions": "true",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
+    "providesDirectionalDerivative": "true",
 }
 MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "true"}
 CO_SIMULATION = {
@@ -36,7 +36,6 @@ def description2(table: Table, token: str) -> dict[str, bytes]:
     model.set("numberOfEventIndicators", "0")
     for kind, more in (("ModelExchange", MODEL_EXCHANGE), ("CoSimulation", CO_SIMULATION)):
         interface = SubElement(model, kind, {"modelIdentifier": table.name, **more, **BOTH})
-        interface.set("providesDirectionalDerivative", flag(table.differentiable))
         SubElement(SubElement(interface, "SourceFiles"), "File", name="fmu.c")
     add_units(model, table)
     add_categories(model)

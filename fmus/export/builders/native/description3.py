@@ -6,7 +6,6 @@ from fmus.export.builders.native.description import (
     add_categories,
     add_experiment,
     add_units,
-    flag,
     needs,
     numbers,
     root,
@@ -19,8 +18,9 @@ BOTH = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canGetAndSetFMUState": "true",
     "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
 }
-DERIVATIVES = ("providesDirectionalDerivatives", "providesAdjointDerivatives")
 MODEL_EXCHANGE = {"needsCompletedIntegratorStep": "false"}
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
@@ -37,8 +37,7 @@ def description3(table: Table, token: str) -> dict[str, bytes]:
     """The files of an FMI 3.0 FMU that describe it, by path."""
     model = root("3.0", table, instantiationToken=token)
     for kind, more in (("ModelExchange", MODEL_EXCHANGE), ("CoSimulation", CO_SIMULATION)):
-        derivatives = dict.fromkeys(DERIVATIVES, flag(table.differentiable))
-        SubElement(model, kind, {"modelIdentifier": table.name, **more, **BOTH, **derivatives})
+        SubElement(model, kind, {"modelIdentifier": table.name, **more, **BOTH})
     add_units(model, table, "s")  # of the time
     add_categories(model)
     add_experiment(model, table)

@@ -86,10 +86,9 @@ class Table:
     display: dict[str, tuple[str, dict[str, str]]]  # unit: its display unit and how that one is defined
     terminals: tuple[Terminal, ...]
     effects: tuple[str, ...]
-    differentiable: bool  # whether partial derivatives are built in
 
 
-def table(model: Model, made: Equations, differentiable: bool = True) -> Table:
+def table(model: Model, made: Equations) -> Table:
     """The table of a model."""
     entries, slopes, local = _entries(model)
     sizes = [len(model.of(kind)) for kind in KINDS]
@@ -115,7 +114,6 @@ def table(model: Model, made: Equations, differentiable: bool = True) -> Table:
         display={u: (d, _display(u, d)) for u, d in sorted(shown.items())},
         terminals=tuple(_terminals(model)),
         effects=tuple(f"{effect.kind}@{location}" for effect, location in model.effects),
-        differentiable=differentiable,
     )
 
 

@@ -21,10 +21,6 @@
 #endif
 #define CASADI_SYMBOL_EXPORT static
 #include "equations.c"
-#ifdef NO_DERIVATIVES /* were built in: to compute them fails */
-static int forward(const double **arg, double **res, int *iw, double *w, int memory) { return 1; }
-static int reverse(const double **arg, double **res, int *iw, double *w, int memory) { return 1; }
-#endif
 #if defined(__GNUC__)
 #pragma GCC diagnostic pop
 #endif
