@@ -15,6 +15,7 @@ from fmus.errors import BadInput
 from fmus.export.around.effects_alone import EffectsAlone
 from fmus.export.around.outside import Outside
 from fmus.export.builders.native.build import build_native
+from fmus.export.builders.native.working import build_working
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
@@ -158,7 +159,7 @@ def _described(fmu: Path) -> FmuDescription:
 
 def _fastest(model: Model, path: Path) -> Path:
     try:
-        return build_native(model, path)
+        return build_working(model, path)
     except BadInput:  # no compiler
         return build_python(model, path)
 

@@ -79,19 +79,23 @@ def build_native(
             compile_library(calls[where.name], code / "fmu.c", libraries[where], where)
         files |= _binaries(libraries, fmi)
     files[PLACE] = sealed(about, files)
-    _write(target, _packed(files))
+    write_at_once(target, packed(files))
     return target
 
 
 def _content(model: Model, made: Equations, about: Table, fmi: int) -> dict[str, bytes]:
-    """All files but the libraries, by path; the token is a hash of what the sources and descriptions say."""
+    """All files but the libraries, by path."""
     code = {f"sources/{n}": text.encode() for n, text in sources(about, made, fmi, NO_TOKEN).items()}
-    files = DESCRIBED[fmi](about, NO_TOKEN) | code
-    parts = [version("railfmi").encode(), *(files[path] for path in sorted(files))]
-    token = f"{{{uuid.UUID(hashlib.sha256(bytes(1).join(parts)).hexdigest()[:32])}}}"
-    files = {path: data.replace(NO_TOKEN.encode(), token.encode()) for path, data in files.items()}
+    files = identified(DESCRIBED[fmi](about, NO_TOKEN) | code)
     files[PAGE] = page(model, about, fmi).encode()
     return files | {path: (HERE / name).read_bytes() for path, name in ICONS[fmi].items()}
+
+
+def identified(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Sources and descriptions with their token: a hash of what they say."""
+    parts = [version("railfmi").encode(), *(files[path] for path in sorted(files))]
+    token = f"{{{uuid.UUID(hashlib.sha256(bytes(1).join(parts)).hexdigest()[:32])}}}"
+    return {path: data.replace(NO_TOKEN.encode(), token.encode()) for path, data in files.items()}
 
 
 def _binaries(libraries: dict[Platform, Path], fmi: int) -> dict[str, bytes]:
@@ -102,16 +106,16 @@ def _binaries(libraries: dict[Platform, Path], fmi: int) -> dict[str, bytes]:
     return {path: p[0].read_bytes() if len(p) == 1 else universal(p) for path, p in by_path.items()}
 
 
-def _packed(files: dict[str, bytes]) -> bytes:
+def packed(files: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> bytes:
     """A zip with sorted names and no dates."""
     memory = io.BytesIO()
-    with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as packed:
+    with zipfile.ZipFile(memory, "w", method) as archive:
         for name in sorted(files):
-            packed.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], compress_type=zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], compress_type=method)
     return memory.getvalue()
 
 
-def _write(target: Path, data: bytes) -> None:
+def write_at_once(target: Path, data: bytes) -> None:
     """Write a file at once: a reader sees the old one or the new one."""
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".{target.name}.{os.getpid()}")

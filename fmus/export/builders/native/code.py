@@ -32,18 +32,23 @@ class Work:
     w: int
 
 
-def sources(table: Table, made: Equations, fmi: int, token: str) -> dict[str, str]:
-    """Text of each source file by name; `fmu.c` includes the others."""
-    code, work = _equations(table.name, made)
+def sources(table: Table, made: Equations, fmi: int, token: str, derivatives: bool = True) -> dict[str, str]:
+    """Text of each source file by name; `fmu.c` includes the others.
+
+    Calls for derivatives are refused where these are left out, which is for FMI 2.0 only.
+    """
+    code, work = _equations(table.name, made, derivatives)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
+    if not derivatives:
+        wrapper["derivatives.c"] = (HERE / "sources" / "no_derivatives.c").read_text(encoding="utf-8")
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
     return {**wrapper, **standard, "equations.c": code, "model.h": _header(table, work, fmi, token)}
 
 
-def _equations(name: str, made: Equations) -> tuple[str, Work]:
-    """C code of f, h, step and of the derivatives of [x', y] by [x, u, p] along a direction and back."""
-    functions = [made.f, made.h, made.step, *_derivatives(made)]
+def _equations(name: str, made: Equations, derivatives: bool = True) -> tuple[str, Work]:
+    """C code of f, h, step and, if wanted, derivatives of [x', y] by [x, u, p] along a direction and back."""
+    functions = [made.f, made.h, made.step, *(_derivatives(made) if derivatives else ())]
     # the name begins that of every helper, so that two models can be linked together
     generator = cs.CodeGenerator(f"{name}_equations.c", {"casadi_int": "int"})
     for function in functions:

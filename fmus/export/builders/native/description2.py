@@ -30,13 +30,18 @@ CO_SIMULATION = {
 }
 
 
-def description2(table: Table, token: str) -> dict[str, bytes]:
-    """The files of an FMI 2.0 FMU that describe it, by path."""
+def description2(table: Table, token: str, complete: bool = True) -> dict[str, bytes]:
+    """The files of an FMI 2.0 FMU that describe it, by path.
+
+    complete: whether sources and directional derivatives come with it.
+    """
     model = root("2.0", table, guid=token)
     model.set("numberOfEventIndicators", "0")
+    both = BOTH | {"providesDirectionalDerivative": str(complete).lower()}
     for kind, more in (("ModelExchange", MODEL_EXCHANGE), ("CoSimulation", CO_SIMULATION)):
-        interface = SubElement(model, kind, {"modelIdentifier": table.name, **more, **BOTH})
-        SubElement(SubElement(interface, "SourceFiles"), "File", name="fmu.c")
+        interface = SubElement(model, kind, {"modelIdentifier": table.name, **more, **both})
+        if complete:
+            SubElement(SubElement(interface, "SourceFiles"), "File", name="fmu.c")
     add_units(model, table)
     add_categories(model)
     add_experiment(model, table)
