@@ -8,8 +8,9 @@ from fmpy.fmi1 import FMICallException
 from numpy.testing import assert_array_equal
 
 from fmus.errors import BadInput
-from fmus.export.builders.native import working
-from fmus.export.builders.native.working import build_working, folder
+from fmus.export.builders.native import libraries
+from fmus.export.builders.native.libraries import folder
+from fmus.export.builders.native.working import build_working
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
 from tests.helpers.native import description, every_native, native
@@ -25,8 +26,8 @@ def empty_cache(monkeypatch, tmp_path):
 def compiled(monkeypatch, empty_cache):
     """How often the compiler was called."""
     calls = []
-    real = working.compile_library
-    monkeypatch.setattr(working, "compile_library", lambda *given: calls.append(given) or real(*given))
+    real = libraries.compile_library
+    monkeypatch.setattr(libraries, "compile_library", lambda *given: calls.append(given) or real(*given))
     return calls
 
 
@@ -68,8 +69,8 @@ def test_other_sources_and_other_compilers_have_libraries_of_their_own(compiled,
     build_working(MODELS["drive"](), tmp_path / "1.fmu")
     build_working(heavier(96.0), tmp_path / "2.fmu")
     assert len(compiled) == 2
-    real = working.version
-    monkeypatch.setattr(working, "version", lambda name: "0.0" if name == "ziglang" else real(name))
+    real = libraries.version
+    monkeypatch.setattr(libraries, "version", lambda name: "0.0" if name == "ziglang" else real(name))
     build_working(heavier(96.0), tmp_path / "3.fmu")
     assert len(compiled) == 3
 
@@ -108,14 +109,14 @@ def test_a_library_that_others_could_have_made_is_compiled_again(harm, compiled,
 
 def test_a_cache_that_cannot_be_written_costs_time_only(compiled, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(working, "folder", lambda: tmp_path / "file" / "libraries")
+    monkeypatch.setattr(libraries, "folder", lambda: tmp_path / "file" / "libraries")
     assert zipfile.is_zipfile(build_working(MODELS["drive"](), tmp_path / "1.fmu"))
     assert zipfile.is_zipfile(build_working(MODELS["drive"](), tmp_path / "2.fmu"))
     assert len(compiled) == 2
 
 
 def test_the_oldest_library_goes_where_there_are_too_many(compiled, monkeypatch, tmp_path):
-    monkeypatch.setattr(working, "KEPT", 1)
+    monkeypatch.setattr(libraries, "KEPT", 1)
     build_working(MODELS["drive"](), tmp_path / "1.fmu")
     old = list(folder().iterdir())
     build_working(heavier(96.0), tmp_path / "2.fmu")

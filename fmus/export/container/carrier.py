@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Sequence
@@ -21,10 +20,11 @@ import fmpy
 from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.around.outside import Laws, laws
+from fmus.export.builders.native.build import packed, write_at_once
 from fmus.export.builders.native.code import STANDARD, Work
-from fmus.export.builders.native.compilers import command, compile_library, host
+from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description import flag, text
-from fmus.export.builders.pythonfmu import ZIP_DATE
+from fmus.export.builders.native.libraries import library
 from fmus.export.container.coupled import carrying
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription, PortNames
@@ -32,6 +32,7 @@ from fmus.host.description import FmuDescription, PortNames
 HERE = Path(__file__).parent
 NAME = "Carrier"
 LARGEST = sys.float_info.max
+LINKED = {".so": ("-ldl",)}  # for libraries of a platform that load others
 ABILITIES = {
     "needsExecutionTool": "true",
     "canHandleVariableCommunicationStepSize": "true",
@@ -46,26 +47,22 @@ def build_carrier(
 
     BadInput where there is no compiler, or the base has no library for this platform.
     """
-    call, where = command(None, [host()])[host().name], host()
-    with Archive(base) as archive, tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
+    with Archive(base) as archive:
         description, inside = archive.description, archive.folder
-        version = int(description.fmi_version[0])
-        library = f"binaries/{where.folder(version)}/{description.identifier}{where.suffix}"
+        where, fmi = host(), int(archive.description.fmi_version[0])
+        carried = f"binaries/{where.folder(fmi)}/{description.identifier}{where.suffix}"
         made = laws(description, ports, effects)
         card = carrying(description, ports, effects, made, {})
-        files = _sources(card, made, description, library)
-        for name, content in files.items():
-            (Path(folder) / name).write_text(content, encoding="utf-8")
-        binary = Path(folder) / "binary" / f"{NAME}{where.suffix}"
-        compile_library(
-            call, Path(folder) / "carrier.c", binary, where, ("-ldl",) if where.suffix == ".so" else ()
-        )
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as packed:
-            packed.writestr(zipfile.ZipInfo("modelDescription.xml", ZIP_DATE), _described(card, description))
-            packed.write(binary, f"binaries/{where.folder(2)}/{binary.name}")
-            for path in sorted(p for p in inside.rglob("*") if p.is_file()):
-                packed.write(path, f"resources/base/{path.relative_to(inside).as_posix()}")
+        built = library(_sources(card, made, description, carried), "carrier.c", LINKED.get(where.suffix, ()))
+        files = {
+            path.relative_to(inside).as_posix(): path.read_bytes()
+            for path in inside.rglob("*")
+            if path.is_file()
+        }
+    files = {f"resources/base/{name}": data for name, data in files.items()}
+    files["modelDescription.xml"] = _described(card, description)
+    files[f"binaries/{where.folder(2)}/{NAME}{where.suffix}"] = built
+    write_at_once(out, packed(files, zipfile.ZIP_STORED))
     return out
 
 
@@ -74,8 +71,8 @@ def _token(card: dict[str, Any], description: FmuDescription) -> str:
     return f"{{{uuid.UUID(hashlib.sha256(said.encode()).hexdigest()[:32])}}}"
 
 
-def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, library: str) -> dict[str, str]:
-    """Text of the files to compile, by name."""
+def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, library: str) -> dict[str, bytes]:
+    """The files to compile, by name."""
     generator = cs.CodeGenerator("laws.c", {"casadi_int": "int"})
     functions = [made.push, made.go_on]
     for function in functions:
@@ -109,13 +106,13 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     }
     templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
     headers = Path(fmpy.__file__).parent / "c-code"
-    standard = {n: (headers / n).read_text(encoding="utf-8") for n in (*STANDARD[2], *STANDARD[3])}
-    return {
-        **standard,
+    files = {
         "carrier.c": (HERE / "carrier.c").read_text(encoding="utf-8"),
         "carrier.h": templates.get_template("carrier.h.j2").render(facts),
         "laws.c": generator.dump(),
     }
+    standard = {n: (headers / n).read_bytes() for n in (*STANDARD[2], *STANDARD[3])}
+    return standard | {name: content.encode() for name, content in files.items()}
 
 
 def _limit(row: dict[str, Any], key: str, without: float) -> str:

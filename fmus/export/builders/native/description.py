@@ -69,3 +69,8 @@ def needs(unknown: Unknown, offset: int, kinds: bool = True) -> dict[str, str]:
     """What an unknown depends on, as attributes; `offset` from references to FMI's numbers."""
     found = {"dependencies": " ".join(str(r + offset) for r in unknown.depends_on)}
     return found | ({"dependenciesKind": " ".join(unknown.kinds)} if kinds else {})
+
+
+def flag(value: bool) -> str:
+    """A truth value in XML."""
+    return "true" if value else "false"

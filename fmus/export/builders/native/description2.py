@@ -6,6 +6,7 @@ from fmus.export.builders.native.description import (
     add_categories,
     add_experiment,
     add_units,
+    flag,
     needs,
     numbers,
     root,
@@ -37,7 +38,7 @@ def description2(table: Table, token: str, complete: bool = True) -> dict[str, b
     """
     model = root("2.0", table, guid=token)
     model.set("numberOfEventIndicators", "0")
-    both = BOTH | {"providesDirectionalDerivative": str(complete).lower()}
+    both = BOTH | {"providesDirectionalDerivative": flag(complete)}
     for kind, more in (("ModelExchange", MODEL_EXCHANGE), ("CoSimulation", CO_SIMULATION)):
         interface = SubElement(model, kind, {"modelIdentifier": table.name, **more, **both})
         if complete:
