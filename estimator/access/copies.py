@@ -59,11 +59,17 @@ class Copies:
 
         Raises Refused if the FMU does not make the step.
         """
-        return self._run(values, t, dt)
+        loop, out = self._ready(values, t), np.empty((len(values), len(self.get)))
+        failed = loop.run(values, out, self.t0 if self.way is Way.RESUME else t, dt)
+        if failed >= 0:
+            self._refuse(values[failed // 8], failed // 8, failed % 8, t)
+        if not self._one:
+            self._now = t + dt
+        return out
 
     def evaluate(self, values: Array, t: float) -> Array:
         """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step."""
-        return self._run(values, t, 0.0)
+        return self.advance(values, t, 0.0)
 
     def close(self) -> None:
         """Free all instances."""
@@ -81,17 +87,6 @@ class Copies:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _run(self, values: Array, t: float, dt: float) -> Array:
-        values = np.ascontiguousarray(values)
-        loop = self._ready(values, t)
-        out = np.empty((len(values), len(self.get)))
-        failed = loop.run(values, out, self.t0 if self.way is Way.RESUME else t, dt)
-        if failed >= 0:
-            self._refuse(values[failed // 8], failed // 8, failed % 8, t)
-        if not self._one:
-            self._now = t + dt
-        return out
 
     def _ready(self, values: Array, t: float) -> Loop:
         """The loop over the instances for these rows, at time t."""

@@ -47,14 +47,17 @@ def factorise(P: Array, L: Array) -> bool:
             rest = P[i, j]
             for k in range(j):
                 rest -= L[i, k] * L[j, k]
-            L[i, j] = rest / L[j, j]
+            L[i, j], L[j, i] = rest / L[j, j], 0.0
     return True
 
 
 @compiled
 def finite(x: Array) -> bool:
     """Whether all values of x (n,) are finite."""
-    return not np.isnan(np.sum(x * 0.0))
+    total = 0.0
+    for value in x:
+        total += value * 0.0
+    return total == 0.0
 
 
 @compiled
@@ -91,82 +94,127 @@ def mean(points: Array, weights: Array, x: Array) -> None:
 @compiled
 def cross(A: Array, a: Array, B: Array, b: Array, weights: Array, P: Array) -> None:
     """Write the weighted covariance of points A (k, n) about a and B (k, m) about b into P (n, m)."""
-    P[:] = 0.0
-    for k in range(len(weights)):
-        for i in range(len(a)):
-            off = weights[k] * (A[k, i] - a[i])
-            for j in range(len(b)):
-                P[i, j] += off * (B[k, j] - b[j])
+    for i in range(len(a)):
+        for j in range(len(b)):
+            total = 0.0
+            for k in range(len(weights)):
+                total += weights[k] * (A[k, i] - a[i]) * (B[k, j] - b[j])
+            P[i, j] = total
+
+
+@compiled
+def covariance(points: Array, x: Array, weights: Array, P: Array) -> None:
+    """Write the weighted covariance of points (k, n) about x (n,) into P (n, n)."""
+    for i in range(len(x)):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(len(weights)):
+                total += weights[k] * (points[k, i] - x[i]) * (points[k, j] - x[j])
+            P[i, j] = P[j, i] = total
+
+
+@compiled
+def drawn(x: Array, P: Array, scale: float, L: Array, points: Array) -> bool:
+    """Write the factor L of P (n, n) and the sigma points about x (n,); False if either is not valid.
+
+    Nothing is drawn then, and L is undefined.
+    """
+    if not (factorise(P, L) and finite(x)):
+        return False
+    draw(x, L, scale, points)
+    return True
 
 
 @compiled
 def predict(
-    before: Array, x0: Array, after: Array, Wm: Array, Wc: Array, Q: Array, x: Array, P: Array, C: Array
-) -> None:
+    after: Array, Wm: Array, Wc: Array, Q: Array, scale: float,
+    L: Array, X: Array, x: Array, P: Array, C: Array,
+) -> bool:  # fmt: skip
     """Write the mean x (n,) and covariance P (n, n), with Q added, of weighted points after a step.
 
-    before, after: points (k, n) about x0 before and after the step; C: (n, n) their cross-covariance.
+    after: (k, n); L: factor with which the points before the step were drawn; C: (n, n) cross-covariance of
+    x before and after the step. L and X become those of the prediction, see `drawn`.
     """
+    n = len(x)
     mean(after, Wm, x)
-    cross(after, x, after, x, Wc, P)
+    covariance(after, x, Wc, P)
     P += Q
-    cross(before, x0, after, x, Wc, C)
+    C[:] = 0.0
+    for k in range(n):
+        for i in range(n):
+            up, down = Wc[1 + k] * scale * L[i, k], Wc[1 + n + k] * scale * L[i, k]
+            for j in range(n):
+                C[i, j] += up * (after[1 + k, j] - x[j]) - down * (after[1 + n + k, j] - x[j])
+    return drawn(x, P, scale, L, X)
 
 
 @compiled
-def expect(Y: Array, Wm: Array, Wc: Array, y: Array, S: Array) -> None:
-    """Write the mean y (m,) and covariance S (m, m) of weighted outputs Y (k, m)."""
+def expect(seen: Array, Wm: Array, Wc: Array, Y: Array, y: Array, S: Array) -> None:
+    """Write the mean y (m,) and covariance S (m, m) of weighted outputs (k, m), which are copied into Y."""
+    Y[:] = seen
     mean(Y, Wm, y)
-    cross(Y, y, Y, y, Wc, S)
+    covariance(Y, y, Wc, S)
 
 
 @compiled
 def solve(L: Array, b: Array) -> None:
     """Replace b (n, m) by the solution x of L L' x = b, by forward and backward substitution."""
-    n = len(L)
-    for j in range(b.shape[1]):
-        for i in range(n):
-            rest = b[i, j]
-            for k in range(i):
-                rest -= L[i, k] * b[k, j]
-            b[i, j] = rest / L[i, i]
-        for i in range(n - 1, -1, -1):
-            rest = b[i, j]
-            for k in range(i + 1, n):
-                rest -= L[k, i] * b[k, j]
-            b[i, j] = rest / L[i, i]
+    n, m = b.shape
+    for i in range(n):
+        for k in range(i):
+            for j in range(m):
+                b[i, j] -= L[i, k] * b[k, j]
+        for j in range(m):
+            b[i, j] /= L[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            for j in range(m):
+                b[i, j] -= L[k, i] * b[k, j]
+        for j in range(m):
+            b[i, j] /= L[i, i]
 
 
 @compiled
 def correct(
-    Wc: Array, X: Array, x: Array, Y: Array, y: Array, S: Array, e: Array, R: Array, x1: Array, P1: Array
-) -> None:
+    X: Array, x: Array, Y: Array, y: Array, S: Array, used: BoolArray, e: Array, R: Array, Wc: Array,
+    scale: float, x1: Array, P1: Array, L: Array,
+) -> bool:  # fmt: skip
     """Write the mean x1 (n,) and covariance P1 (n, n) of points X (k, n) corrected by innovations e (m,).
 
     Y: outputs (k, m) of the points; x, y: means of X and Y; S: (m, m) covariance of e, of which R is the
-    measurement noise. P1 is a sum of squares (Joseph's form). Both are nan if S is not positive definite.
+    measurement noise; used: (m,) the channels that correct. P1 is a sum of squares (Joseph's form). L and X
+    become those of the correction, see `drawn`. All are nan or undefined if S is not positive definite.
     """
+    if not used.all():
+        Y, y, e, S, R = Y[:, used], y[used], e[used], S[used][:, used], R[used][:, used]
     n, m = len(x), len(y)
-    L, gain, rest, none = np.zeros((m, m)), np.empty((m, n)), np.empty(X.shape), np.zeros(n)
-    if not factorise(S, L):
-        L[:] = np.nan
+    root, gain, rest, none = np.empty((m, m)), np.empty((m, n)), np.empty(X.shape), np.empty(n)
+    if not factorise(S, root):
+        root[:] = np.nan
     cross(Y, y, X, x, Wc, gain)
-    solve(L, gain)  # the gain, transposed
+    solve(root, gain)  # the gain, transposed
     for i in range(n):
-        x1[i] = x[i]
+        x1[i], none[i] = x[i], 0.0
         for a in range(m):
             x1[i] += gain[a, i] * e[a]
-        for k in range(len(X)):
+    for k in range(len(X)):
+        for i in range(n):
             rest[k, i] = X[k, i] - x[i]
-            for a in range(m):
-                rest[k, i] -= gain[a, i] * (Y[k, a] - y[a])
-    cross(rest, none, rest, none, Wc, P1)
+        for a in range(m):
+            off = Y[k, a] - y[a]
+            for i in range(n):
+                rest[k, i] -= gain[a, i] * off
+    covariance(rest, none, Wc, P1)
+    for a in range(m):
+        for b in range(m):
+            if R[a, b] != 0.0:  # mostly R is diagonal
+                for i in range(n):
+                    for j in range(i + 1):
+                        P1[i, j] += gain[a, i] * R[a, b] * gain[b, j]
     for i in range(n):
-        for j in range(i + 1):
-            for a in range(m):
-                for b in range(m):
-                    P1[i, j] += gain[a, i] * R[a, b] * gain[b, j]
+        for j in range(i):
             P1[j, i] = P1[i, j]
+    return drawn(x1, P1, scale, L, X)
 
 
 @compiled
@@ -196,3 +244,56 @@ def log_density(e: Array, S: Array) -> tuple[float, float]:
         square += e[i] * x[i, 0]
         size += 2 * np.log(L[i, i])
     return -0.5 * (square + size), square
+
+
+@compiled
+def weigh(
+    y: Array, expected: Array, S: Array, R: Array, deviations: float, patience: int,
+    innovation: Array, used: BoolArray, gated: BoolArray, rejected: Array,
+) -> tuple[int, float, float]:  # fmt: skip
+    """Compare outputs y (m,) with those expected: the number of channels used, log_density of these.
+
+    Writes the innovation (m,); adds R to S (m, m); takes gated channels out of `used`. See Gate for
+    `deviations` (inf if there is no gate) and `patience`; rejected: (m,) counts that the gate continues.
+    """
+    n = 0
+    S += R
+    for i in range(len(y)):
+        innovation[i], gated[i] = y[i] - expected[i], False
+        if used[i] and deviations < np.inf:
+            far = innovation[i] ** 2 > deviations**2 * S[i, i]
+            rejected[i] = rejected[i] + 1 if far else 0.0
+            gated[i] = far and rejected[i] <= patience
+            used[i] = not gated[i]
+        n += used[i]
+    if n == 0:
+        return 0, 0.0, 0.0
+    if n < len(y):
+        likelihood, nis = log_density(innovation[used], S[used][:, used])
+    else:
+        likelihood, nis = log_density(innovation, S)
+    return n, likelihood, nis
+
+
+@compiled
+def match(
+    innovation: Array, S: Array, R: Array, declared: Array, used: BoolArray, share: float,
+    limits: tuple[float, float], scatter: Array, ratios: Array,
+) -> float:  # fmt: skip
+    """Match the noise to innovations (m,) with covariance S (m, m), of which R is the noise in use.
+
+    Continues with weight `share` the mean squares `scatter` (m,) and the ratios (m,) of the variances to the
+    declared ones, within limits. Returns the scatter found over that explained by the process noise.
+    """
+    explained = found = 0.0
+    for i in range(len(innovation)):
+        if np.isnan(scatter[i]):
+            scatter[i] = S[i, i]
+        if used[i]:
+            scatter[i] += share * (innovation[i] ** 2 - scatter[i])
+            wanted = (scatter[i] - (S[i, i] - R[i, i])) / declared[i, i]
+            ratios[i] += share * (wanted - ratios[i])
+            explained += (S[i, i] - R[i, i]) / S[i, i]
+            found += (scatter[i] - R[i, i]) / S[i, i]
+        ratios[i] = min(max(ratios[i], limits[0]), limits[1])
+    return found / max(explained, 1e-12)

@@ -6,7 +6,6 @@ A parameter is estimated from its influence within one step, so that the states 
 measured.
 """
 
-from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -72,8 +71,7 @@ class Dual(Estimator):
         self._moving.rest = np.concatenate([before.x[:n], theta.x])
         x = self.states.step(u, y, dt, held)
         self._learning.rest = np.concatenate([x.x, theta.x])
-        self.now = replace(
-            x,
+        self.now = x._replace(
             x=np.concatenate([x.x, theta.x]),
             P=_blocks(x.P, theta.P),
             x_prior=np.concatenate([x.x_prior, theta.x_prior]),

@@ -4,7 +4,7 @@ from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from estimator.filters.algebra import joseph, symmetric
+from estimator.filters.algebra import symmetric
 from estimator.filters.derivatives import differentiated
 from estimator.filters.estimator import (
     Adaptation,
@@ -14,7 +14,7 @@ from estimator.filters.estimator import (
     Gate,
     System,
 )
-from estimator.filters.linear import central, slopes
+from estimator.filters.linear import central, kalman, slopes
 from estimator.filters.named import Estimator, Request
 from estimator.filters.system import Joint
 from estimator.record import Array, BoolArray
@@ -82,8 +82,7 @@ class Ekf(Filter, Estimator):
     def _correct(
         self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        found: tuple[Array, Array] = joseph(x, P, np.ascontiguousarray(self._H[used]), innovation, R)
-        return found
+        return kalman(x, P, self._H, used, innovation, R)
 
 
 def _scale(x: Array, P: Array) -> Array:

@@ -2,22 +2,23 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from math import isnan
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from math import inf, isnan
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from estimator.filters.algebra import (
     factorise,
     finite,
-    log_density,
+    match,
     there,
+    weigh,
 )
 from estimator.record import Array, BoolArray
 
 Covariance = Array | Callable[[float], Array]  # constant, or a function of the step length [s]
-NONE = np.empty(0)
+NONE, NO_CHANNELS = np.empty(0), np.empty(0, np.bool_)
 ROUNDING = 1e-12  # eigenvalues of a correlation matrix below this are zero to rounding
 
 
@@ -52,8 +53,7 @@ class System(Protocol):
         """The state (n,) after a correction, clipped to its bounds if the system requires it."""
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """The estimate after a sample, with the intermediate results; a filter can be restarted from it exactly.
 
     If nothing was measured, innovation is nan, S is empty and log_likelihood is 0.
@@ -63,16 +63,16 @@ class Estimate:
     x: Array  # (n,)
     P: Array  # (n, n)
     u: Array | None = None  # (n_u,) inputs at t; None before the first sample
-    innovation: Array = field(default_factory=lambda: NONE)  # (m,) nan where nothing was measured
-    S: Array = field(default_factory=lambda: NONE)  # (m, m) expected covariance of the innovation
-    used: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) channels that were used
-    gated: BoolArray = field(default_factory=lambda: np.empty(0, np.bool_))  # (m,) rejected by the gate
+    innovation: Array = NONE  # (m,) nan where nothing was measured
+    S: Array = NONE  # (m, m) expected covariance of the innovation
+    used: BoolArray = NO_CHANNELS  # (m,) channels that were used
+    gated: BoolArray = NO_CHANNELS  # (m,) rejected by the gate
     log_likelihood: float = 0.0
     nis: float = 0.0  # normalised innovation squared, of the channels that were used
-    x_prior: Array = field(default_factory=lambda: NONE)  # (n,) before the correction
-    P_prior: Array = field(default_factory=lambda: NONE)  # (n, n)
-    C: Array = field(default_factory=lambda: NONE)  # (n, n) covariance of x before and after the step
-    carried: Array = field(default_factory=lambda: NONE)
+    x_prior: Array = NONE  # (n,) before the correction
+    P_prior: Array = NONE  # (n, n)
+    C: Array = NONE  # (n, n) covariance of x before and after the step
+    carried: Array = NONE
     memory: Any = None  # internal state of the gate and the adaptation
 
 
@@ -135,17 +135,18 @@ class Filter(ABC):
         self.system, self.now, self.dt = system, start, dt
         self.names = system.names
         self.gate, self.adapt = gate, adapt
-        self._Q, self.R = Q, np.asarray(R, dtype=float)
-        self._factor: tuple[Array, Array] | None = None
+        self._Q, self.R = Q, np.ascontiguousarray(R, dtype=float)
+        self._deviations, self._patience = (float(gate.deviations), gate.patience) if gate else (inf, 0)
+        self._L, self._factored = np.empty((len(system.names),) * 2), NONE
         m = len(self.R)
         self._memory: Adapted = start.memory or Adapted(np.full(m, np.nan), np.ones(m), 1.0, np.zeros(m))
         self.factored(start.x, start.P, start.t)
 
     def factored(self, x: Array, P: Array, t: float) -> Array:
         """A factor of P (n, n), computed once; raises Diverged if there is none."""
-        if self._factor is None or self._factor[0] is not P:
-            self._factor = P, checked(x, P, self.names, t)
-        return self._factor[1]
+        if self._factored is not P:
+            self._L, self._factored = checked(x, P, self.names, t), P
+        return self._L
 
     @abstractmethod
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
@@ -159,7 +160,7 @@ class Filter(ABC):
     def _correct(
         self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        """x, P corrected by the channels `used`; innovation (m_u,), S and R (m_u, m_u) are of these."""
+        """x, P corrected by the channels `used` (m,); innovation (m,), S and R (m, m) are of all channels."""
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
         """Predict over dt with inputs u (n_u,) at its end, correct by outputs y (m,), nan if not measured.
@@ -186,65 +187,45 @@ class Filter(ABC):
         self, x: Array, P: Array, u: Array, y: Array, t: float, carried: Array
     ) -> tuple[Array, Array, Facts]:
         """x, P after the correction, or the same objects if no channel is used."""
-        m = len(y)
-        seen = np.empty(m, np.bool_)
-        n = there(y, seen)
-        if n == 0:
-            return x, P, (np.full(m, np.nan), NONE, seen, seen, 0.0, 0.0)
+        m, memory, gated = len(y), self._memory, np.empty(len(y), np.bool_)
+        used, innovation, R = np.empty(m, np.bool_), np.empty(m), self.R
+        if there(y, used) == 0:
+            return x, P, (np.full(m, np.nan), NONE, used, used, 0.0, 0.0)
         expected, S = self._expect(x, P, u, t, carried)
-        R = self.R * np.sqrt(np.outer(self._memory.R, self._memory.R)) if self.adapt else self.R
-        S, innovation = S + R, y - expected
-        used, gated = seen, np.zeros(m, np.bool_)
-        if self.gate:
-            gated = self._gated(innovation, S, seen)
-            used = seen & ~gated
-            n = int(used.sum())
-        if n == 0:
-            return x, P, (innovation, S, used, gated, 0.0, 0.0)
-        part = innovation, S, R
-        if n < m:
-            both = np.ix_(used, used)
-            part = innovation[used], S[both], R[both]
-        likelihood, nis = log_density(*part[:2])
-        if isnan(nis):
-            self._cannot_weigh(*part[:2], used, t)
-        x, P = self._correct(x, P, used, *part)
         if self.adapt:
-            self._adapt(self.adapt, innovation, S, R, used)
+            R = R * np.sqrt(np.outer(memory.R, memory.R))
+        rejected = memory.rejected.copy() if self.gate else memory.rejected
+        n, likelihood, nis = weigh(
+            y, expected, S, R, self._deviations, self._patience, innovation, used, gated, rejected
+        )
+        if self.gate:
+            self._memory = replace(memory, rejected=rejected)
+        if isnan(nis):
+            self._cannot_weigh(innovation, S, used, t)
+        if n:
+            x, P = self._correct(x, P, used, innovation, S, R)
+            if self.adapt:
+                self._adapt(self.adapt, innovation, S, R, used)
         return x, P, (innovation, S, used, gated, likelihood, nis)
 
     def _cannot_weigh(self, innovation: Array, S: Array, used: BoolArray, t: float) -> None:
         """Raise Diverged with the output whose innovation covariance is not positive definite."""
-        checked(innovation, S, [n for n, there in zip(self.system.outputs, used, strict=True) if there], t)
+        names = [name for name, weighed in zip(self.system.outputs, used, strict=True) if weighed]
+        checked(innovation[used], S[np.ix_(used, used)], names, t)
         raise Diverged(f"at t = {t:g} s the expected outputs have no variance; declare noise for the outputs")
 
     def _process_noise(self, dt: float) -> Array:
         Q = self._Q(dt) if callable(self._Q) else self._Q
         return Q * self._memory.Q if self.adapt and self.adapt.process else Q
 
-    def _gated(self, innovation: Array, S: Array, seen: BoolArray) -> BoolArray:
-        if self.gate is None:
-            return np.zeros(len(innovation), dtype=np.bool_)
-        far = seen & (innovation**2 > self.gate.deviations**2 * np.diag(S))
-        rejected = np.where(far, self._memory.rejected + 1, np.where(seen, 0, self._memory.rejected))
-        far &= rejected <= self.gate.patience
-        self._memory = Adapted(self._memory.scatter, self._memory.R, self._memory.Q, rejected)
-        return far
-
     def _adapt(self, a: Adaptation, innovation: Array, S: Array, R: Array, used: BoolArray) -> None:
         """Covariance matching: scatter of the innovations beyond that of the predicted outputs is noise."""
         m, share = self._memory, 1 / a.samples
-        known = np.where(np.isnan(m.scatter), np.diag(S), m.scatter)
-        scatter = np.where(used, known + share * (innovation**2 - known), known)
-        r, q = m.R, m.Q
-        if a.measurement:
-            wanted = (scatter - np.diag(S - R)) / np.diag(self.R)
-            r = np.clip(np.where(used, r + share * (wanted - r), r), *a.limits)
+        scatter, r, q = m.scatter.copy(), m.R.copy(), m.Q
+        excess = match(innovation, S, R, self.R, used, share, a.limits, scatter, r)
         if a.process:
-            explained = float(np.sum(np.diag(S - R)[used] / np.diag(S)[used]))
-            found = float(np.sum((scatter - np.diag(R))[used] / np.diag(S)[used]))
-            q = float(np.clip(q * (1 + share * (found / max(explained, 1e-12) - 1)), *a.limits))
-        self._memory = Adapted(scatter, r, q, m.rejected)
+            q = float(np.clip(q * (1 + share * (excess - 1)), *a.limits))
+        self._memory = Adapted(scatter, r if a.measurement else m.R, q, m.rejected)
 
 
 def checked(x: Array, P: Array, names: Sequence[str], t: float) -> Array:

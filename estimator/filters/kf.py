@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimator.filters.algebra import joseph, symmetric
+from estimator.filters.algebra import symmetric
 from estimator.filters.estimator import (
     Adaptation,
     Covariance,
@@ -10,7 +10,7 @@ from estimator.filters.estimator import (
     Filter,
     Gate,
 )
-from estimator.filters.linear import Linear
+from estimator.filters.linear import Linear, kalman
 from estimator.record import Array, BoolArray
 
 
@@ -41,5 +41,4 @@ class Kf(Filter):
     def _correct(
         self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        found: tuple[Array, Array] = joseph(x, P, self._H[used], innovation, R)
-        return found
+        return kalman(x, P, self._H, used, innovation, R)

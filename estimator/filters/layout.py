@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from estimator.filters.bounds import (
     Transform,
     Whole,
     coded,
-    grow,
+    grown,
 )
 from estimator.filters.unknown_input import UnknownInput
 from estimator.record import Array
@@ -30,7 +31,7 @@ class Layout:
     inputs: int
     fed: Whole  # (n_fed,) index of the unknown inputs' state that drives each input
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Length of a row."""
         return self.n + self.others + len(self.transforms[0]) + self.inputs + len(self.fed)
@@ -41,11 +42,8 @@ class Layout:
         u: (inputs,); carried: (others,); F: (n_w, n_w) transition of the states of the unknown inputs, which
         act with the mean of their values at both ends.
         """
-        values, after = np.empty((len(X), self.width)), np.empty_like(X)
-        at, end = self.n + self.others, self.n + len(self.transforms[0])
-        fill(X, u, carried, F, self.n, end, self.fed, values, after)
-        if end > self.n:
-            grow(*self.transforms, X[:, self.n : end], values[:, at:])
+        values, after = np.empty((len(X), self.width)), np.empty(X.shape)
+        fill(X, u, carried, F, self.n, *self.transforms, self.fed, values, after)
         return values, after
 
 
@@ -61,21 +59,38 @@ def layout(
 
 
 @compiled
+def collect(found: Array, n: int, after: Array, carried: Array) -> None:
+    """Copy the n states of each row read from the FMU into `after`, and the other states of the first row."""
+    for k in range(len(found)):
+        for i in range(n):
+            after[k, i] = found[k, i]
+    for i in range(len(carried)):
+        carried[i] = found[0, n + i]
+
+
+@compiled
 def fill(
-    X: Array, u: Array, carried: Array, F: Array, n: int, first: int, fed: Whole, values: Array, after: Array
-) -> None:
-    """See Layout.rows; first: position of the unknown inputs in x. Parameters in `values` are not filled."""
-    at_inputs = len(carried) + first
+    X: Array, u: Array, carried: Array, F: Array, n: int, codes: Whole, low: Array, high: Array, fed: Whole,
+    values: Array, after: Array,
+) -> None:  # fmt: skip
+    """See Layout.rows; codes, low, high: transforms of the parameters."""
+    first = n + len(codes)  # of the states of the unknown inputs in x
+    at_parameters, at_inputs = n + len(carried), len(carried) + first
     at_fed = at_inputs + len(u)
-    for row in range(len(X)):
-        x, end, value = X[row], after[row], values[row]
-        value[:n] = x[:n]
-        value[n : n + len(carried)] = carried
-        value[at_inputs:at_fed] = u
-        end[:first] = x[:first]
+    for k in range(len(X)):
+        for i in range(n):
+            values[k, i] = after[k, i] = X[k, i]
+        for i in range(len(carried)):
+            values[k, n + i] = carried[i]
+        for i in range(len(codes)):
+            values[k, at_parameters + i] = grown(codes[i], low[i], high[i], X[k, n + i])
+            after[k, n + i] = X[k, n + i]
+        for i in range(len(u)):
+            values[k, at_inputs + i] = u[i]
         for i in range(len(F)):
-            end[first + i] = 0.0
+            total = 0.0
             for j in range(len(F)):
-                end[first + i] += F[i, j] * x[first + j]
+                total += F[i, j] * X[k, first + j]
+            after[k, first + i] = total
         for i in range(len(fed)):
-            value[at_fed + i] = (x[first + fed[i]] + end[first + fed[i]]) / 2
+            values[k, at_fed + i] = (X[k, first + fed[i]] + after[k, first + fed[i]]) / 2

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.filters.algebra import joseph
 from estimator.filters.estimator import NONE, System
-from estimator.record import Array
+from estimator.record import Array, BoolArray
 
 NUDGE = 1e-3  # finite difference, as share of a state's scale
 
@@ -37,6 +38,12 @@ class Linear:
     def settled(self, x: Array) -> Array:
         """See System."""
         return x
+
+
+def kalman(x: Array, P: Array, H: Array, used: BoolArray, innovation: Array, R: Array) -> tuple[Array, Array]:
+    """x, P corrected by the outputs `used` (m,) of H x, with innovations (m,) and noise R (m, m)."""
+    found: tuple[Array, Array] = joseph(x, P, H[used], innovation[used], R[np.ix_(used, used)])
+    return found
 
 
 def central(x: Array, scale: Array) -> tuple[Array, Array]:

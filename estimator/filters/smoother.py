@@ -28,9 +28,11 @@ def smoothed(estimates: Sequence[Estimate]) -> Smoothed:
     t = np.array([e.t for e in estimates])
     x = np.array([e.x for e in estimates])
     P = np.array([e.P for e in estimates])
+    if len(estimates) > 1:
+        prior, C = (np.array([getattr(e, part) for e in estimates[1:]]) for part in ("P_prior", "C"))
+        gains = np.linalg.solve(prior, C.transpose(0, 2, 1)).transpose(0, 2, 1)
     for k in range(len(estimates) - 2, -1, -1):
-        after = estimates[k + 1]
-        G = np.linalg.solve(after.P_prior, after.C.T).T
+        G, after = gains[k], estimates[k + 1]
         x[k] = x[k] + G @ (x[k + 1] - after.x_prior)
         P[k] = symmetric(P[k] + G @ (P[k + 1] - after.P_prior) @ G.T)
     return Smoothed(t, x, P)

@@ -16,7 +16,7 @@ from estimator.access.probe import Access, by_exchange, probe
 from estimator.access.recipe import Way
 from estimator.filters.bounds import Transform
 from estimator.filters.estimator import Diverged, Estimate
-from estimator.filters.layout import layout
+from estimator.filters.layout import collect, layout
 from estimator.filters.unknown_input import UnknownInput
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
@@ -123,9 +123,9 @@ class Joint:
             return X, carried
         values, after = self.layout.rows(X, u, carried, self.transition(dt))
         found = self._asked(self.copies.advance, values, t, dt)
-        n = len(self.states)
-        after[:, :n] = found[:, :n]
-        return after, found[0, n : n + len(self.others)].copy()
+        carried = np.empty(len(carried))
+        collect(found, len(self.states), after, carried)
+        return after, carried
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """See System; the FMU is evaluated only if an output is not a state."""
@@ -144,10 +144,10 @@ class Joint:
 
     def settled(self, x: Array) -> Array:
         """See System; clips parameters whose bounds are kept by clipping."""
-        for i, p in enumerate(self.parameters, len(self.states)):
-            if p.transform.kind == "clip":
-                x = x.copy()
-                x[i] = p.transform.settled(x[i])
+        if self._clipped:
+            x = x.copy()
+            for i, transform in self._clipped:
+                x[i] = transform.settled(x[i])
         return x
 
     def values(self, x: Array, std: Array) -> tuple[Array, Array]:
@@ -201,6 +201,7 @@ class Joint:
         """Set up the positions of unknowns in x, in the rows set in the FMU and in the rows read from it."""
         n, transforms = len(self.states), [p.transform for p in self.parameters]
         self.layout = layout(n, len(self.others), transforms, len(self.inputs), self.unknown)
+        self._clipped = [(i, t) for i, t in enumerate(transforms, n) if t.kind == "clip"]
         self._still = np.eye(len(self.names) - n - len(transforms))
         self._seen = [get.index(name) for name in self.outputs]
         self._direct: slice | list[int] | None = None

@@ -18,6 +18,7 @@ from estimator.filters.algebra import (
     predict,
 )
 from estimator.filters.estimator import (
+    NONE,
     Adaptation,
     Covariance,
     Estimate,
@@ -69,7 +70,7 @@ class Ukf(Filter, Estimator):
         n, m = len(system.names), len(self.R)
         weights = MerweScaledSigmaPoints(n, spread.alpha, spread.beta, spread.kappa)
         self._Wm, self._Wc, self._scale = weights.Wm, weights.Wc, spread.scale(n)
-        self._before, self._X = (np.empty((2 * n + 1, n)) for _ in range(2))
+        self._X, self._drawn = np.empty((2 * n + 1, n)), NONE
         self._Y, self._y = np.empty((2 * n + 1, m)), np.empty(m)
 
     @classmethod
@@ -79,26 +80,35 @@ class Ukf(Filter, Estimator):
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
         now, n = self.now, len(self.names)
-        draw(now.x, self.factored(now.x, now.P, t), self._scale, self._before)
-        after, carried = self.system.f(self._before, u, t, dt, now.carried)
+        X = self._points(now.x, now.P, t)
+        after, carried = self.system.f(X, u, t, dt, now.carried)
         x, P, C = np.empty(n), np.empty((n, n)), np.empty((n, n))
-        predict(self._before, now.x, after, self._Wm, self._Wc, Q, x, P, C)
+        valid = predict(after, self._Wm, self._Wc, Q, self._scale, self._L, X, x, P, C)
+        self._remember(valid, x, P)
         return x, P, C, carried
 
     def _expect(self, x: Array, P: Array, u: Array, t: float, carried: Array) -> tuple[Array, Array]:
-        m = len(self.R)
-        draw(x, self.factored(x, P, t), self._scale, self._X)
-        self._Y = np.ascontiguousarray(self.system.h(self._X, u, t, carried))
-        self._y, S = np.empty(m), np.empty((m, m))
-        expect(self._Y, self._Wm, self._Wc, self._y, S)
+        seen, S = self.system.h(self._points(x, P, t), u, t, carried), np.empty(self.R.shape)
+        expect(seen, self._Wm, self._Wc, self._Y, self._y, S)
         return self._y, S
 
     def _correct(
         self, x: Array, P: Array, used: BoolArray, innovation: Array, S: Array, R: Array
     ) -> tuple[Array, Array]:
-        Y, y, n = self._Y, self._y, len(x)
-        if len(innovation) < len(y):
-            Y, y = np.ascontiguousarray(Y[:, used]), y[used]
-        x1, P1 = np.empty(n), np.empty((n, n))
-        correct(self._Wc, self._X, x, Y, y, S, innovation, R, x1, P1)
+        x1, P1 = np.empty(len(x)), np.empty(P.shape)
+        valid = correct(
+            self._X, x, self._Y, self._y, S, used, innovation, R, self._Wc, self._scale, x1, P1, self._L
+        )
+        self._remember(valid, x1, P1)
         return x1, P1
+
+    def _points(self, x: Array, P: Array, t: float) -> Array:
+        """The sigma points of x, P, which are in place already if the last step ended with these."""
+        if self._drawn is not x or self._factored is not P:
+            draw(x, self.factored(x, P, t), self._scale, self._X)
+            self._drawn = x
+        return self._X
+
+    def _remember(self, valid: bool, x: Array, P: Array) -> None:
+        """Note of which x and P the factor and the sigma points are; of none if they are not valid."""
+        self._drawn, self._factored = (x, P) if valid else (NONE, NONE)

@@ -165,7 +165,7 @@ def test_a_filter_restarted_from_a_saved_estimate_goes_on_exactly(kind, options)
     again = kind(made, whole[29], Q, R, DT, **options)
     for e, expected in zip(run(again, u[30:], Y[30:]), whole[30:], strict=True):
         assert e.t == expected.t
-        for part in ("x", "P", "innovation", "gated", "log_likelihood"):
+        for part in ("x", "P", "innovation", "S", "gated", "log_likelihood", "x_prior", "P_prior", "C"):
             assert_array_equal(getattr(e, part), getattr(expected, part))
 
 
@@ -355,14 +355,23 @@ def test_compiled_and_plain_algebra_agree():
     P, w = L @ L.T + np.eye(3), rng.random(7)
     H, S = rng.standard_normal((2, 3)), np.array([[2.0, 0.3], [0.3, 1.0]])
     n, m, nn, nm, mm = (np.zeros(shape) for shape in (3, 2, (3, 3), (3, 2), (2, 2)))
+    one, both, counts = np.array([True, False]), np.ones(2, bool), np.array([3.0, 0.0])
+    correction = (X, X[0], Y, Y[0], S), (Y[1], 0.1 * S, w, 1.3, n, nn, nn.copy())
+    weighed = (Y[0], Y[1], S, 0.1 * S), (m, both, both, counts)
     for name, arguments in {
         "symmetric": (L,), "factorise": (P, nn), "finite": (X[0],), "there": (Y[0], np.zeros(2, bool)),
         "draw": (X[0], L, 1.3, X.copy()), "mean": (X, w, n), "cross": (X, X[0], Y, Y[0], w, nm),
-        "predict": (X, X[0], X[::-1].copy(), w, w, P, n, nn, nn.copy()), "expect": (Y, w, w, m, mm),
-        "solve": (np.tril(P), L), "correct": (w, X, X[0], Y, Y[0], S, Y[1], 0.1 * S, n, nn),
+        "covariance": (X, X[0], w, nn), "drawn": (X[0], P, 1.3, nn, X.copy()),
+        "predict": (X[::-1].copy(), w, w, P, 1.3, L, X, n, nn, nn.copy()),
+        "expect": (X[:, :2], w, w, Y, m, mm), "solve": (np.tril(P), L),
+        "correct": (*correction[0], both, *correction[1]),
+        "correct by one": (*correction[0], one, *correction[1]),
         "joseph": (X[0], P, H, Y[0], S), "log_density": (Y[0], S),
+        "weigh": (*weighed[0], np.inf, 0, *weighed[1]),
+        "weigh with a gate": (*weighed[0], 0.9, 2, *weighed[1]),
+        "match": (Y[0], S, 0.1 * S, 0.2 * S, one, 0.1, (0.5, 2.0), np.array([np.nan, 1.0]), np.ones(2)),
     }.items():  # fmt: skip
-        function = getattr(algebra, name)
+        function = getattr(algebra, name.split(" ")[0])
         for a, b in zip(_made(function, arguments), _made(function.py_func, arguments), strict=True):
             assert_allclose(a, b, rtol=1e-12, atol=1e-13)
 
