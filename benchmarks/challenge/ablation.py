@@ -10,8 +10,7 @@ from unittest.mock import patch
 from benchmarks.challenge.match import Answer, judged
 from benchmarks.challenge.truth import Truth
 from estimator.closeloop.decision import law_form
-from estimator.closeloop.decision.allowed import allowed
-from estimator.closeloop.decision.detect import LIKENESS, Detection
+from estimator.closeloop.decision.detect import Detection
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
 from estimator.closeloop.evidence import Judgement
@@ -26,7 +25,6 @@ Answers = dict[str, dict[str, Told]]  # by limit and change
 
 STAGES = ("detection", "decision")  # limits of the search decide what is fitted: these need new fits
 NEEDS_DRAWS = ("detection.replicates", "detection.slow_blocks")  # the noise would have to be drawn again
-REFITS = ("errors_reach", "errors_apart", "errors_laws")  # limits that move hypotheses by their errors
 FACTORS = {"0": 0.0, "half": 0.5, "double": 2.0, "no end": 1e12}
 SEARCHED = "would be searched"  # of a residual that the default leaves alone, so that there are no fits
 
@@ -58,13 +56,10 @@ class _Again:
     """What the chain found in a record, judged again; simulations are made once for all policies."""
 
     found: Outcome
-    usual: list[Hypothesis] | None = None  # single hypotheses, moved as their errors allow
-    curves: dict[int, tuple[float, float]] = field(default_factory=dict)
+    curves: dict[int, float] = field(default_factory=dict)
     _curvature = staticmethod(law_form.curvature)
 
-    def curvature(
-        self, baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]
-    ) -> tuple[float, float]:
+    def curvature(self, baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> float:
         """See law_form.curvature."""
         if id(h) not in self.curves:
             self.curves[id(h)] = self._curvature(baseline, h, forces)
@@ -79,24 +74,15 @@ class _Again:
             return early.verdict, []
         if not found.singles and not found.pairs:
             return SEARCHED, []
-        singles = form_of(baseline).ranked(self._moved(baseline))
+        singles = form_of(baseline).ranked(found.singles)
         leading = judge(baseline, singles, found.pairs, found.detection.sets_in)
-        leading = leading.of([*found.singles, *found.pairs])
         told = confirmed_on_test(baseline, law_form.confirmed(baseline, leading, found.forces))
         return told.after(before).verdict, _named(told)
 
     def _detection(self, baseline: Baseline) -> Detection:
         limits, seen = baseline.policy.detection, self.found.detection
-        clear = seen.figures.get(LIKENESS, 0.0) >= limits.clear_likeness
-        size = form_of(baseline).importance(seen.likeness, seen.sets_in, clear)
+        size = form_of(baseline).importance(seen.likeness, seen.sets_in)
         return replace(seen, level=limits.level, importance=size)
-
-    def _moved(self, baseline: Baseline) -> list[Hypothesis]:
-        if any(getattr(baseline.policy.decision, n) != getattr(DEFAULT.decision, n) for n in REFITS):
-            return allowed(baseline, self.found.singles)
-        if self.usual is None:
-            self.usual = allowed(baseline, self.found.singles)
-        return self.usual
 
 
 def _named(judgement: Judgement) -> list[tuple[str, str]]:

@@ -9,7 +9,6 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.closeloop.checkpoints import Stages
-from estimator.closeloop.decision.allowed import allowed
 from estimator.closeloop.decision.detect import Detection, detect
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.model_form import form_of
@@ -170,10 +169,8 @@ class Chain:
         pairs: Sequence[Hypothesis], stage: str,
     ) -> tuple[Judgement, Judgement]:  # fmt: skip
         """The judgement by comparison of the fits, and the same after the test of the law's curve."""
-        baseline, done = shown.baseline, self.stages.done
-        judged = done(f"allowed {stage}", lambda: allowed(baseline, singles))
-        leading = judge(baseline, judged, pairs, shown.began).of([*singles, *pairs])
-        return leading, done(stage, lambda: confirmed(baseline, leading, forces))
+        leading = judge(shown.baseline, singles, pairs, shown.began)
+        return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))
 
 
 def _profiled(fitter: Fitter, members: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -57,15 +57,6 @@ class DetectionPolicy:
         "a residual beyond noise is too small to matter if it is below this and below `signal_share`",
         "derivation: half of the noise adds 12 % to an output's rms, which no user of the model would notice",
     )
-    noise_share_of_effects: float = limit(
-        0.2, "times the noise", "replaces `noise_share` if the residual is clearly like an effect", CHALLENGE
-    )
-    clear_likeness: float = limit(
-        20.0,
-        "times the 95 % quantile of noise",
-        "likeness to an effect from which on the residual is clearly like that effect",
-        f"{CHALLENGE}: records without an effect reach 6",
-    )
     chance: float = limit(
         3.0,
         "standard deviations",
@@ -305,12 +296,6 @@ class DecisionPolicy:
         "share that an answer must explain if noise is not declared, so that the noise floor is unknown",
         CHALLENGE,
     )
-    open_explained: float = limit(
-        0.9,
-        "share of the variance beyond noise",
-        "share that several effects must explain if the model form is open and all residuals are small",
-        CHALLENGE,
-    )
     open_single: float = limit(
         0.5,
         "share of the variance beyond noise",
@@ -353,52 +338,10 @@ class DecisionPolicy:
         "share that a second effect, or a free curve beside a law, must explain",
         CHALLENGE,
     )
-    pair_leaves: float = limit(
-        0.1,
-        "share of what the second effect explains",
-        "largest remainder beyond noise that a correct pair may leave",
-        CHALLENGE,
-    )
-    curve_of_noise: float = limit(
-        0.05,
-        "share of the sum of squares of noise",
-        "reduction by a free curve beside a law, from which on the law may be rejected",
-        CHALLENGE,
-    )
-    open_curve_left: float = limit(
-        0.05,
-        "share of what the law leaves",
-        "reduction by a free curve, from which on a law may be rejected if the model form is open",
-        CHALLENGE,
-    )
     open_curve_explained: float = limit(
         2.5e-3,
         "share of what the law explains",
         "reduction by a free curve, from which on a law may be rejected if the model form is open",
-        CHALLENGE,
-    )
-    open_curve_elsewhere: float = limit(
-        0.99,
-        "share of the reduction by a curve over another motion",
-        "a law is not rejected by a free curve that gains less, if the model form is open",
-        CHALLENGE,
-    )
-    rounded: float = limit(
-        1e-4,
-        "share of what a law explains",
-        "smallest misfit of a smooth curve that imitates a law with a corner",
-        CHALLENGE,
-    )
-    plain_law: int = limit(
-        2,
-        "unknowns",
-        "a law with no more unknowns is imitated less closely: `open_curve_explained` replaces `rounded`",
-        CHALLENGE,
-    )
-    fastest: float = limit(
-        0.1,
-        "share of the samples",
-        "fastest samples; friction whose rounded part includes even these is not named friction",
         CHALLENGE,
     )
     different: float = limit(
@@ -407,16 +350,6 @@ class DecisionPolicy:
         "p-value below which the estimates of several records differ, so that no common value is given",
         "convention, as the level of detection",
     )
-    errors_reach: float = limit(
-        3.0,
-        "standard errors",
-        "how far values may move when laws are adjusted to the part to choose within their errors",
-        CHALLENGE,
-    )
-    errors_apart: float = limit(
-        20.0, "log score", "difference between laws from which on they are adjusted in this way", CHALLENGE
-    )
-    errors_laws: int = limit(8, "laws", "laws that are adjusted in this way, best first", CHALLENGE)
 
 
 @dataclass(frozen=True)

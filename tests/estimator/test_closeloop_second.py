@@ -10,7 +10,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from estimator.closeloop import progress
-from estimator.closeloop.decision import allowed as allowing
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import one_curve
 from estimator.closeloop.fitting import fitter
@@ -222,63 +221,6 @@ def test_a_moment_some_swings_off_is_found(moment, off):
 
 
 # ---- laws that the part to identify cannot tell apart
-
-
-class Saturating:
-    """An effect F on an output, and friction c that shows in the held-out part alone."""
-
-    policy = DEFAULT
-
-    def __init__(self, seed: int) -> None:
-        t = np.arange(0.0, 60.0, 0.02)
-        fit, rng = t < 36.0, np.random.default_rng(seed)
-        self.late = 1.0 * (t > 40.0)
-        noise = 0.1 * rng.standard_normal(len(t))
-        self.run = Run(t, t[:, None], (3.0 + 2.0 * self.late + noise)[:, None], fit, ~fit, ~fit)
-        self.record = SimpleNamespace(runs=(self.run,), noise_declared=np.array([True]), outputs=("y",))
-        self.form_error = 0.0
-
-    def residuals(self, theta: Mapping[str, float]) -> list[np.ndarray]:
-        return [self.run.y - (theta["F"] + theta["c"] * self.late)[:, None]]
-
-
-def friction_known(asked: Saturating, kind: str, c: float, error: float) -> Hypothesis:
-    """A law of size 3 that was fitted with a value of the friction and its error."""
-    unknowns = Unknown("F", 0.0, -9.0, 9.0, 1.0), Unknown("c", 1.0, 0.0, 4.0, 1.0)
-    residuals = asked.residuals({"F": 3.0, "c": c})
-    weighted = residuals[0][asked.run.fit].ravel() / 0.1
-    jacobian = np.column_stack([-10 * np.ones(len(weighted)), np.zeros(len(weighted))])
-    found = Fit(unknowns, np.array([3.0, c]), np.diag([1e-2 / len(weighted), error**2]), weighted, jacobian)
-    return Hypothesis((Candidate(kind, "wheel", unknowns[:1]),), found, tuple(residuals))
-
-
-@given(st.floats(0.3, 3.7), st.floats(0.3, 3.7), st.integers(0, 50))
-@settings(max_examples=25, deadline=None)
-def test_where_a_fit_came_to_rest_is_no_evidence(one, other, seed):
-    asked = Saturating(seed)
-    asking = baseline(asked, noise=0.1)
-    found = [
-        friction_known(asked, kind, c, 1.2)
-        for kind, c in (("constant_force", one), ("coulomb_friction", other))
-    ]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(allowing, "built", lambda problem, _: problem)
-        told = allowing.allowed(asking, form_of(asking).ranked(found))
-        sure = [friction_known(asked, h.candidates[0].kind, h.theta["c"], 1e-4) for h in found]
-        still = allowing.allowed(asking, form_of(asking).ranked(sure))
-    assert abs(asking.lead(*told)[0]) < 3.0
-    for h in told:
-        assert h.rms(asked, "choose") == pytest.approx(0.1, rel=0.1)
-    for h in sure:  # what is known stays
-        [moved] = [x for x in still if x.key == h.key]
-        assert moved.rms(asked, "choose") == pytest.approx(h.rms(asked, "choose"), rel=0.1)
-
-
-def test_what_leaves_more_than_noise_is_not_helped():
-    asked = Saturating(1)
-    h = friction_known(asked, "constant_force", 1.0, 1.2)
-    wrong = replace(h, fit=replace(h.fit, residual=2 * h.fit.residual))
-    assert allowing.allowed(baseline(asked, noise=0.1), [wrong]) == [wrong]
 
 
 # ---- progress

@@ -27,7 +27,7 @@ from tests.helpers.verdicts import FAILED, judged
 
 
 def importance(at, h, likeness=1.0, sets_in=False, noise=np.ones(2)):  # noqa: B008
-    return form_of(baseline(at, h, noise)).importance(likeness, sets_in, False)
+    return form_of(baseline(at, h, noise)).importance(likeness, sets_in)
 
 
 NAMES = get_args(Name)

@@ -85,8 +85,7 @@ def detect(
         p_values.append((1 + np.sum(reference >= value)) / (limits.replicates + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
     p_value = min(1.0, len(p_values) * float(min(p_values)))
-    clear = figures.get(LIKENESS, 0.0) >= limits.clear_likeness
-    size = form_of(baseline).importance(likeness, sets_in, clear)
+    size = form_of(baseline).importance(likeness, sets_in)
     return Detection(limits.level, p_value, figures, size, likeness, sets_in)
 
 

@@ -3,17 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import named, no_law
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.screening.candidates import physical_candidates
-from estimator.closeloop.screening.free_form import FREE_FORMS, offered
+from estimator.closeloop.screening.free_form import FREE_FORMS
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.screen import Screening, screen
 from fmus.effects import EFFECTS
@@ -40,58 +38,32 @@ def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[Missing
         rest = []
     if rest:
         return named(rest).after(judgement.checks)
-    wrong = doubted(baseline, best, forces)
+    wrong = misnamed(best, forces)
     return no_law(best, wrong[0] if wrong else None, check).after(judgement.checks)
 
 
 def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> Check:
     """The check that all laws are true to their names and that a single law is the curve of its force."""
-    wrong = doubted(baseline, h, forces)
+    wrong = misnamed(h, forces)
     if wrong or len(h.candidates) > 1:
         return Check.most(FORCE_FOLLOWS, len(wrong), 0)
-    own, elsewhere = curvature(baseline, h, forces)
-    return Check.most(FORCE_FOLLOWS, own, form_of(baseline).curve_limit(h, elsewhere))
+    return Check.most(FORCE_FOLLOWS, curvature(baseline, h, forces), form_of(baseline).curve_limit(h))
 
 
-def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
-    """Laws of a hypothesis that are not true to their names with the fitted values, as the record shows."""
-    wrong = misnamed(h, forces)
-    if not form_of(baseline).exact or not wrong:
-        return wrong
-    nowhere = misnamed(h, forces, baseline.policy.decision.fastest)
-    return [c for c in wrong if c in nowhere or not told_apart(baseline, h, c)]
-
-
-def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0) -> list[Candidate]:
-    """Laws that are not true to their names with the fitted values and the motion at their port.
-
-    fastest: share of the samples that is examined, those with the highest velocities.
-    """
+def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
+    """Laws that are not true to their names with the fitted values and the motion at their port."""
     at, found = {missing.port.name: missing for missing in forces}, []
     for c in h.candidates:
         law = EFFECTS.get(c.kind)
         if law and issubclass(law, ForceLaw) and c.location in at:
             values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
-            q, v = at[c.location].displacement, at[c.location].velocity
-            fast = np.abs(v) >= np.quantile(np.abs(v), 1 - fastest)
-            if not law.true_to_name(values, q[fast], v[fast]):
+            if not law.true_to_name(values, at[c.location].displacement, at[c.location].velocity):
                 found.append(c)
     return found
 
 
-def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate) -> bool:
-    """Whether h leaves only noise, in which a smooth curve in place of its law c would be visible."""
-    limits = baseline.policy.decision
-    if not over_what(c) or not baseline.leaves_noise(h):
-        return False
-    alone = len(h.candidates) == 1
-    explained = cost(baseline.hypothesis) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
-    near = limits.open_curve_explained if len(c.unknowns) <= limits.plain_law else limits.rounded
-    return near * explained > limits.noticed
-
-
 def motion(h: Hypothesis) -> tuple[str, str]:
-    """Location of a single law, and the motion that it depends on: velocity or displacement."""
+    """Location of a single law and the motion that it depends on."""
     [c] = h.candidates
     return c.location, over_what(c)
 
@@ -101,24 +73,18 @@ def over_what(c: Candidate) -> str:
     return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
-def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> tuple[float, float]:
-    """Reduction of the sum of squares by a free curve beside a single law, by linear regression.
+def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> float:
+    """Reduction of the sum of squares by a free curve over a single law's motion, by linear regression.
 
-    The first value is for a curve over the law's own motion. The second is the largest for a curve over any
-    other velocity or displacement, at this port or another; it is computed only if the model form is open.
-    Both are zero for an effect that is no law over a motion.
+    It is zero for an effect that is no law over a motion.
     """
     location, over = motion(h)
     mine = [(kind, location) for kind, law in FREE_FORMS.items() if law.against == over]
     if not mine:
-        return 0.0, 0.0
+        return 0.0
     problem = baseline.problem
-    offers = mine if form_of(baseline).exact else offered(problem, forces)
-    curves = physical_candidates(offers, problem.builder.outside(), problem.record, forces)
+    curves = physical_candidates(mine, problem.builder.outside(), problem.record, forces)
     screening = Screening(built(problem, h.candidates), h.fit, baseline.noise.scale)
     change = screening.changes(curves)
-    gains = {False: 0.0, True: 0.0}
-    for p in screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)]):
-        own = any((k.kind, k.location) in mine for k in p.candidates)
-        gains[own] = max(gains[own], p.gain)
-    return gains[True], gains[False]
+    found = screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)])
+    return max((p.gain for p in found), default=0.0)

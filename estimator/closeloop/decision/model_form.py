@@ -41,7 +41,7 @@ class ModelForm(ABC):
         """The figure by which hypotheses are ranked; smaller is better."""
 
     @abstractmethod
-    def importance(self, likeness: float, sets_in: bool, clear: bool) -> float:
+    def importance(self, likeness: float, sets_in: bool) -> float:
         """Size of the residual of the calibrated FMU over the smallest size that matters; see `detect`."""
 
     @abstractmethod
@@ -53,10 +53,6 @@ class ModelForm(ABC):
         """Whether the record rejects h against the best one; price: log score for unknowns that h lacks."""
 
     @abstractmethod
-    def whole(self, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-        """Whether the residual of a pair in the part to identify is small enough for the pair to be right."""
-
-    @abstractmethod
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """Whether a richer hypothesis fits the part to identify better than it could if h were right."""
 
@@ -65,11 +61,8 @@ class ModelForm(ABC):
         """The check that the residual exceeds the open share; None if the form is not open."""
 
     @abstractmethod
-    def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected.
-
-        elsewhere: the reduction by a free curve over another motion.
-        """
+    def curve_limit(self, h: Hypothesis) -> float:
+        """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected."""
 
     @abstractmethod
     def could_be(self, likeness: float) -> bool:
@@ -79,11 +72,6 @@ class ModelForm(ABC):
         """Reduction of the sum of squares by a richer hypothesis, from which on h is incomplete."""
         limits = self.baseline.policy.decision
         return max(limits.noticed, limits.missed * (cost(self.baseline.hypothesis) - cost(h)))
-
-    def _plain(self, h: Hypothesis) -> float:
-        """Reduction of the sum of squares by a free curve that noise alone does not cause."""
-        limits = self.baseline.policy.decision
-        return max(limits.noticed, limits.curve_of_noise * len(h.fit.residual))
 
     def _at_noise(self, h: Hypothesis) -> BoolArray:
         """Outputs (n_y,) whose residual comes down to the noise, or nearly so, with a hypothesis."""
@@ -101,10 +89,10 @@ class ModelForm(ABC):
         squares = np.mean(residual**2, axis=0) - chance * b.noise.std**2
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
-    def _material(self, beyond: Array, least: float) -> float:
-        """Size beyond noise over the smallest size that matters; least: that size in units of the noise."""
-        b, share = self.baseline, self.baseline.policy.detection.signal_share
-        lowest = np.minimum(share * signal_size(b.problem), least * b.noise.std)
+    def _material(self, beyond: Array) -> float:
+        """Size beyond noise over the smallest size that matters."""
+        b, limits = self.baseline, self.baseline.policy.detection
+        lowest = np.minimum(limits.signal_share * signal_size(b.problem), limits.noise_share * b.noise.std)
         return float(np.max(beyond / np.maximum(lowest, TINY)))
 
 
@@ -116,11 +104,9 @@ class Closed(ModelForm):
     def _misfit(self, h: Hypothesis) -> float:
         return -float(self.baseline.scores(h).sum())
 
-    def importance(self, likeness: float, sets_in: bool, clear: bool) -> float:
-        """See ModelForm; the worst part counts. The limit is lower for a residual clearly like an effect."""
-        limits = self.baseline.policy.detection
-        beyond = np.maximum(self._beyond("unseen"), self._beyond("fit"))
-        return self._material(beyond, limits.noise_share_of_effects if clear else limits.noise_share)
+    def importance(self, likeness: float, sets_in: bool) -> float:
+        """See ModelForm; the worst part counts."""
+        return self._material(np.maximum(self._beyond("unseen"), self._beyond("fit")))
 
     def reached(self, h: Hypothesis) -> BoolArray:
         """See ModelForm."""
@@ -133,16 +119,6 @@ class Closed(ModelForm):
         worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
         better = b.lead(best, h)[0] >= max(price, alike) and b.beats(best, h)
         return (h.fit.converged and worse) or better
-
-    def whole(self, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-        """See ModelForm; only noise, or a small share of what the best single effect leaves, may remain.
-
-        Two wrong effects together may also come near to the noise, therefore the limit is strict.
-        """
-        if not self.baseline.noise.known or self.baseline.leaves_noise(pair):
-            return True
-        gained = min((cost(s) for s in singles), default=np.inf) - cost(pair)
-        return bool(pair.fit.beyond_noise < self.baseline.policy.decision.pair_leaves * gained)
 
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """See ModelForm; richer: a law with h as its limit, or h and one more effect.
@@ -160,10 +136,9 @@ class Closed(ModelForm):
         """See ModelForm."""
         return False
 
-    def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """See ModelForm; half of what the law leaves beyond noise, or much compared with what it explains."""
-        share = self.baseline.policy.decision.second_share
-        return min(max(self._plain(h), share * h.fit.beyond_noise), self.noticed(h))
+    def curve_limit(self, h: Hypothesis) -> float:
+        """See ModelForm; what noise alone does not cause."""
+        return self.baseline.policy.decision.noticed
 
 
 @dataclass(frozen=True)
@@ -178,7 +153,7 @@ class Open(ModelForm):
         # on one part alone, an effect that acts in the other part would lose to one that imitates the form
         return 0.5 * cost(h) - float(self.baseline.scores(h).sum())
 
-    def importance(self, likeness: float, sets_in: bool, clear: bool) -> float:
+    def importance(self, likeness: float, sets_in: bool) -> float:
         """See ModelForm; computed on the parts to choose and to test.
 
         A residual below the open share matters only if one effect could explain much of it, or if it sets in
@@ -189,33 +164,34 @@ class Open(ModelForm):
         form = np.maximum(self.share * signal_size(b.problem), TINY)
         large = float(np.max(np.minimum(beyond / form, rms / (limits.open_form_noises * b.noise.std))))
         if sets_in or likeness >= limits.open_form_likeness:
-            return max(large, self._material(beyond, limits.noise_share))
+            return max(large, self._material(beyond))
         return large
 
     def reached(self, h: Hypothesis) -> BoolArray:
         """Whether each output (n_y,) comes down to its noise or to the open share.
 
         All outputs together: one effect must explain at least half of the variance beyond noise, several
-        effects more, because they can imitate an error of form; if every output was small, several effects
-        must explain nearly all. This must hold over both parts, and on the part to choose as well unless
-        hardly anything is left over both: an effect may act in one part only.
+        effects half of what one may leave, because they can imitate an error of form. This must hold over
+        both parts, and on the part to choose as well unless little is left over both: an effect may act in
+        one part only.
         Each output: a large residual must come below the open share, a small one must not grow. A sensor
-        fault may leave the other outputs unchanged if it explains nearly all of its own output.
+        fault may leave the other outputs unchanged if it explains as much of its own output as several
+        effects must.
         """
         b, limits = self.baseline, self.baseline.policy
         noise, down = b.noise.std, self._at_noise(h)
         before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
         left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
-        gone = left <= (1 - limits.decision.open_explained) * np.maximum(was, TINY)
+        one, several = limits.decision.open_single, limits.decision.open_single**2
+        gone = left <= several * np.maximum(was, TINY)
         if np.any(_faulty(b.problem, h) & gone & (was >= limits.detection.noise_share**2)):
             return np.asarray(down | gone | (after <= limits.decision.clean * before))
         share = (self.share * signal_size(b.problem) / noise) ** 2
         large = (was >= share) & (before >= limits.detection.open_form_noises * noise)
-        several = limits.decision.open_single**2 if large.any() else 1 - limits.decision.open_explained
-        most = limits.decision.open_single if len(h.candidates) == 1 else several
+        most = one if len(h.candidates) == 1 else several
         of_all = b.beyond_noise_of_all(h) / max(b.beyond_noise_of_all(b.hypothesis), TINY)
         held_out = np.sum(left) <= most * np.sum(was)
-        if of_all > most or not (held_out or of_all <= most * limits.decision.open_single):
+        if of_all > most or not (held_out or of_all <= most * one):
             return down
         if not large.any():
             return np.ones(len(noise), dtype=bool)
@@ -230,28 +206,20 @@ class Open(ModelForm):
         alike = max(alike, limits.open_alike * b.beyond_noise_of_all(best) / 2)
         return b.lead(best, h)[0] + (cost(h) - cost(best)) / 2 >= max(price, alike)
 
-    def whole(self, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-        """See ModelForm; always, because what is left may come from the open form."""
-        return True
-
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """See ModelForm; never, because the gain may come from the open form."""
         return False
 
     def another(self, began: bool) -> Check | None:
         """See ModelForm."""
-        size = self.importance(0.0, began, False)
+        size = self.importance(0.0, began)
         return Check.least("more than another form of the model leaves", size, 1.0)
 
-    def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """See ModelForm; much of what the law leaves or explains, and most of the gain over another motion.
-
-        The open form looks like a curve over every motion, so that correct laws leave some curve too.
-        """
+    def curve_limit(self, h: Hypothesis) -> float:
+        """See ModelForm; a share of what the law explains, since correct laws leave some of the open form."""
         limits = self.baseline.policy.decision
         explained = cost(self.baseline.hypothesis) - cost(h)
-        much = max(limits.open_curve_left * h.fit.beyond_noise, limits.open_curve_explained * explained)
-        return max(self._plain(h), much, limits.open_curve_elsewhere * elsewhere)
+        return max(limits.noticed, limits.open_curve_explained * explained)
 
     def could_be(self, likeness: float) -> bool:
         """See ModelForm."""

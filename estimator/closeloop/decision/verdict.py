@@ -113,9 +113,7 @@ def judge(
     """
     form = form_of(baseline)
     good = [h for h in singles if explains(baseline, h)]
-    both = [
-        h for h in pairs if explains(baseline, h) and needed(baseline, h, singles) and form.whole(h, singles)
-    ]
+    both = [h for h in pairs if explains(baseline, h) and needed(baseline, h, singles)]
     if both and (not good or completes(baseline, both[0], good[0])):
         members = [h for h in equivalent(baseline, both[0], both) if not one_curve(h)]
         checks = account(baseline, both[0])
