@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -35,13 +36,29 @@ class Plot:
 
     def write(self, folder: Path) -> bytes:
         """Write as PNG and SVG into a folder; returns the PNG."""
-        full, small = BytesIO(), BytesIO()
-        self.figure.savefig(full, format="png", dpi=DPI)
-        with Image.open(full) as picture:
-            picture.convert("RGB").quantize(COLOURS).save(small, "png", optimize=True)
+        small = BytesIO()
+        _drawn(self.figure).quantize(COLOURS).save(small, "png", compress_level=6)
         (folder / f"{self.name}.png").write_bytes(small.getvalue())
+        _settle(self.figure)
         self.figure.savefig(folder / f"{self.name}.svg", metadata={"Date": None})
         return small.getvalue()
+
+
+def _drawn(figure: Figure) -> Image.Image:
+    """A figure as a picture; it is laid out by this."""
+    figure.set_dpi(DPI)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+
+def _settle(figure: Figure) -> None:
+    """Keep the axes and their labels where they are, so that the next format needs no other layout."""
+    figure.set_layout_engine(None)
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            place = axis.label.get_transform().transform(axis.label.get_position())
+            axis.set_label_coords(*ax.transAxes.inverted().transform(place))
 
 
 def sheet(height: float, layout: Sequence[Sequence[str]], width: float = WIDTH, **more: Any) -> Any:
@@ -71,7 +88,8 @@ def name_axes(ax: Axes, x: str = "", y: str = "", title: str = "") -> None:
     ax.set_xlabel(x, fontsize=9)
     ax.set_ylabel(y, fontsize=9)
     if title:
-        ax.set_title(title, loc="left", fontsize=9, fontweight="bold")
+        # at a given height, for to find a free one the ticks would be measured in every drawing
+        ax.set_title(title, loc="left", fontsize=9, fontweight="bold", y=1.0)
 
 
 def legend(figure: Figure, ax: Axes) -> None:
