@@ -23,9 +23,7 @@ from fmus.export.provenance import Origin, checksum
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
-from scenarios.closing.report import write_report
 from scenarios.closing.result import Result, result_of
-from scenarios.exchange.augmented import export_augmented
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import writable
@@ -133,6 +131,8 @@ def closed(
     tell("building the augmented FMU and writing the report")
     augmented = augment(posed.builder, e, problem, found, folder, tell)
     result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
+    from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
+
     write_report(folder, problem, found, result)
     result.write(folder / "result.json")
     return found, result
@@ -186,6 +186,8 @@ def augment(
         if isinstance(builder, ModelBuilder):
             files.append(builder.final_native(effects, starts, folder, origin))
         elif effects:
+            from scenarios.exchange.augmented import export_augmented  # for foreign FMUs only
+
             package = files[0].with_suffix(".ssp")
             files.append(export_augmented(builder, effects, problem.record, starts, origin, package))
     except (BadInput, FmuError) as error:

@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.integrate import trapezoid
-from scipy.signal import find_peaks
 
 from estimator.record import Array
 from fmus.contact.geometry.conicity import equivalent_conicity
@@ -120,6 +118,8 @@ def _steps(a: Value) -> Value:
 
 
 def _integral(a: Value) -> Value:
+    from scipy.integrate import trapezoid  # few expectations integrate
+
     x, y = a.finite_signal()
     return Value(float(trapezoid(y, x)), unit=product(a, Value(0.0, unit=AXIS)))
 
@@ -149,6 +149,8 @@ def _settled(a: Value, target: Value, band: Value) -> Value:
 
 def _peaks(a: Value) -> Value:
     """Amplitudes of an oscillation about zero: the extremes of its half waves."""
+    from scipy.signal import find_peaks  # takes half a second to load, and few expectations want it
+
     x, y = a.finite_signal()
     if np.isnan(y).any():
         return a.with_y(y, a.unit)

@@ -24,8 +24,6 @@ from scenarios.simulating.case import (
     Run,
     prepared,
 )
-from scenarios.simulating.contact_sheet import write_contact_sheet
-from scenarios.simulating.drawing import write_figure
 from scenarios.simulating.reading import SINGLE, Scenario, load_scenario
 from scenarios.simulating.result import (
     Finding,
@@ -62,6 +60,8 @@ def run(
             result.write(folder / "result.json")  # written before the figures, which may fail
             if result.interrupted_at is not None:
                 return result
+            from scenarios.simulating.drawing import write_figure  # loads Matplotlib
+
             tell(f"{read.id}: drawing")
             pictures = enumerate(read.declared.figure)
             figures = tuple(write_figure(p, i, questions, runs, folder) for i, p in pictures)
@@ -96,6 +96,8 @@ def run_all(
             if results[-1].interrupted_at is not None:
                 break
     if len(results) > 1:
+        from scenarios.simulating.contact_sheet import write_contact_sheet  # loads a library of pictures
+
         write_contact_sheet(results, folder / "contact-sheet.png")
     return results
 

@@ -16,7 +16,6 @@ from estimator.closeloop.search import screened, search
 from fmus import codec
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import ModelBuilder
-from scenarios.closing import closing
 from scenarios.closing.closing import STAGES
 from tests.fmus.test_codec import Harmful
 from tests.helpers.carriage import (
@@ -111,7 +110,7 @@ def test_every_checkpoint_of_a_run_can_be_read_back(carriage: Path, tmp_path: Pa
     """A run that is broken off at its end has nothing to work out again."""
     out = tmp_path / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(closing, "write_report", interrupted)
+        patch.setattr("scenarios.closing.report.write_report", interrupted)
         assert close(carriage, out) == 130
     assert all(file.suffix == SUFFIX for file in (out / STAGES).iterdir())
     with pytest.MonkeyPatch.context() as patch:

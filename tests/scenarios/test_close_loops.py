@@ -66,7 +66,7 @@ def closed(both: tuple[Results, Path, Outcomes]) -> tuple[Results, Path]:
 def known(both: tuple[Results, Path, Outcomes], monkeypatch) -> None:
     """The chain finds what it found before, at once; FMUs and reports are those of the fixture `both`."""
     monkeypatch.setattr("scenarios.closing.closing.augment", lambda *a: ())
-    monkeypatch.setattr("scenarios.closing.closing.write_report", lambda *a: None)
+    monkeypatch.setattr("scenarios.closing.report.write_report", lambda *a: None)
     monkeypatch.setattr(TRACE, lambda problem, *more: both[2][problem.declared["q_dot"]])
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.signal import lfilter
 
 from estimator.record import (
     Array,
@@ -147,6 +146,8 @@ def _rounds(parts: Sequence[_Part], order: int) -> Iterator[_Model]:
 
 def _lagged(x: Array, a: Array, order: int) -> Array:
     """Columns x (n, k) filtered by 1/a and delayed by 0 to `order` steps, from rest, (n, k (order + 1))."""
+    from scipy.signal import lfilter  # takes half a second to load, and comes after the verdict
+
     filtered = lfilter([1.0], a, x, axis=0)
     padded = np.vstack([np.zeros((order, x.shape[1])), filtered])
     return np.hstack([padded[order - i : len(padded) - i] for i in range(order + 1)])
