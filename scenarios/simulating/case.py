@@ -10,7 +10,6 @@ import numpy as np
 
 from estimator.record import Array
 from fmus.contact.forces.conditions import CONDITIONS
-from fmus.contact.geometry.table import contact_table
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 from fmus.host.master.connections import Connection
@@ -75,6 +74,8 @@ class _TableCase:
     duration: float | None = None
 
     def __init__(self, geometry: Geometry, folder: Path, wanted: Iterable[Expression]) -> None:
+        from fmus.contact.geometry.table import contact_table  # few scenarios search for the contact
+
         options = geometry.model_dump(exclude={"reach", "points"})
         options |= {name: beside(options[name], folder) for name in ("wheel", "rail")}
         shifts = np.linspace(-geometry.reach, geometry.reach, geometry.points)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.stats import norm
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
@@ -68,6 +67,8 @@ def power(
     calibration = Calibration.of(base)
     left = lengths(calibration, change)
     cosines = alike(calibration, change, ROWS, rng)
+    from scipy.stats import norm  # takes a third of a second to load, and comes after the verdict
+
     needed = threshold(cosines, level, rng) + float(norm.ppf(chance))
     found: dict[tuple[str, str, str], Visible] = {}
     for (c, _), at in zip(change, columns_of(change), strict=True):
@@ -84,6 +85,8 @@ def threshold(cosines: Array, level: float, rng: np.random.Generator) -> float:
     cosines: (K, K) between the directions.
     """
     if not len(cosines):
+        from scipy.stats import norm
+
         return float(norm.isf(level / 2))
     values, vectors = np.linalg.eigh(cosines)
     kept = values > 1e-9 * values[-1]

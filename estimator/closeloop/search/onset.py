@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from estimator.closeloop.fitting.fit import fit, weighted
 from estimator.closeloop.fitting.fitter import Fitter
@@ -68,6 +67,8 @@ def grown(squares: Array, first: int, times: float, level: float) -> int | None:
     spread = {k: k * logs[:k].var() + (len(logs) - k) * logs[k:].var() for k in range(first, len(logs))}
     k = min(spread, key=spread.__getitem__)
     before, after = squares[:k], squares[k:]
+    from scipy.stats import mannwhitneyu  # takes a third of a second to load
+
     chance = float(mannwhitneyu(after, before, alternative="greater").pvalue)
     return k if after.mean() > times * before.mean() and chance < level else None
 
