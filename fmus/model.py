@@ -8,10 +8,10 @@ come every FMU, the model description, the parameter tables and the Jacobians.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import casadi as cs
 
@@ -29,15 +29,6 @@ from fmus.variables import (
     State,
     Variable,
 )
-
-
-@dataclass(frozen=True)
-class Call:
-    """A function called in a model's equations: its arguments, and the symbols that stand for its results."""
-
-    function: cs.Function
-    arguments: tuple[Expr, ...]
-    results: tuple[Expr, ...]
 
 
 class Model(Site, ABC):
@@ -68,7 +59,6 @@ class Model(Site, ABC):
         )
         self.effects = tuple(effects)
         self.motions: dict[str, Expr] = {}  # outputs of the probes
-        self.calls: list[Call] = []
         self.build(self.effects)
         if probes:
             self._probe()
@@ -91,17 +81,14 @@ class Model(Site, ABC):
         return {}
 
     def call(self, function: cs.Function, *arguments: Expr) -> list[Expr]:
-        """Results of a CasADi function in the equations, as symbols: a table, or a choice between laws.
+        """Results of a CasADi function that stays a call in the equations: a table, or a choice between laws.
 
-        For what a scalar expression cannot hold without working out every branch of it. The arguments
-        are expressions of the model's symbols and of results of earlier calls.
+        For what a scalar expression cannot hold without working out every branch of it.
         """
-        results = [
-            cs.SX.sym(f"{function.name()}_{function.name_out(i)}", function.sparsity_out(i))
-            for i in range(function.n_out())
-        ]
-        self.calls.append(Call(function, tuple(cs.vertcat(a) for a in arguments), tuple(results)))
-        return results
+        # CasADi keeps calls of functions of this kind only
+        graph = function if function.is_a("MXFunction") else function.wrap()
+        inline, call = False, True
+        return list(graph.call([cs.SX(a) for a in arguments], inline, call))
 
     def of(self, *kinds: type[Variable]) -> list[Variable]:
         """Variables of the given kinds, in the order of declaration."""
@@ -155,45 +142,24 @@ def equations(model: Model) -> Equations:
     given = {r.name: dot[r.of.name] for r in model.of(Rate) if isinstance(r, Rate)}
     given |= model.outputs() | model.motions
     y = _complete(model, "outputs", given, [v.name for v in model.of(Output)])
-    calls = _with_own_functions(model.calls)
-    f = _compiled("f", calls, [x, u, p], cs.vertcat(*dot.values()), "dx")
-    h = _compiled("h", calls, [x, u, p], cs.vertcat(*y.values()), "y")
+    names = ["x", "u", "p"]
+    f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])
+    h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
+    f, h = _own([f, h])
     tolerated = [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
     method = integrator(type(model).method, f"model '{model.name}'")
     return Equations(f, h, method.step(f, tolerated))
 
 
-def _with_own_functions(calls: Sequence[Call]) -> list[Call]:
-    """The calls with copies of their functions, which share what the functions share.
+def _own(functions: list[cs.Function]) -> list[cs.Function]:
+    """Copies of functions and of all that they call, which share what these share.
 
     CasADi keeps the derivative of a spline in the spline and serialises it too: without the copies, equations
     that were linearised would change the bytes of every later build.
     """
     packed = cs.StringSerializer()
-    packed.pack([call.function for call in calls])
-    own = cs.StringDeserializer(packed.encode()).unpack()
-    return [replace(call, function=function) for call, function in zip(calls, own, strict=True)]
-
-
-def _compiled(
-    name: str, calls: Sequence[Call], symbols: list[Expr], expression: Expr, result: str
-) -> cs.Function:
-    """A function of x, u, p; where the model calls others, a graph of them around its own expressions."""
-    names = ["x", "u", "p"]
-    if not calls:
-        return cs.Function(name, symbols, [cs.cse(expression)], names, [result])
-    given = [cs.MX.sym(n, s.shape) for n, s in zip(names, symbols, strict=True)]
-    known = list(zip(symbols, given, strict=True))
-
-    def worked_out(parts: Sequence[Expr]) -> list[Expr]:
-        needed = [(s, m) for s, m in known if cs.depends_on(cs.vertcat(*parts), s)]
-        inner = cs.Function("part", [s for s, _ in needed], cs.cse(list(parts)))
-        return list(inner.call([m for _, m in needed]))
-
-    for call in calls:
-        results: Any = call.function.call(worked_out(call.arguments))
-        known += zip(call.results, results, strict=True)
-    return cs.Function(name, given, worked_out([expression]), names, [result])
+    packed.pack(functions)
+    return list(cs.StringDeserializer(packed.encode()).unpack())
 
 
 def _complete(model: Model, what: str, given: dict[str, Expr], names: list[str]) -> dict[str, Expr]:

@@ -11,17 +11,16 @@ import casadi as cs
 import numpy as np
 
 from fmus.contact.arguments import Array
-from fmus.variables import Expr
+from fmus.contact.even_table import rows_from
 from fmus.wheelset.track import Track
 
 G, NU, LOAD = 8e10, 0.28, 55e3  # Pa, 1, N: the patches are tabulated for these and scale from here
 E = 2 * G * (1 + NU)
 SPACING = 5e-5  # m between tabulated shifts
 CUBIC = 3
-EVEN = {"lookup_mode": ["exact"]}  # of evenly spaced knots: the place is computed, not searched
 USUAL = 3e-3  # m of shift, within which wheelsets run on straight track
 PATCH = ("a_hertz", "b_hertz", "a_virtual", "b_virtual")
-FIELDS = ("growth", "delta", "lift", *PATCH, "lift_slope", *(f"{name}_mean" for name in PATCH))
+FIELDS = ("growth", "delta", "lift", *PATCH, "lift_slope")
 
 
 @cache
@@ -30,8 +29,8 @@ def contact_curves(track: Track) -> cs.Function:
 
     growth: rolling radius less the nominal one, m; delta: contact angle, rad; lift: height, m, by which
     the wheel carries its side, and lift_slope its derivative; a, b: semi-axes, m, by Hertz and by virtual
-    penetration, for LOAD, G and NU, and their geometric means over the USUAL shifts. Cubic B-splines, twice
-    continuously differentiable. Beyond the table the last contact holds.
+    penetration, for LOAD, G and NU. Cubic B-splines, twice continuously differentiable. Beyond the table
+    the last contact holds.
     """
     from fmus.contact.geometry.table import SEARCHES  # loads SciPy and pandas, which other models do without
 
@@ -39,22 +38,54 @@ def contact_curves(track: Track) -> cs.Function:
     return cs.Function.conditional("contact", curves[:-1], curves[-1])
 
 
+@cache
+def both_contacts(track: Track) -> cs.Function:
+    """Function (contact_search, shifts of both wheels towards their flanges, m) -> FIELDS of each, a row."""
+    search, shifts = cs.MX.sym("search"), cs.MX.sym("shifts", 2)
+    curves = contact_curves(track)
+    each = [curves(search, shifts[i]).T for i in (0, 1)]
+    return cs.Function("both_contacts", [search, shifts], [cs.vertcat(*each)])
+
+
+@cache
+def usual_patch(track: Track) -> cs.Function:
+    """Function (contact_search) -> column of geometric means of PATCH over the USUAL shifts."""
+    from fmus.contact.geometry.table import SEARCHES  # as above
+
+    means = []
+    for shifts, values in (_tabulated(track, search) for search in SEARCHES):
+        usual = values[np.abs(shifts) <= USUAL, FIELDS.index(PATCH[0]) :]
+        means.append(cs.Function("means", [], [cs.DM(np.exp(np.log(usual).mean(axis=0)))]))
+    return cs.Function.conditional("usual_patch", means[:-1], means[-1])
+
+
 def _curves(track: Track, search: str) -> cs.Function:
     shifts, values = _tabulated(track, search)
     # one row more at each end, so that the outermost shifts too have their full share of the basis
     rows = _spline_coefficients(np.vstack([values[0], values, values[-1]]))
-    knots = shifts[0] + SPACING * np.arange(-3, len(shifts) + 3)
     q = cs.MX.sym("q")
-    inside = cs.fmin(cs.fmax(q, shifts[0]), shifts[-1])
+    number, t, rate = _place(shifts)(q)
+    found = _spline(rows.shape[1])(rows_from(rows, number, CUBIC + 1), t, rate)
+    return cs.Function(search, [q], [found], ["shift"], ["contact"])
 
-    def spline(columns: Array) -> Expr:
-        return cs.bspline(inside, cs.DM(columns.ravel()), [list(knots)], [CUBIC], columns.shape[1], EVEN)
 
-    lift = FIELDS.index("lift")
-    slope = cs.jacobian(spline(rows[:, lift : lift + 1]), q)  # of it alone, not of all columns
-    usual = values[np.abs(shifts) <= USUAL, FIELDS.index(PATCH[0]) :]
-    means = cs.DM(np.exp(np.log(usual).mean(axis=0)))
-    return cs.Function(search, [q], [cs.vertcat(spline(rows), slope, means)], ["shift"], ["contact"])
+def _place(shifts: Array) -> cs.Function:
+    """Function of a shift -> (number of its interval in the table, how far along it, change by shift)."""
+    q = cs.SX.sym("q")
+    place = (cs.fmin(cs.fmax(q, shifts[0]), shifts[-1]) - shifts[0]) * (1 / SPACING)
+    number = cs.fmin(cs.floor(place), len(shifts) - 2)
+    return cs.Function("place", [q], cs.cse([number, place - number, cs.jacobian(place, q)]))
+
+
+def _spline(width: int) -> cs.Function:
+    """Function (four rows of coefficients, place t between 0 and 1, dt/dq) -> values, slope of the lift."""
+    rows, t, rate = cs.SX.sym("rows", width, CUBIC + 1), cs.SX.sym("t"), cs.SX.sym("rate")
+    s = 1 - t
+    basis = cs.vertcat(s**3, 4 - 3 * t**2 * (1 + s), 4 - 3 * s**2 * (1 + t), t**3) * (1 / 6)
+    of_lift = rows[FIELDS.index("lift"), :]
+    slope = cs.mtimes(of_lift, cs.jacobian(basis, t)) * rate
+    found = cs.cse(cs.vertcat(cs.mtimes(rows, basis), slope))
+    return cs.Function("spline", [cs.vec(rows), t, rate], [found])
 
 
 def _spline_coefficients(rows: Array) -> Array:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict, replace
-from functools import cache, cached_property
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from fmus.contact.forces.conditions import CONDITIONS, PARAMETERS
 from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws import LAWS, law_codes, selected_law
 from fmus.contact.forces.laws.polach import Polach
+from fmus.contact.power import power
 from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.option import Choice
@@ -36,8 +37,10 @@ from fmus.wheelset.curves import (
     FIELDS,
     LOAD,
     NU,
+    PATCH,
     G,
-    contact_curves,
+    both_contacts,
+    usual_patch,
 )
 from fmus.wheelset.track import OPTIONS, Track
 
@@ -48,11 +51,15 @@ CHOICE = "this model"
 FORM = "this model: what methods for the patch differ in"
 V_MIN = 0.1  # m/s, below which creepages are those at this speed
 S_MIN = 1e-12  # rounds the size of the creepage at zero
-SIDES = {"left": 1.0, "right": -1.0}  # sign of y
+SIDES = ("left", "right")
+SIGN = cs.DM([1.0, -1.0])  # of y there
 
 
-class Wheel(NamedTuple):
-    """What acts on one wheel, and its motion over the rail; creep forces in the contact's own axes."""
+class Wheels(NamedTuple):
+    """What acts on both wheels, and their motion over the rails; creep forces in the contacts' own axes.
+
+    Columns of two, left and right: so a compiler works them out at once.
+    """
 
     F_x: Expr
     F_y: Expr
@@ -66,15 +73,12 @@ class Wheel(NamedTuple):
     b: Expr
 
 
-@cache
-def patch_scale() -> cs.Function:
-    """Function (load N, shear modulus Pa, Poisson's ratio) -> size of a patch over the tabulated one.
+def patch_scale(load: Expr, shear: Expr, nu: Expr) -> Expr:
+    """Size of a patch over the tabulated one, by load, N, shear modulus, Pa, and Poisson's ratio.
 
     It grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu).
     """
-    load, shear, nu = cs.SX.sym("load"), cs.SX.sym("shear"), cs.SX.sym("nu")
-    scale = (load / LOAD * (G / (1 - NU)) / (shear / (1 - nu))) ** (1 / 3)
-    return cs.Function("patch_scale", [load, shear, nu], [scale], ["load", "G", "nu"], ["scale"])
+    return (load / LOAD * (G / (1 - NU)) / (shear / (1 - nu))) ** (1 / 3)
 
 
 class Wheelset(Model):
@@ -227,11 +231,11 @@ class Wheelset(Model):
         from fmus.contact.geometry.search import FLANGE_ANGLE  # loads SciPy, which other models do without
 
         found = {
-            f"{name}_{side}": value
-            for side, wheel in m._wheels.items()
-            for name, value in wheel._asdict().items()
+            f"{name}_{side}": both[i]
+            for name, both in m._wheels._asdict().items()
+            for i, side in enumerate(SIDES)
         }
-        steepest = cs.fmax(*(wheel.delta for wheel in m._wheels.values()))
+        steepest = cs.mmax(m._wheels.delta)
         return {**found, "phi": m._roll[0], "flange_contact": steepest > FLANGE_ANGLE}
 
     def ports(m) -> dict[str, Port]:
@@ -257,92 +261,69 @@ class Wheelset(Model):
         return {"friction_condition": PARAMETERS}
 
     @cached_property
-    def _shifts(m) -> dict[str, Expr]:
-        """Shift of each wheel towards its flange."""
-        return {side: sign * (m.y - m.y_irr) - m.gauge_irr / 2 for side, sign in SIDES.items()}
-
-    @cached_property
-    def _curves(m) -> dict[str, dict[str, Expr]]:
-        """Contact of each wheel, by the fields of the curves."""
-        curves = contact_curves(m.track)
-        found = {}
-        for side, shift in m._shifts.items():
-            (contact,) = m.call(curves, m.contact_search, shift)
-            found[side] = dict(zip(FIELDS, cs.vertsplit(contact), strict=True))
-        return found
+    def _curves(m) -> dict[str, Expr]:
+        """Contact of both wheels at their shifts towards their flanges, by the fields of the curves."""
+        shifts = SIGN * (m.y - m.y_irr) - m.gauge_irr / 2
+        (contacts,) = m.call(both_contacts(m.track), m.contact_search, shifts)
+        return dict(zip(FIELDS, cs.horzsplit(contacts), strict=True))
 
     @cached_property
     def _roll(m) -> tuple[Expr, Expr]:
         """Roll of the wheelset and its rate: both wheels carry their sides over the tape distance."""
-        base = 2 * m.track.half_distance
-        left, right = m._curves["left"], m._curves["right"]
+        per_base = 1 / (2 * m.track.half_distance)
+        lift, slope = m._curves["lift"], m._curves["lift_slope"]
         rate_of_shift = m.y_dot - m.y_irr_dot
-        phi = (left["lift"] - right["lift"]) / base
-        return phi, (left["lift_slope"] + right["lift_slope"]) * rate_of_shift / base
+        return (lift[0] - lift[1]) * per_base, (slope[0] + slope[1]) * rate_of_shift * per_base
 
     @cached_property
-    def _scale(m) -> Expr:
-        """Size of the patches over the table's; called, as otherwise each use would work it out anew."""
-        (scale,) = m.call(patch_scale(), m.F_n, m.G, m.nu)
-        return scale
+    def _usual(m) -> dict[str, Expr]:
+        """Semi-axes a and b, m, that stand for the usual shifts at the tabulated load."""
+        (means,) = m.call(usual_patch(m.track), m.contact_search)
+        found = dict(zip(PATCH, cs.vertsplit(means), strict=True))
+        return {which: m._by_patch(found, which) for which in ("a", "b")}
+
+    def _by_patch(m, at: dict[str, Expr], which: str) -> Expr:
+        """Semi-axis a or b of the patch that is chosen."""
+        return cs.if_else(m.patch > 0.5, at[f"{which}_virtual"], at[f"{which}_hertz"])
 
     @cached_property
-    def _wheels(m) -> dict[str, Wheel]:
-        return {side: m._wheel(side, sign) for side, sign in SIDES.items()}
-
-    def _wheel(m, side: str, sign: float) -> Wheel:
-        """Creepages (eq. 3.100, 3.101, with spin over V once) and creep forces of one wheel."""
-        at = m._curves[side]
-        phi_dot = m._roll[1]
-        r, delta = m.r0 + at["growth"], at["delta"]
+    def _wheels(m) -> Wheels:
+        """Creepages (eq. 3.100, 3.101, with spin over V once) and creep forces of both wheels."""
+        growth, delta = m._curves["growth"], m._curves["delta"]
+        r = m.r0 + growth
         V = cs.fmax(m.V, V_MIN)
-        xi_x = (m.V * (1 - r / m.r0) - sign * m.s * m.psi_dot) / V
-        xi_y = (m.y_dot + r * phi_dot - m.V * m.psi) / V
-        xi_s = (m.psi_dot - sign * m.V / m.r0 * delta) / V
-        a, b = m.k_a * m._semi_axis(at, "a"), m.k_b * m._semi_axis(at, "b")
+        rolls = m.V / V  # 1, but towards standstill; quotients of inputs and parameters are found once a step
+        xi_x = -(rolls / m.r0) * growth - SIGN * (m.s / V) * m.psi_dot
+        xi_y = m.y_dot / V + r * (m._roll[1] / V) - rolls * m.psi
+        xi_s = m.psi_dot / V - SIGN * (rolls / m.r0) * delta
+        a, b = m._semi_axes
         mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2 + S_MIN**2), m.mu0, m.A, m.B)
-        c11, c22, c23, c33 = m._coefficients(a, b)
+        c11, c22, c23, c33 = m.call(looked_up(), a / b, m.nu)
         F_x, F_y, M_z = m.call(
             selected_law(),
-            m.creep_law, a, b, m.F_n, mu, m.G, c11, c22, c23, c33, xi_x, xi_y, xi_s, m.k_A, m.k_S,
+            m.creep_law, a, b, m.F_n, mu, m.G, c11, c22, m.k_spin * c23, m.k_spin * c33, xi_x, xi_y, xi_s,
+            m.k_A, m.k_S, m.f11, m.f22, m.f23, m.f33,
         )  # fmt: skip
-        return Wheel(F_x, F_y, M_z, xi_x, xi_y, xi_s, r, delta, a, b)
+        return Wheels(F_x, F_y, M_z, xi_x, xi_y, xi_s, r, delta, a, b)
 
-    def _semi_axis(m, at: dict[str, Expr], which: str) -> Expr:
-        """a or b as tabulated for the load, or between that and its mean over the usual shifts."""
-        own, mean = (
-            cs.if_else(m.patch > 0.5, at[f"{which}_virtual{of}"], at[f"{which}_hertz{of}"])
-            for of in ("", "_mean")
-        )
-        return m._scale * mean * (own / mean) ** m.k_c
-
-    def _coefficients(m, a: Expr, b: Expr) -> list[Expr]:
-        """Kalker's coefficients, or for the linear law those that are given."""
-        c11, c22, c23, c33 = m.call(looked_up(), a / b, m.nu)
-        kalker = (c11, c22, m.k_spin * c23, m.k_spin * c33)
-        area = m.G * a * b
-        given = (
-            m.f11 / area,
-            m.f22 / area,
-            m.f23 / (area * cs.sqrt(area)) * cs.sqrt(m.G),
-            m.f33 / area**2 * m.G,
-        )
-        linear = m.creep_law < 0.5  # code 0
-        return [
-            cs.if_else(cs.logic_and(linear, own > 0), own, table)
-            for own, table in zip(given, kalker, strict=True)
-        ]
+    @cached_property
+    def _semi_axes(m) -> list[Expr]:
+        """a and b as tabulated for the load, or between that and their means over the usual shifts."""
+        usual = m._usual
+        ratios = [m._by_patch(m._curves, which) / mean for which, mean in usual.items()]
+        (powers,) = m.call(power(4), cs.vertcat(*ratios), m.k_c)
+        scale = patch_scale(m.F_n, m.G, m.nu)
+        factors = (m.k_a * scale * usual["a"], m.k_b * scale * usual["b"])
+        return [k * found for k, found in zip(factors, cs.vertsplit(powers, 2), strict=True)]
 
     def _contact_forces(m) -> tuple[Expr, Expr]:
         """Lateral force and yaw moment of both contacts (eq. 3.93 to 3.96, 3.102, 3.103)."""
-        phi, F, M = m._roll[0], 0.0, 0.0
-        for side, sign in SIDES.items():
-            w = m._wheels[side]
-            slope = w.delta + sign * phi  # of the contact plane over the track
-            across = w.F_y * cs.cos(slope)
-            F_x = w.F_x - across * m.psi
-            F_y = w.F_x * m.psi + across - sign * m.F_n * cs.sin(slope)
-            R_x, R_y = -(sign * m.s + w.r * phi) * m.psi, sign * m.s + w.r * phi
-            F += F_y
-            M += R_x * F_y - R_y * F_x + w.M_z * cs.cos(slope)
-        return F, M
+        phi, w = m._roll[0], m._wheels
+        slope = w.delta + SIGN * phi  # of the contact planes over the track
+        across = w.F_y * cs.cos(slope)
+        F_x = w.F_x - across * m.psi
+        F_y = w.F_x * m.psi + across - SIGN * m.F_n * cs.sin(slope)
+        R_y = SIGN * m.s + w.r * phi
+        R_x = -R_y * m.psi
+        M = R_x * F_y - R_y * F_x + w.M_z * cs.cos(slope)
+        return cs.sum1(F_y), cs.sum1(M)

@@ -18,14 +18,17 @@ from fmus.contact.arguments import (
     checked,
     mapped,
 )
+from fmus.contact.even_table import rows_from
 from fmus.contact.forces.kalker_asymptotes import long_across, long_along
 from fmus.contact.forces.kalker_polynomials import polynomials
+from fmus.contact.two import for_two
 from fmus.errors import did_you_mean
 from fmus.variables import Expr
 
 TABLE = Path(__file__).with_name("kalker_1990.csv")
 NU = (0.0, 0.25, 0.5)  # Poisson's ratios of the table
 SLENDER = 0.1  # smaller over larger semi-axis in the table's outer rows
+SPACING = 0.1
 PLACES = np.arange(1, 20) / 10  # of the rows: a/b up to the circle, 2 - b/a beyond it
 
 
@@ -84,32 +87,56 @@ def coefficients(a_over_b: Expr, nu: Expr) -> Kalker:
 
 @cache
 def looked_up() -> cs.Function:
-    """The same as a function (a/b, nu) -> (c11, c22, c23, c33), several times cheaper.
+    """The same for both contacts of a wheelset, (a/b of both, nu) -> columns of two, several times cheaper.
 
     It looks the rows up where `coefficients`, an expression of scalars, must work all of them out.
     """
-    a_over_b, nu = cs.SX.sym("a_over_b"), cs.SX.sym("nu")
-    columns = cs.SX.sym("columns", _table().shape[1])
-    beyond = cs.Function("beyond", [a_over_b, nu], list(coefficients(a_over_b, nu)))
-    to_place = cs.Function("place", [a_over_b], [_place(a_over_b)])
-    over_nu = cs.Function("over_nu", [columns, nu], _over_nu(cs.vertsplit(columns), nu))
-    rows = cs.interpolant("rows", "linear", [list(PLACES)], _table().ravel())
-    r, n = cs.MX.sym("a_over_b"), cs.MX.sym("nu")
-    within = cs.Function("within", [r, n], over_nu.call([rows(to_place(r)), n]))
-    choice = cs.Function.conditional("kalker", [within], beyond)
-    slender = cs.fmax(cs.fmin(r, 1 / r) < SLENDER, 0)
-    return cs.Function("kalker", [r, n], choice.call([slender, r, n]), ["a_over_b", "nu"], Kalker._fields)
+    ratio, nu = cs.SX.sym("ratio"), cs.SX.sym("nu")
+    every = cs.Function("every", [ratio, nu], list(coefficients(ratio, nu)), ["ratio", "nu"], Kalker._fields)
+    r, numbers, along = (cs.MX.sym(name, 2) for name in ("a_over_b", "numbers", "along"))
+    n = cs.MX.sym("nu")
+    rows = [rows_from(_table(), numbers[i], 2) for i in (0, 1)]
+    given = [r, numbers, along, n]
+    within = cs.Function("within", given, _between_rows_of_two().call([*rows, along, n]))
+    beyond = cs.Function("beyond", given, for_two(every, ["nu"]).call([r, n]))
+    outside, *at = _place_of_two()(r)
+    found = cs.Function.conditional("kalker", [within], beyond).call([outside, r, *at, n])
+    return cs.Function("kalker", [r, n], found, ["a_over_b", "nu"], Kalker._fields)
+
+
+def _place_of_two() -> cs.Function:
+    """Function (a/b of both) -> whether one is beyond the table, rows before them, how far beyond those."""
+    r = cs.SX.sym("a_over_b", 2)
+    place = _place(r)
+    inside = _bounded(place)
+    beyond = cs.logic_or(place[0] != inside[0], place[1] != inside[1])
+    row = (inside - PLACES[0]) * (1 / SPACING)
+    number = cs.fmin(cs.floor(row), len(PLACES) - 2)
+    return cs.Function("place", [r], [beyond, number, row - number])
+
+
+def _between_rows_of_two() -> cs.Function:
+    """Function (two rows for each contact, how far between them, nu) -> c11, c22, c23, c33 of both."""
+    rows = [cs.SX.sym(side, _table().shape[1], 2) for side in ("left", "right")]
+    t, nu = cs.SX.sym("t", 2), cs.SX.sym("nu")
+    each = [_over_nu(cs.vertsplit(r[:, 0] + t[i] * (r[:, 1] - r[:, 0])), nu) for i, r in enumerate(rows)]
+    both = [cs.vertcat(*of) for of in zip(*each, strict=True)]
+    return cs.Function("between_rows", [*map(cs.vec, rows), t, nu], cs.cse(both))
 
 
 def _place(a_over_b: Expr) -> Expr:
-    """Where in the table's rows a ratio lies, at most at its ends."""
-    place = cs.if_else(a_over_b <= 1, a_over_b, 2 - 1 / a_over_b)
+    """Where among the table's rows a ratio lies."""
+    return cs.if_else(a_over_b <= 1, a_over_b, 2 - 1 / a_over_b)
+
+
+def _bounded(place: Expr) -> Expr:
+    """The place, or the table's end that it is beyond."""
     return cs.fmin(cs.fmax(place, PLACES[0]), PLACES[-1])
 
 
 def _between_rows(a_over_b: Expr, nu: Expr) -> list[Expr]:
     """The four coefficients in the table, beyond its end its outer rows."""
-    table, place = _table(), _place(a_over_b)
+    table, place = _table(), _bounded(_place(a_over_b))
     # a broken line is a sum of ramps, one from each row on; all columns share them
     ramps = cs.vertcat(*(cs.fmax(place - row, 0) for row in PLACES[:-1]))
     bends = np.diff(np.diff(table, axis=0) / np.diff(PLACES)[:, None], axis=0, prepend=0.0)
@@ -118,12 +145,13 @@ def _between_rows(a_over_b: Expr, nu: Expr) -> list[Expr]:
 
 def _over_nu(columns: list[Expr], nu: Expr) -> list[Expr]:
     """The coefficients by the parabola through 1/c at the table's Poisson's ratios."""
-    t = nu / NU[1]
-    found = []
-    for low, middle, high in zip(*(columns[j::3] for j in range(3)), strict=True):
-        y0, y1, y2 = 1 / low, 1 / middle, 1 / high
-        found.append(1 / (y0 + t * (y1 - y0) + t * (t - 1) / 2 * (y2 - 2 * y1 + y0)))
-    return found
+    t = 1 / NU[1] * nu
+    share = 0.5 * (t - 1) * (t - 2), t * (2 - t), 0.5 * t * (t - 1)
+    return [
+        # the sum of the shares over their columns, with one division
+        low * mid * high / (share[0] * mid * high + share[1] * low * high + share[2] * low * mid)
+        for low, mid, high in zip(*(columns[j::3] for j in range(3)), strict=True)
+    ]
 
 
 @cache

@@ -12,6 +12,8 @@ from fmus.contact.forces.coefficients import Kalker
 from fmus.variables import Expr
 
 ARGUMENTS = ("a", "b", "N", "mu", "G", "c11", "c22", "c23", "c33", "xi_x", "xi_y", "xi_s", "k_A", "k_S")
+SHARED = ("N", "G", "k_A", "k_S")  # what both contacts of a wheelset have in common
+GIVEN = ("f11", "f22", "f23", "f33")  # creep coefficients that stand for Kalker's: N, N, N.m, N.m2
 RESULTS = ("F_x", "F_y", "M_z")
 BOUND_MIN = 1e-9  # N, keeps quotients finite where there is no friction
 
@@ -51,6 +53,7 @@ class CreepLaw(ABC):
 
     name: ClassVar[str]
     code: ClassVar[int]  # what the parameter creep_law of an FMU selects; the codes count up from 0
+    takes_given: ClassVar[bool] = False  # whether creep coefficients may be given in place of Kalker's
     title: ClassVar[str] = ""  # in the description of that parameter; its name where it has none
 
     @abstractmethod
@@ -69,3 +72,14 @@ def creep(given: list[Expr]) -> Creep:
     named = dict(zip(ARGUMENTS, given, strict=True))
     coefficients = Kalker(*(named.pop(name) for name in Kalker._fields))
     return Creep(kalker=coefficients, **named)
+
+
+def given_or_kalker(arguments: dict[str, Expr], given: list[Expr]) -> dict[str, Expr]:
+    """Kalker's coefficients by name, each replaced by that which is given, GIVEN, where this is above 0."""
+    G, area = arguments["G"], arguments["a"] * arguments["b"]
+    size = cs.sqrt(area)
+    units = (G * area, G * area, G * area * size, G * area**2)
+    return {
+        name: cs.if_else(f > 0, f / unit, arguments[name])
+        for name, f, unit in zip(Kalker._fields, given, units, strict=True)
+    }

@@ -12,6 +12,7 @@ class Linear(CreepLaw):
     name = "linear"
     code = 0
     title = "linear"
+    takes_given = True
 
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:
         """See CreepLaw.forces."""

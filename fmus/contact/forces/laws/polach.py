@@ -24,8 +24,8 @@ class Polach(CreepLaw):
     def forces(self, c: Creep) -> tuple[Expr, Expr, Expr]:
         """See CreepLaw.forces."""
         # the lateral creepage with that of the leading edge under spin, where it is larger
-        s_yC = cs.sqrt(cs.fmax(c.xi_y**2, (c.xi_y + c.xi_s * c.a) ** 2) + S_MIN**2)
-        s_C = cs.sqrt(c.xi_x**2 + s_yC**2)
+        square = cs.fmax(c.xi_y**2, (c.xi_y + c.xi_s * c.a) ** 2) + S_MIN**2
+        s_yC, s_C = cs.sqrt(square), cs.sqrt(c.xi_x**2 + square)
         eps = stress_gradient(s_C, c.a, c.b, mean_coefficient(c), c.bound, c.G)
         per_creepage = creep_force(eps, c.mu * c.N, c.k_A, c.k_S) / s_C
         F_x = -per_creepage * c.xi_x
@@ -43,12 +43,12 @@ def mean_coefficient(c: Creep) -> Expr:
 
 def stress_gradient(s: Expr, a: Expr, b: Expr, c_jj: Expr, bound: Expr, G: Expr) -> Expr:
     """Gradient of tangential stress in adhesion, for creepage s; bound = mu N (eq. 3.67, 3.77)."""
-    return G * cs.pi * a * b * c_jj * s / (4 * bound)
+    return cs.pi / 4 * G * a * b * c_jj * s / bound
 
 
 def creep_force(eps: Expr, bound: Expr, k_A: Expr, k_S: Expr) -> Expr:
     """Magnitude of the creep force, N, from the stress gradient; bound = mu N (eq. 3.83)."""
-    return 2 * bound / cs.pi * (k_A * eps / (1 + (k_A * eps) ** 2) + cs.atan(k_S * eps))
+    return 2 / cs.pi * bound * (k_A * eps / (1 + (k_A * eps) ** 2) + cs.atan(k_S * eps))
 
 
 def spin_force(s_yC: Expr, s_C: Expr, c: Creep) -> Expr:
@@ -58,6 +58,7 @@ def spin_force(s_yC: Expr, s_C: Expr, c: Creep) -> Expr:
     source is -(2/3) eps/(1 + eps²)², without cancellation at large creepage.
     """
     k_s = 1 + 6.3 * (1 - cs.exp(-c.a / c.b))
-    per_creepage = 8 / 3 * c.G * c.b * cs.sqrt(c.a * c.b) * c.kalker.c23 / (c.bound * k_s)
-    K_M = 2 / 3 * per_creepage * (s_yC / s_C) / (1 + (per_creepage * s_yC) ** 2) ** 2
-    return 9 / 16 * c.a * c.mu * c.N * k_s * K_M * c.xi_s
+    # the quotient (k_s K_M) of the source, with one division by k_s and both brackets at once
+    stiff = 8 / 3 * c.G * c.b * cs.sqrt(c.a * c.b) * c.kalker.c23 / c.bound
+    reduced = k_s**2 / (k_s**2 + (stiff * s_yC) ** 2)
+    return 3 / 8 * c.a * c.mu * c.N * stiff * reduced**2 * (s_yC / s_C) * c.xi_s

@@ -31,4 +31,4 @@ def saturation(F_x: Expr, F_y: Expr, c: Creep) -> Expr:
     """Factor, 0 to 1, that takes a force of the linear theory back to what friction transmits."""
     F = cs.sqrt(F_x**2 + F_y**2 + F_MIN**2)
     f = cs.fmin(F / c.bound, 3)
-    return (1 - f / 3 + f**2 / 27) * cs.fmin(3 * c.mu * c.N / F, 1)
+    return (1 - 1 / 3 * f + 1 / 27 * f**2) * cs.fmin(3 * c.mu * c.N / F, 1)
