@@ -19,7 +19,6 @@ from fmus.contact.forces.conditions import CONDITIONS, PARAMETERS
 from fmus.contact.forces.friction import CRITICAL, friction_coefficient
 from fmus.contact.forces.laws import LAWS, law_codes, selected_law
 from fmus.contact.forces.laws.polach import Polach
-from fmus.contact.power import power
 from fmus.effects.effect import Effect
 from fmus.model import Model
 from fmus.option import Choice
@@ -79,6 +78,12 @@ def patch_scale(load: Expr, shear: Expr, nu: Expr) -> Expr:
     It grows with the cube root of load over stiffness E / (1 - nu²) = 2 G / (1 - nu).
     """
     return (load / LOAD * (G / (1 - NU)) / (shear / (1 - nu))) ** (1 / 3)
+
+
+def powers_of(n: int) -> cs.Function:
+    """Function (n numbers > 0, exponent) -> their powers; in one call, for one test of exponent 1."""
+    base, exponent = cs.MX.sym("base", n), cs.MX.sym("exponent")
+    return cs.Function("powers", [base, exponent], [base**exponent])
 
 
 class Wheelset(Model):
@@ -310,11 +315,11 @@ class Wheelset(Model):
     def _semi_axes(m) -> list[Expr]:
         """a and b as tabulated for the load, or between that and their means over the usual shifts."""
         usual = m._usual
-        ratios = [m._by_patch(m._curves, which) / mean for which, mean in usual.items()]
-        (powers,) = m.call(power(4), cs.vertcat(*ratios), m.k_c)
         scale = patch_scale(m.F_n, m.G, m.nu)
         factors = (m.k_a * scale * usual["a"], m.k_b * scale * usual["b"])
-        return [k * found for k, found in zip(factors, cs.vertsplit(powers, 2), strict=True)]
+        ratios = cs.vertcat(*(m._by_patch(m._curves, which) / mean for which, mean in usual.items()))
+        (powers,) = m.call(powers_of(ratios.numel()), ratios, m.k_c)
+        return [k * power for k, power in zip(factors, cs.vertsplit(powers, len(SIDES)), strict=True)]
 
     def _contact_forces(m) -> tuple[Expr, Expr]:
         """Lateral force and yaw moment of both contacts (eq. 3.93 to 3.96, 3.102, 3.103)."""

@@ -6,10 +6,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fmus.contact.forces.coefficients import coefficients, kalker, looked_up
-from fmus.contact.power import power
 from fmus.model import equations
+from fmus.variables import Input, Parameter, State
 from fmus.wheelset.curves import FIELDS, contact_curves
-from fmus.wheelset.model import Wheelset
+from fmus.wheelset.model import Wheelset, powers_of
 from fmus.wheelset.track import Track
 
 LIFT, SLOPE = FIELDS.index("lift"), FIELDS.index("lift_slope")
@@ -56,7 +56,7 @@ def test_rows_looked_up_have_the_slopes_of_the_coefficients():
 @pytest.mark.parametrize("exponent", [0.0, 0.4, 1.0, 1.7])
 def test_a_power_and_its_slopes_are_those_of_a_power_also_at_one(exponent):
     bases = np.array([0.3, 1.0, 2.5])
-    found = power(3)
+    found = powers_of(3)
     assert_allclose(found(bases, exponent).full().ravel(), bases**exponent, rtol=1e-15)
     by_base, by_exponent = found.jacobian()(bases, exponent, 0)
     assert_allclose(by_base.full(), np.diag(exponent * bases ** (exponent - 1)), rtol=1e-14)
@@ -73,3 +73,14 @@ def test_what_the_states_do_not_decide_is_worked_out_once_a_step():
     # one of the calls in the derivatives is for the patch at usual shifts
     stages, calls = 4, count(made.f, cs.OP_CALL)
     assert count(made.step, cs.OP_CALL) == stages * (calls - 1) + 1
+
+
+def test_the_exponent_of_the_shift_has_its_slope_also_at_one():
+    model = Wheelset()
+    h, at = equations(model).h, [v.name for v in model.of(Parameter)].index("k_c")
+    x, u, p = (np.array([v.start for v in model.of(k)]) for k in (State, Input, Parameter))
+    x[0], more = 3e-3, 1e-5 * np.eye(len(p))[at]
+    found = h.jacobian()(x, u, p, 0)[2].full()[:, at]
+    expected = (h(x, u, p + more) - h(x, u, p - more)).full().ravel() / 2e-5
+    assert np.abs(found).max() > 0
+    assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())

@@ -14,7 +14,9 @@ from fmus.model import Equations
 from fmus.variables import Expr
 
 HERE = Path(__file__).parent
-WRAPPER = ("fmu.c", "instance.h", "instance.c", "values.c", "stepping.c", "states.c", "derivatives.c")
+WRAPPER = (
+    "fmu.c", "quick.c", "instance.h", "instance.c", "values.c", "stepping.c", "states.c", "derivatives.c",
+)  # fmt: skip
 INTERFACE = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 STANDARD = {  # headers of the standard, under its 2-clause BSD licence, as FMPy brings them
     2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),

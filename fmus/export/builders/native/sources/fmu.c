@@ -20,7 +20,10 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 #define CASADI_SYMBOL_EXPORT static
+#include "quick.c"
 #include "equations.c"
+#undef pow
+#undef floor
 #if defined(__GNUC__)
 #pragma GCC diagnostic pop
 #endif
