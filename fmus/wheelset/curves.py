@@ -49,13 +49,14 @@ def both_contacts(track: Track) -> cs.Function:
 
 @cache
 def usual_patch(track: Track) -> cs.Function:
-    """Function (contact_search) -> column of geometric means of PATCH over the USUAL shifts."""
+    """Function (contact_search) -> geometric means of PATCH over the USUAL shifts, and their reciprocals."""
     from fmus.contact.geometry.table import SEARCHES  # as above
 
     means = []
     for shifts, values in (_tabulated(track, search) for search in SEARCHES):
         usual = values[np.abs(shifts) <= USUAL, FIELDS.index(PATCH[0]) :]
-        means.append(cs.Function("means", [], [cs.DM(np.exp(np.log(usual).mean(axis=0)))]))
+        mean = np.exp(np.log(usual).mean(axis=0))
+        means.append(cs.Function("means", [], [cs.DM(mean), cs.DM(1 / mean)]))
     return cs.Function.conditional("usual_patch", means[:-1], means[-1])
 
 
@@ -72,9 +73,11 @@ def _curves(track: Track, search: str) -> cs.Function:
 def _place(shifts: Array) -> cs.Function:
     """Function of a shift -> (number of its interval in the table, how far along it, change by shift)."""
     q = cs.SX.sym("q")
-    place = (cs.fmin(cs.fmax(q, shifts[0]), shifts[-1]) - shifts[0]) * (1 / SPACING)
+    inside = cs.fmin(cs.fmax(q, shifts[0]), shifts[-1])
+    place = (inside - shifts[0]) * (1 / SPACING)
+    rate = cs.if_else(q == inside, 1 / SPACING, 0)
     number = cs.fmin(cs.floor(place), len(shifts) - 2)
-    return cs.Function("place", [q], cs.cse([number, place - number, cs.jacobian(place, q)]))
+    return cs.Function("place", [q], [number, place - number, rate])
 
 
 def _spline(width: int) -> cs.Function:

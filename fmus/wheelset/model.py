@@ -281,11 +281,13 @@ class Wheelset(Model):
         return (lift[0] - lift[1]) * per_base, (slope[0] + slope[1]) * rate_of_shift * per_base
 
     @cached_property
-    def _usual(m) -> dict[str, Expr]:
-        """Semi-axes a and b, m, that stand for the usual shifts at the tabulated load."""
-        (means,) = m.call(usual_patch(m.track), m.contact_search)
-        found = dict(zip(PATCH, cs.vertsplit(means), strict=True))
-        return {which: m._by_patch(found, which) for which in ("a", "b")}
+    def _usual(m) -> dict[str, list[Expr]]:
+        """Semi-axes a and b, m, of the usual shifts at the tabulated load, each with its reciprocal."""
+        found = [
+            dict(zip(PATCH, cs.vertsplit(column), strict=True))
+            for column in m.call(usual_patch(m.track), m.contact_search)
+        ]
+        return {which: [m._by_patch(one, which) for one in found] for which in ("a", "b")}
 
     def _by_patch(m, at: dict[str, Expr], which: str) -> Expr:
         """Semi-axis a or b of the patch that is chosen."""
@@ -297,13 +299,15 @@ class Wheelset(Model):
         growth, delta = m._curves["growth"], m._curves["delta"]
         r = m.r0 + growth
         V = cs.fmax(m.V, V_MIN)
-        rolls = m.V / V  # 1, but towards standstill; quotients of inputs and parameters are found once a step
-        xi_x = -(rolls / m.r0) * growth - SIGN * (m.s / V) * m.psi_dot
-        xi_y = m.y_dot / V + r * (m._roll[1] / V) - rolls * m.psi
-        xi_s = m.psi_dot / V - SIGN * (rolls / m.r0) * delta
+        # a choice, as CasADi makes quotients of products with a plain reciprocal, which cost more
+        per_V = cs.if_else(m.V > V_MIN, 1 / V, 1 / V_MIN)
+        rolls = m.V * per_V  # 1, but towards standstill
+        xi_x = -(rolls / m.r0) * growth - SIGN * (m.s * per_V) * m.psi_dot
+        xi_y = m.y_dot * per_V + r * (m._roll[1] * per_V) - rolls * m.psi
+        xi_s = m.psi_dot * per_V - SIGN * (rolls / m.r0) * delta
         a, b = m._semi_axes
         mu = friction_coefficient(V * cs.sqrt(xi_x**2 + xi_y**2 + S_MIN**2), m.mu0, m.A, m.B)
-        c11, c22, c23, c33 = m.call(looked_up(), a / b, m.nu)
+        c11, c22, c23, c33 = m.call(looked_up(), a, b, m.nu)
         F_x, F_y, M_z = m.call(
             selected_law(),
             m.creep_law, a, b, m.F_n, mu, m.G, c11, c22, m.k_spin * c23, m.k_spin * c33, xi_x, xi_y, xi_s,
@@ -316,8 +320,10 @@ class Wheelset(Model):
         """a and b as tabulated for the load, or between that and their means over the usual shifts."""
         usual = m._usual
         scale = patch_scale(m.F_n, m.G, m.nu)
-        factors = (m.k_a * scale * usual["a"], m.k_b * scale * usual["b"])
-        ratios = cs.vertcat(*(m._by_patch(m._curves, which) / mean for which, mean in usual.items()))
+        factors = (m.k_a * scale * usual["a"][0], m.k_b * scale * usual["b"][0])
+        ratios = cs.vertcat(
+            *(m._by_patch(m._curves, which) * per_mean for which, (_, per_mean) in usual.items())
+        )
         (powers,) = m.call(powers_of(ratios.numel()), ratios, m.k_c)
         return [k * power for k, power in zip(factors, cs.vertsplit(powers, len(SIDES)), strict=True)]
 

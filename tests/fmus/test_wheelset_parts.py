@@ -36,7 +36,7 @@ def test_beyond_the_table_the_last_contact_holds_and_lifts_no_further(side):
 def test_rows_looked_up_for_both_contacts_are_the_coefficients_of_each(nu):
     ratios = np.concatenate([np.geomspace(0.02, 50.0, 301), [0.1, 0.3, 1.0, 1 / 0.3, 10.0]])
     both = np.vstack([ratios, np.random.default_rng(1).permutation(ratios)])  # also one slender, one not
-    found = looked_up().map(ratios.size)(both, np.full((1, ratios.size), nu))
+    found = looked_up().map(ratios.size)(both, np.ones_like(both), np.full((1, ratios.size), nu))
     for mine, expected in zip(found, kalker(both, np.full_like(both, nu)), strict=True):
         assert_allclose(mine.full(), expected, rtol=1e-13)
 
@@ -45,7 +45,7 @@ def test_rows_looked_up_have_the_slopes_of_the_coefficients():
     r, nu = cs.SX.sym("r"), cs.SX.sym("nu")
     alone = cs.Function("alone", [r, nu], [cs.jacobian(cs.vertcat(*coefficients(r, nu)), cs.vertcat(r, nu))])
     pair, n = cs.MX.sym("pair", 2), cs.MX.sym("nu")
-    left = cs.vertcat(*(both[0] for both in looked_up().call([pair, n])))
+    left = cs.vertcat(*(both[0] for both in looked_up().call([pair, cs.DM.ones(2), n])))
     slopes = cs.Function(
         "slopes", [pair, n], [cs.horzcat(cs.jacobian(left, pair)[:, 0], cs.jacobian(left, n))]
     )

@@ -87,32 +87,32 @@ def coefficients(a_over_b: Expr, nu: Expr) -> Kalker:
 
 @cache
 def looked_up() -> cs.Function:
-    """The same for both contacts of a wheelset, (a/b of both, nu) -> columns of two, several times cheaper.
+    """The same for both contacts of a wheelset, (a, b, nu) -> columns of two, several times cheaper.
 
     It looks the rows up where `coefficients`, an expression of scalars, must work all of them out.
     """
     ratio, nu = cs.SX.sym("ratio"), cs.SX.sym("nu")
     every = cs.Function("every", [ratio, nu], list(coefficients(ratio, nu)), ["ratio", "nu"], Kalker._fields)
-    r, numbers, along = (cs.MX.sym(name, 2) for name in ("a_over_b", "numbers", "along"))
+    a, b, numbers, along = (cs.MX.sym(name, 2) for name in ("a", "b", "numbers", "along"))
     n = cs.MX.sym("nu")
     rows = [rows_from(_table(), numbers[i], 2) for i in (0, 1)]
-    given = [r, numbers, along, n]
+    given = [a, b, numbers, along, n]
     within = cs.Function("within", given, _between_rows_of_two().call([*rows, along, n]))
-    beyond = cs.Function("beyond", given, for_two(every, ["nu"]).call([r, n]))
-    outside, *at = _place_of_two()(r)
-    found = cs.Function.conditional("kalker", [within], beyond).call([outside, r, *at, n])
-    return cs.Function("kalker", [r, n], found, ["a_over_b", "nu"], Kalker._fields)
+    beyond = cs.Function("beyond", given, for_two(every, ["nu"]).call([a / b, n]))
+    outside, *at = _place_of_two()(a, b)
+    found = cs.Function.conditional("kalker", [within], beyond).call([outside, a, b, *at, n])
+    return cs.Function("kalker", [a, b, n], found, ["a", "b", "nu"], Kalker._fields)
 
 
 def _place_of_two() -> cs.Function:
-    """Function (a/b of both) -> whether one is beyond the table, rows before them, how far beyond those."""
-    r = cs.SX.sym("a_over_b", 2)
-    place = _place(r)
+    """Function (a, b of both) -> whether one is beyond the table, rows before them, how far beyond those."""
+    a, b = cs.SX.sym("a", 2), cs.SX.sym("b", 2)
+    place = _place(a / b, b / a)
     inside = _bounded(place)
     beyond = cs.logic_or(place[0] != inside[0], place[1] != inside[1])
     row = (inside - PLACES[0]) * (1 / SPACING)
     number = cs.fmin(cs.floor(row), len(PLACES) - 2)
-    return cs.Function("place", [r], [beyond, number, row - number])
+    return cs.Function("place", [a, b], [beyond, number, row - number])
 
 
 def _between_rows_of_two() -> cs.Function:
@@ -124,9 +124,9 @@ def _between_rows_of_two() -> cs.Function:
     return cs.Function("between_rows", [*map(cs.vec, rows), t, nu], cs.cse(both))
 
 
-def _place(a_over_b: Expr) -> Expr:
+def _place(a_over_b: Expr, b_over_a: Expr) -> Expr:
     """Where among the table's rows a ratio lies."""
-    return cs.if_else(a_over_b <= 1, a_over_b, 2 - 1 / a_over_b)
+    return cs.if_else(a_over_b <= 1, a_over_b, 2 - b_over_a)
 
 
 def _bounded(place: Expr) -> Expr:
@@ -136,7 +136,7 @@ def _bounded(place: Expr) -> Expr:
 
 def _between_rows(a_over_b: Expr, nu: Expr) -> list[Expr]:
     """The four coefficients in the table, beyond its end its outer rows."""
-    table, place = _table(), _bounded(_place(a_over_b))
+    table, place = _table(), _bounded(_place(a_over_b, 1 / a_over_b))
     # a broken line is a sum of ramps, one from each row on; all columns share them
     ramps = cs.vertcat(*(cs.fmax(place - row, 0) for row in PLACES[:-1]))
     bends = np.diff(np.diff(table, axis=0) / np.diff(PLACES)[:, None], axis=0, prepend=0.0)
