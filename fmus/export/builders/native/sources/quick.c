@@ -1,4 +1,4 @@
-/* Two functions of C's library as the equations use them: of the same value to the last bit, in less time. */
+/* Two functions of C's library as the equations use them: the same values in less time, but for the sign of a zero. */
 
 #if defined(__GNUC__)
 #define USUALLY(condition) __builtin_expect(condition, 1)
