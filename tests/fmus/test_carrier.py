@@ -1,6 +1,9 @@
 """The native container of a foreign FMU takes the same steps as the container in Python."""
 
+import re
+import zipfile
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pytest
@@ -112,3 +115,21 @@ def test_without_a_compiler_the_container_is_a_pythonfmu(tmp_path, monkeypatch):
         fmu.restart()
         fmu.step(1e-3, F=10.0)
         assert fmu["q_dot"] > 0
+
+
+def test_names_may_hold_any_character(tmp_path):
+    odd = 'a "b" \\n ??/ */ %s ä'
+    base = build_native(Drive(), tmp_path / "drive.fmu")
+    renamed = tmp_path / "odd.fmu"
+    with zipfile.ZipFile(base) as old, zipfile.ZipFile(renamed, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name == "modelDescription.xml":
+                data = data.replace(b'name="F_v"', f"name={quoteattr(odd)}".encode())
+            new.writestr(name, data)
+    carrier = build_carrier(renamed, (PORT,), (), tmp_path / "carrier.fmu")
+    with Fmu(carrier) as fmu:
+        fmu.restart(**{odd: 123.0})
+        assert fmu[odd] == 123.0
+        with pytest.raises(FmuError, match=re.escape(f"{odd} = nan is outside")):
+            fmu.set(**{odd: np.nan})

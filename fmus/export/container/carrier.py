@@ -83,7 +83,7 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     settable = n_states + n_inputs + n_parameters
     told, references = set(base["told"]), base["references"]
     facts = {
-        "title": card["description"],
+        "c": _c,
         "token": _token(card, description),
         "fmi": description.fmi_version[0],
         "base_token": description.guid,
@@ -113,6 +113,12 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     }
     standard = {n: (headers / n).read_bytes() for n in (*STANDARD[2], *STANDARD[3])}
     return standard | {name: content.encode() for name, content in files.items()}
+
+
+def _c(words: str) -> str:
+    """A string of C; what the carried FMU's description says may hold any character."""
+    plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in words.encode())
+    return f'"{"".join(plain)}"'
 
 
 def _limit(row: dict[str, Any], key: str, without: float) -> str:
