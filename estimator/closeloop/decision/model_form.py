@@ -137,8 +137,9 @@ class Closed(ModelForm):
         return False
 
     def curve_limit(self, h: Hypothesis) -> float:
-        """See ModelForm; what noise alone does not cause."""
-        return self.baseline.policy.decision.noticed
+        """See ModelForm; more than chance, and most of what the law leaves beyond noise."""
+        limits = self.baseline.policy.decision
+        return max(limits.noticed, limits.second_share * h.fit.beyond_noise)
 
 
 @dataclass(frozen=True)
