@@ -344,6 +344,24 @@ class DecisionPolicy:
         "reduction by a free curve, from which on a law may be rejected if the model form is open",
         CHALLENGE,
     )
+    rounded: float = limit(
+        1e-4,
+        "share of what a law explains",
+        "smallest misfit of a smooth curve that imitates a law with a corner",
+        CHALLENGE,
+    )
+    plain_law: int = limit(
+        2,
+        "unknowns",
+        "a law with no more unknowns is imitated less closely: `open_curve_explained` replaces `rounded`",
+        CHALLENGE,
+    )
+    fastest: float = limit(
+        0.1,
+        "share of the samples",
+        "fastest samples; friction whose rounded part includes even these is not named friction",
+        CHALLENGE,
+    )
     different: float = limit(
         0.01,
         "probability",

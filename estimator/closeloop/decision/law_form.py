@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import named, no_law
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.free_form import FREE_FORMS
@@ -38,28 +40,53 @@ def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[Missing
         rest = []
     if rest:
         return named(rest).after(judgement.checks)
-    wrong = misnamed(best, forces)
+    wrong = doubted(baseline, best, forces)
     return no_law(best, wrong[0] if wrong else None, check).after(judgement.checks)
 
 
 def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> Check:
     """The check that all laws are true to their names and that a single law is the curve of its force."""
-    wrong = misnamed(h, forces)
+    wrong = doubted(baseline, h, forces)
     if wrong or len(h.candidates) > 1:
         return Check.most(FORCE_FOLLOWS, len(wrong), 0)
     return Check.most(FORCE_FOLLOWS, curvature(baseline, h, forces), form_of(baseline).curve_limit(h))
 
 
-def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
-    """Laws that are not true to their names with the fitted values and the motion at their port."""
+def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
+    """Laws of a hypothesis that are not true to their names with the fitted values, as the record shows."""
+    wrong = misnamed(h, forces)
+    if not form_of(baseline).exact or not wrong:
+        return wrong
+    nowhere = misnamed(h, forces, baseline.policy.decision.fastest)
+    return [c for c in wrong if c in nowhere or not told_apart(baseline, h, c)]
+
+
+def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0) -> list[Candidate]:
+    """Laws that are not true to their names with the fitted values and the motion at their port.
+
+    fastest: share of the samples that is examined, those with the highest velocities.
+    """
     at, found = {missing.port.name: missing for missing in forces}, []
     for c in h.candidates:
         law = EFFECTS.get(c.kind)
         if law and issubclass(law, ForceLaw) and c.location in at:
             values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
-            if not law.true_to_name(values, at[c.location].displacement, at[c.location].velocity):
+            q, v = at[c.location].displacement, at[c.location].velocity
+            fast = np.abs(v) >= np.quantile(np.abs(v), 1 - fastest)
+            if not law.true_to_name(values, q[fast], v[fast]):
                 found.append(c)
     return found
+
+
+def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate) -> bool:
+    """Whether h leaves only noise, in which a smooth curve in place of its law c would be visible."""
+    limits = baseline.policy.decision
+    if not over_what(c) or not baseline.leaves_noise(h):
+        return False
+    alone = len(h.candidates) == 1
+    explained = cost(baseline.hypothesis) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
+    near = limits.open_curve_explained if len(c.unknowns) <= limits.plain_law else limits.rounded
+    return near * explained > limits.noticed
 
 
 def motion(h: Hypothesis) -> tuple[str, str]:
