@@ -77,13 +77,13 @@ class Loops:
     def steps(self, fmu: Fmu, start: Mapping[str, float], dt: float, steps: int) -> None:
         """Restart an FMU and make communication steps."""
         fmu.restart(**start)
-        self.library.steps(_calls(fmu), _component(fmu), c_double(dt), c_int(steps))
+        self.library.steps(_calls(fmu), c_void_p(fmu.instance.component), c_double(dt), c_int(steps))
 
     def restarts(self, fmus: Sequence[Fmu], start: Mapping[str, float], dt: float, times: int) -> Run:
         """A call that resets, sets, initialises, steps and reads each FMU, as a filter does, some times."""
         n, references = len(start), fmus[0].references(start)
         functions, refs = _calls(fmus[0]), (c_uint * n)(*references)
-        components = (c_void_p * len(fmus))(*map(_component, fmus))
+        components = (c_void_p * len(fmus))(*(fmu.instance.component for fmu in fmus))
         given = (c_double * n)(*start.values())
 
         def run() -> None:
@@ -99,13 +99,8 @@ def _address(values: Array) -> c_void_p:
     return c_void_p(values.ctypes.data)
 
 
-def _component(fmu: Fmu) -> c_void_p:
-    component = fmu.instance._slave.component
-    return c_void_p(getattr(component, "value", component))
-
-
 def _calls(fmu: Fmu) -> ctypes.Array[c_void_p]:
     """Addresses of an FMU's functions, in the order of the structure in loops.c."""
-    dll = fmu.instance._slave.dll
+    dll = fmu.instance.library
     found = (ctypes.cast(getattr(dll, f"fmi2{n}"), c_void_p) for n in FUNCTIONS)
     return (c_void_p * len(FUNCTIONS))(*found)
