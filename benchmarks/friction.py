@@ -1,7 +1,7 @@
 """The friction case: six states of the wheelset, mu0 and the alignment, estimated from four noisy outputs.
 
-The wheelset runs at 40 m/s and is sampled at 1 kHz. The alignment is an unknown input with a shaping filter, so
-that there are nine unknowns and 19 sigma points.
+The wheelset runs at 40 m/s and is sampled at 1 kHz. The alignment is an unknown input with a shaping filter.
+There are thus nine unknowns and 19 sigma points.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """What a group of measurements is: it yields rows of the table, and curves of the figure."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
@@ -40,7 +40,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Curve:
-    """Cost y against a number x, as one line of a panel of the figure; label: what was measured, and in what."""
+    """Cost y against a number x, a line in a panel of the figure; label: what was measured, with unit."""
 
     panel: str
     label: str
@@ -54,7 +54,6 @@ class Work:
 
     folder: Path
     quick: bool = False
-    tell: Callable[[str], None] = lambda _: None
     _built: dict[tuple[str, str], Path] = field(default_factory=dict)
 
     def of(self, usual: int, quick: int) -> int:

@@ -1,7 +1,7 @@
 """Runs `railfmi` with the given arguments up to the first communication step, and ends the process there.
 
-Run: python -m benchmarks.until_first_step run SCENARIO.toml --out DIR. The exit code REACHED says that an FMU was
-about to be stepped.
+Run: python -m benchmarks.until_first_step run SCENARIO.toml --out DIR. The exit code REACHED says that an FMU
+was about to be stepped.
 """
 
 import os

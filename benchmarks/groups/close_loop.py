@@ -1,4 +1,4 @@
-"""Processor time of each step of close-loop for a record of every system, beside one simulation of the record."""
+"""Processor time of each step of close-loop for a record of every system, beside one simulation of it."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -49,8 +49,8 @@ class ContactGroup(Group):
             times = in_turns({**runs, PLAIN: plain}, work.of(5, 2))
         for said in searches:
             how = (
-                f"{len(shifts)} shifts of S1002 on 60E1, {said} search, with curvatures and ellipses; the peer "
-                "finds roll, radii and angles of the rigid contact"
+                f"{len(shifts)} shifts of S1002 on 60E1, {said} search, with curvatures and ellipses; the "
+                "peer finds roll, radii and angles of the rigid contact"
             )
             yield times.row(f"contact table, {said}", said, PLAIN, "ms", how, factor=1e3)
 

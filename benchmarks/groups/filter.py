@@ -19,7 +19,7 @@ CASE = "friction case, 19 sigma points, samples of 1 ms"
 
 
 class FilterGroup(Group):
-    """The unscented filter of the wheelset with unknown friction and alignment; see benchmarks/friction.py."""
+    """The unscented filter with unknown friction and alignment; see benchmarks/friction.py."""
 
     name = "filter"
 
@@ -37,10 +37,7 @@ class FilterGroup(Group):
             ours, slow = Ours(path), Ours(path, compiled=False)
             plain = PlainFilter(path, work.folder / f"plain_{build}", ours.joint)
             filters: dict[str, Ours | PlainFilter] = {"ours": ours, "without numba": slow, PLAIN: plain}
-            if build == "native":
-                runs = {BARE: bare(work, steps)}
-            else:
-                runs = {}
+            runs = {BARE: bare(work, steps)} if build == "native" else {}
             times = in_turns(runs | {n: _through(f, y, steps) for n, f in filters.items()}, rounds)
             _agreed(ours, plain, said)
             name = f"friction filter: step, {said}"
@@ -55,7 +52,7 @@ class FilterGroup(Group):
             plain.close()
 
     def _real_time(self, work: Work, y: Array) -> Row:
-        """The whole record with the history that `railfmi estimate` keeps, in simulated seconds per second."""
+        """A whole record with the history that `railfmi estimate` keeps, in simulated seconds per second."""
         data = as_samples(y[: round(work.of(20, 1) / DT) + 1])
         length = float(data.t[-1])
         with Ours(work.fmu("wheelset")).joint as joint:

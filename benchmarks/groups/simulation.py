@@ -69,7 +69,9 @@ def beside_fmpy(work: Work, model: str, build: str, t: Array) -> Row:
         )
     peer.close()
     how = f"{SAID[build]}, {len(inputs)} sampled inputs, {len(outputs)} outputs, steps of 1 ms; per step"
-    return times.row(f"{model}: simulation, {SAID[build]}", "ours", FMPY, "µs", how, factor=1e6 / (len(t) - 1))
+    return times.row(
+        f"{model}: simulation, {SAID[build]}", "ours", FMPY, "µs", how, factor=1e6 / (len(t) - 1)
+    )
 
 
 def beside_ecos(work: Work, model: str, t: Array) -> Row:

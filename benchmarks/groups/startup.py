@@ -31,8 +31,8 @@ class StartupGroup(Group):
             FMPY: ended("-c", SCRIPT.format(str(work.fmu("testrig", "PythonFMU")))),
         }
         how = (
-            f"{SCENARIO.name}: start, reading, building the FMU and loading it, until the first step; the peer "
-            "is given the built FMU"
+            f"{SCENARIO.name}: start, reading, building the FMU and loading it, until the first step; the "
+            "peer is given the built FMU"
         )
         yield in_turns(runs, rounds).row("railfmi run until the first step", "ours", FMPY, "s", how)
 

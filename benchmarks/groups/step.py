@@ -92,7 +92,7 @@ def _restarts(name: str, loops: Loops, work: Work) -> Row:
             archive = stack.enter_context(Archive(work.fmu(name, build)))
             fmus = [stack.enter_context(Fmu(archive)) for _ in range(COPIES)]
             runs[label] = loops.restarts(fmus, start, DT, times)
-        how = f"{COPIES} instances: reset, set states, initialise, step of 1 ms, read states; both called from C"
+        how = f"{COPIES} instances, called from C: reset, set states, initialise, step of 1 ms, read states"
         return in_turns(runs, work.of(9, 3)).row(
             f"{name}: restart and step", "ours", PYTHON, "µs", how, factor=1e6 / times
         )

@@ -32,8 +32,11 @@ class EcosProcess:
     ) -> None:
         given = [str(fmu), repr(dt), str(steps), json.dumps(dict(start)), *outputs]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", __spec__.name, *given], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )  # fmt: skip
+            [sys.executable, "-m", __spec__.name, *given],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
 
     def simulate(self) -> tuple[float, Array]:
         """Processor time of the steps with their outputs, s, and the last outputs."""

@@ -1,4 +1,4 @@
-"""Rigid contact of a wheelset as a script would find it with SciPy: splines, a root and a minimum per shift."""
+"""Rigid contact of a wheelset by a script with SciPy: splines, and a root and a minimum per shift."""
 
 from dataclasses import dataclass
 
