@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from benchmarks.group import Curve
 from scenarios.drawing.sheet import AFTER, BEFORE, DPI, LAW, NOISE, name_axes, sheet
@@ -44,5 +45,8 @@ def _label(ax: Axes, curves: Sequence[Curve]) -> None:
     ax.set_xticks(ticks, [f"{n:g}" for n in ticks])
     ax.set_xticks([], minor=True)
     ax.set_xlim(min(x) / ROOM**0.5, max(x) * ROOM**0.5)
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_ylim(min(y) / ROOM**2, max(y) * ROOM**4)
     ax.legend(loc="upper left", frameon=False, fontsize=8)

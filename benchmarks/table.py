@@ -70,8 +70,8 @@ class Results:
             yield from (f"| {' | '.join(cells(row))} | {row.how} |" for row in rows)
         if self.curves:
             yield from ("", "## Figure", "", f"![Cost by number, in four panels]({FIGURE})", "")
-            yield "Dashed: the first point of each line, scaled in proportion to the number (for cores, divided"
-            yield "by it)."
+            yield "Dashed: the first point of each line, scaled in proportion to the number (for cores,"
+            yield "divided by it)."
 
 
 def cells(row: Row) -> list[str]:

@@ -32,7 +32,11 @@ def begin(model: Model) -> tuple[Array, Array, Array]:
     """Start values of states, inputs and parameters, away from rest."""
     x = {v.name: v.start + 0.1 * (v.nominal or 1.0) for v in model.of(State)}
     u, p = ({v.name: v.start for v in model.of(kind)} for kind in (Input, Parameter))
-    return tuple(np.array([ROLLING.get(n, value) for n, value in some.items()]) for some in (x, u, p))
+
+    def column(values: dict[str, float]) -> Array:
+        return np.array([ROLLING.get(name, value) for name, value in values.items()])
+
+    return column(x), column(u), column(p)
 
 
 def start_of(model: Model) -> dict[str, float]:

@@ -38,7 +38,7 @@ SHOWN void steps(const Calls *f, void *c, double dt, int n) {
 
 SHOWN void restarts(const Calls *f, void **copies, int n, const unsigned *refs, size_t n_x,
                     const double *x, double dt) {
-    double value[N_STATES];
+    double value[n_x];
     for (int k = 0; k < n; k++) {
         void *c = copies[k];
         for (size_t i = 0; i < n_x; i++) value[i] = x[i];

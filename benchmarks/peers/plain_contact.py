@@ -58,7 +58,7 @@ class PlainContact:
         phi = float(brentq(tilted, -ROLL, ROLL, xtol=PRECISION))
         places = np.array([self.place(y, phi)[0], self.place(-y, -phi)[0]])
         radii, angles = self.r0 - self.wheel(places), np.arctan(self.wheel(places, 1))
-        return phi, *map(float, radii), *map(float, angles)
+        return phi, float(radii[0]), float(radii[1]), float(angles[0]), float(angles[1])
 
     def table(self, shifts: Array) -> Array:
         """Rows of `at` for shifts (n,), (n, 5)."""

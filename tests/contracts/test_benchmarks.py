@@ -1,4 +1,4 @@
-"""Benchmarks of speed: every file is a group, rounds alternate, ratios are of rounds, the JSON is complete."""
+"""Speed: every file is a group, rounds alternate, ratios are of rounds, the JSON has its keys."""
 
 import json
 from itertools import count
