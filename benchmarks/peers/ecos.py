@@ -60,8 +60,8 @@ def serve(path: str, dt: float, steps: int, start: Mapping[str, float], outputs:
     # ecospy's library is linked to TBB but does not bring it; the package tbb does
     tbb = next(f.locate() for f in files("tbb") or [] if f.name == "libtbb.so.12")
     ctypes.CDLL(str(tbb), mode=ctypes.RTLD_GLOBAL)
-    from ecospy.EcosSimulation import EcosSimulation
-    from ecospy.EcosSimulationStructure import EcosSimulationStructure
+    from ecospy.EcosSimulation import EcosSimulation  # type: ignore[import-not-found]
+    from ecospy.EcosSimulationStructure import EcosSimulationStructure  # type: ignore[import-not-found]
 
     for _ in sys.stdin:
         with EcosSimulationStructure() as structure:
