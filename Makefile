@@ -28,11 +28,8 @@ lint: .venv/ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-bench: .venv/ready-dev  ## side-by-side measurements
-	$(BIN)/python -m benchmarks.steps
-	$(BIN)/python -m benchmarks.wheelset
-	$(BIN)/python -m benchmarks.native
-	$(BIN)/python -m benchmarks.estimate
+bench: .venv/ready-dev  ## one table of speed beside named peers; for ecos, pip install '.[interop]' first
+	$(BIN)/python -m benchmarks --out $(OUT)/benchmarks
 
 SEED ?=
 COUNT ?= 240
