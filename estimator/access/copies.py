@@ -59,6 +59,7 @@ class Copies:
 
         Raises Refused if the FMU does not make the step.
         """
+        values = np.ascontiguousarray(values)  # the compiled loop reads it by its address
         loop, out = self._ready(values, t), np.empty((len(values), len(self.get)))
         failed = loop.run(values, out, self.t0 if self.way is Way.RESUME else t, dt)
         if failed >= 0:

@@ -88,7 +88,7 @@ def name_axes(ax: Axes, x: str = "", y: str = "", title: str = "") -> None:
     ax.set_xlabel(x, fontsize=9)
     ax.set_ylabel(y, fontsize=9)
     if title:
-        # at a given height, for to find a free one the ticks would be measured in every drawing
+        # at a fixed height: the search for a free one would measure the ticks in every drawing
         ax.set_title(title, loc="left", fontsize=9, fontweight="bold", y=1.0)
 
 

@@ -1,9 +1,11 @@
 """How a figure is written: laid out once, alike in both formats, in few colours."""
 
 import re
+from io import BytesIO
 
 import numpy as np
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.testing import assert_allclose
 from PIL import Image
 
 from scenarios.drawing.sheet import COLOURS, DPI, INK, Plot, legend, name_axes, sheet
@@ -12,12 +14,18 @@ POINTS_PER_INCH = 72
 
 
 def a_plot():
-    figure, axes = sheet(3.0, [["a"], ["b"]], sharex=True)
-    for name, size in (("a", 1.0), ("b", 1e6)):
-        axes[name].plot([0.0, 1.0], [0.0, size], color=INK, label="line")
-        name_axes(axes[name], "time in s" if name == "b" else "", "value in m", name)
+    figure, axes = sheet(3.0, [["a", "b"], ["c", "b"]])
+    for i, (name, ax) in enumerate(axes.items()):
+        ax.plot(np.linspace(0, 1, 50), 10.0 ** (3 * i) * np.sin(np.arange(50)), color=INK, label="sine")
+        name_axes(ax, "time in s", "force in N", title=name)
     legend(figure, axes["a"])
     return Plot("one", figure, "caption")
+
+
+def places(svg):
+    """Every number of translations and paths in an SVG, in points."""
+    drawn = " ".join(re.findall(r'(?: d="|translate\()([^")]+)', svg))
+    return np.array([float(n) for n in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", drawn)])
 
 
 def test_a_figure_is_laid_out_once_for_both_formats(tmp_path, monkeypatch):
@@ -59,3 +67,22 @@ def test_a_vector_graphic_has_the_size_of_the_figure_and_no_date(tmp_path):
     assert found is not None
     assert float(found[2]) == 3.0 * POINTS_PER_INCH
     assert "<dc:date>" not in text
+
+
+def test_the_png_is_the_picture_but_for_the_number_of_its_colours(tmp_path):
+    full = BytesIO()
+    a_plot().figure.savefig(full, format="png", dpi=DPI)
+    a_plot().write(tmp_path)
+    with Image.open(full) as expected, Image.open(tmp_path / "one.png") as found:
+        assert found.mode == "P"
+        difference = np.abs(np.asarray(found.convert("RGB"), int) - np.asarray(expected.convert("RGB"), int))
+    assert difference.mean() < 0.5  # of 255 steps of brightness
+
+
+def test_the_svg_has_everything_where_a_layout_of_its_own_would_place_it(tmp_path):
+    full = BytesIO()
+    a_plot().figure.savefig(full, format="svg")
+    a_plot().write(tmp_path)
+    expected, found = places(full.getvalue().decode()), places((tmp_path / "one.svg").read_text())
+    assert len(found) > 1000
+    assert_allclose(found, expected, atol=1.0)  # a point; text is measured in pixels for the one layout

@@ -28,7 +28,7 @@ from fmus.variables import Expr
 TABLE = Path(__file__).with_name("kalker_1990.csv")
 NU = (0.0, 0.25, 0.5)  # Poisson's ratios of the table
 SLENDER = 0.1  # smaller over larger semi-axis in the table's outer rows
-SPACING = 0.1
+SPACING = 0.1  # of the places
 PLACES = np.arange(1, 20) / 10  # of the rows: a/b up to the circle, 2 - b/a beyond it
 
 

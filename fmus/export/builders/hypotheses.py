@@ -68,7 +68,12 @@ class ModelBuilder:
 
         Native where a C compiler is at hand, since hypotheses are run many times; PythonFMU otherwise.
         """
-        return _once(self.folder, effects, lambda path: _fastest(self._model(effects, probes=True), path))
+        return _once(
+            self.folder,
+            effects,
+            lambda path: build_working(self._model(effects, probes=True), path),
+            lambda path: build_python(self._model(effects, probes=True), path),
+        )
 
     def final(
         self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
@@ -124,7 +129,12 @@ class ForeignBuilder:
         """
         if not self.ports and not effects:
             return self.fmu
-        return _once(self.folder, effects, lambda path: _carried(self.fmu, self.ports, effects, path))
+        return _once(
+            self.folder,
+            effects,
+            lambda path: build_carrier(self.fmu, self.ports, effects, path),
+            lambda path: build_coupled(self.fmu, self.ports, effects, path),
+        )
 
     def final(
         self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
@@ -157,27 +167,19 @@ def _described(fmu: Path) -> FmuDescription:
     return describe(fmu)
 
 
-def _fastest(model: Model, path: Path) -> Path:
-    try:
-        return build_working(model, path)
-    except BadInput:  # no compiler
-        return build_python(model, path)
-
-
-def _carried(fmu: Path, ports: tuple[PortNames, ...], effects: Effects, path: Path) -> Path:
-    try:
-        return build_carrier(fmu, ports, effects, path)
-    except BadInput:  # no compiler
-        return build_coupled(fmu, ports, effects, path)
-
-
-def _once(folder: Path, effects: Effects, build: Callable[[Path], Path]) -> Path:
+def _once(
+    folder: Path, effects: Effects, native: Callable[[Path], Path], python: Callable[[Path], Path]
+) -> Path:
+    """The build with these effects, made if it is not there yet: in Python if there is no compiler."""
     name = "+".join(["base", *(f"{k}@{at}" for k, at in effects)])
     if len(name) > LONGEST or not PLAIN.fullmatch(name):  # a slash would lead out of the folder
         name = f"{len(effects)}_effects_{sha256(name.encode()).hexdigest()[:16]}"
     target = folder / name / "model.fmu"
     if not target.exists():
         part = target.with_name(f"{os.getpid()}.fmu")
-        build(part)
+        try:
+            native(part)
+        except BadInput:
+            python(part)
         part.replace(target)  # workers may build the same at once
     return target

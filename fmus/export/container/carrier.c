@@ -14,12 +14,10 @@
 #include <windows.h>
 #define OPEN(path) ((void *)LoadLibraryA(path))
 #define SYMBOL(library, name) ((void *)GetProcAddress((HMODULE)(library), name))
-#define CLOSE(library) FreeLibrary((HMODULE)(library))
 #else
 #include <dlfcn.h>
 #define OPEN(path) dlopen(path, RTLD_NOW | RTLD_LOCAL)
 #define SYMBOL(library, name) dlsym(library, name)
-#define CLOSE(library) dlclose(library)
 #endif
 
 #include "carrier.h"
@@ -42,8 +40,23 @@
 #define TIME_TOLERANCE 1e-9 /* of a coupling step, so that a whole number of them is seen as one */
 enum { WARNING = 1, PATH = 4096 };
 
+/* The functions of the carried FMU that are called, by their role here. */
+#if BASE_FMI == 2
+#define OF_BASE(name) fmi2##name
+#define FUNCTIONS(EACH)                                                                                           \
+    EACH(get, GetReal) EACH(set, SetReal) EACH(step, DoStep) EACH(reset, Reset) EACH(setup, SetupExperiment)      \
+    EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode) EACH(instantiate, Instantiate)       \
+    EACH(free, FreeInstance)
+#else
+#define OF_BASE(name) fmi3##name
+#define FUNCTIONS(EACH)                                                                                           \
+    EACH(get, GetFloat64) EACH(set, SetFloat64) EACH(step, DoStep) EACH(reset, Reset)                             \
+    EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode)                                      \
+    EACH(instantiate, InstantiateCoSimulation) EACH(free, FreeInstance)
+#endif
+
 typedef struct {
-    void *library, *base;
+    void *base;
     const fmi2CallbackFunctions *host;
     char name[128];
     double values[N_VALUES];
@@ -56,26 +69,8 @@ typedef struct {
     double *res[AT_LEAST_1(WORK_RES)];
     int iw[AT_LEAST_1(WORK_IW)];
     double w[AT_LEAST_1(WORK_W)];
-#if BASE_FMI == 2
-    fmi2GetRealTYPE *get;
-    fmi2SetRealTYPE *set;
-    fmi2DoStepTYPE *step;
-    fmi2ResetTYPE *reset;
-    fmi2SetupExperimentTYPE *setup;
-    fmi2EnterInitializationModeTYPE *enter;
-    fmi2ExitInitializationModeTYPE *leave;
-    fmi2InstantiateTYPE *instantiate;
-    fmi2FreeInstanceTYPE *free;
-#else
-    fmi3GetFloat64TYPE *get;
-    fmi3SetFloat64TYPE *set;
-    fmi3DoStepTYPE *step;
-    fmi3ResetTYPE *reset;
-    fmi3EnterInitializationModeTYPE *enter;
-    fmi3ExitInitializationModeTYPE *leave;
-    fmi3InstantiateCoSimulationTYPE *instantiate;
-    fmi3FreeInstanceTYPE *free;
-#endif
+#define FIELD(role, function) OF_BASE(function##TYPE) *role;
+    FUNCTIONS(FIELD)
 } Instance;
 
 #define ME(c) ((Instance *)(c))
@@ -216,39 +211,20 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 
 static void begin(Instance *m) {
     memcpy(m->values, START, sizeof START);
-    memcpy(m->touched, RESTARTED, sizeof RESTARTED);
+    memset(m->touched, 0, sizeof m->touched);
     memset(m->motion, 0, sizeof m->motion);
     m->failed = m->running = false;
     m->stale = true;
 }
 
-#define FIND(role, type, function)                                                      \
-    if (!(m->role = (type *)SYMBOL(m->library, function))) {                            \
-        refuse(m, fmi2Error, "the carried FMU has no function %s", function);           \
-        return false;                                                                   \
-    }
+#define TEXT_OF(name) #name
+#define IN_TEXT(name) TEXT_OF(name)
+#define FIND(role, function)                                                                                      \
+    if (!(m->role = (OF_BASE(function##TYPE) *)SYMBOL(LIBRARY, IN_TEXT(OF_BASE(function)))))                      \
+        return refuse(m, fmi2Error, "the carried FMU has no function %s", IN_TEXT(OF_BASE(function))), false;
 
 static bool found(Instance *m) {
-#if BASE_FMI == 2
-    FIND(get, fmi2GetRealTYPE, "fmi2GetReal")
-    FIND(set, fmi2SetRealTYPE, "fmi2SetReal")
-    FIND(step, fmi2DoStepTYPE, "fmi2DoStep")
-    FIND(reset, fmi2ResetTYPE, "fmi2Reset")
-    FIND(setup, fmi2SetupExperimentTYPE, "fmi2SetupExperiment")
-    FIND(enter, fmi2EnterInitializationModeTYPE, "fmi2EnterInitializationMode")
-    FIND(leave, fmi2ExitInitializationModeTYPE, "fmi2ExitInitializationMode")
-    FIND(instantiate, fmi2InstantiateTYPE, "fmi2Instantiate")
-    FIND(free, fmi2FreeInstanceTYPE, "fmi2FreeInstance")
-#else
-    FIND(get, fmi3GetFloat64TYPE, "fmi3GetFloat64")
-    FIND(set, fmi3SetFloat64TYPE, "fmi3SetFloat64")
-    FIND(step, fmi3DoStepTYPE, "fmi3DoStep")
-    FIND(reset, fmi3ResetTYPE, "fmi3Reset")
-    FIND(enter, fmi3EnterInitializationModeTYPE, "fmi3EnterInitializationMode")
-    FIND(leave, fmi3ExitInitializationModeTYPE, "fmi3ExitInitializationMode")
-    FIND(instantiate, fmi3InstantiateCoSimulationTYPE, "fmi3InstantiateCoSimulation")
-    FIND(free, fmi3FreeInstanceTYPE, "fmi3FreeInstance")
-#endif
+    FUNCTIONS(FIND)
     return true;
 }
 
@@ -262,7 +238,7 @@ static bool carried(Instance *m, const char *uri) {
     snprintf(resources, sizeof resources, "%s/base/resources/", path);
 #endif
     snprintf(path + n, sizeof path - n, "/base/%s", BASE_LIBRARY);
-    if (!(m->library = LIBRARY = OPEN(path)))
+    if (!(LIBRARY = OPEN(path)))
         return refuse(m, fmi2Error, "the carried FMU cannot be loaded: %s", path), false;
     if (!found(m)) return false;
 #if BASE_FMI == 2

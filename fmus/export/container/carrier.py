@@ -6,9 +6,7 @@ no compiler and runs on every platform that PythonFMU supports.
 
 from __future__ import annotations
 
-import hashlib
 import sys
-import uuid
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +18,7 @@ import fmpy
 from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.around.outside import Laws, laws
-from fmus.export.builders.native.build import packed, write_at_once
+from fmus.export.builders.native.build import NO_TOKEN, identified, packed, write_at_once
 from fmus.export.builders.native.code import STANDARD, Work
 from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description import flag, text
@@ -53,22 +51,17 @@ def build_carrier(
         carried = f"binaries/{where.folder(fmi)}/{description.identifier}{where.suffix}"
         made = laws(description, ports, effects)
         card = carrying(description, ports, effects, made, {})
-        built = library(_sources(card, made, description, carried), "carrier.c", LINKED.get(where.suffix, ()))
-        files = {
-            path.relative_to(inside).as_posix(): path.read_bytes()
+        code = _sources(card, made, description, carried)
+        files = identified(code | {"modelDescription.xml": _described(card, description)})
+        built = library({name: files.pop(name) for name in code}, "carrier.c", LINKED.get(where.suffix, ()))
+        files |= {
+            f"resources/base/{path.relative_to(inside).as_posix()}": path.read_bytes()
             for path in inside.rglob("*")
             if path.is_file()
         }
-    files = {f"resources/base/{name}": data for name, data in files.items()}
-    files["modelDescription.xml"] = _described(card, description)
     files[f"binaries/{where.folder(2)}/{NAME}{where.suffix}"] = built
     write_at_once(out, packed(files, zipfile.ZIP_STORED))
     return out
-
-
-def _token(card: dict[str, Any], description: FmuDescription) -> str:
-    said = repr((card["description"], description.guid, card["variables"]))
-    return f"{{{uuid.UUID(hashlib.sha256(said.encode()).hexdigest()[:32])}}}"
 
 
 def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, library: str) -> dict[str, bytes]:
@@ -84,7 +77,7 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     told, references = set(base["told"]), base["references"]
     facts = {
         "c": _c,
-        "token": _token(card, description),
+        "token": NO_TOKEN,
         "fmi": description.fmi_version[0],
         "base_token": description.guid,
         "library": library,
@@ -102,7 +95,6 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
         "told": [references[i] for i in base["told"]],
         "passed": [int(references[i] >= 0 and i not in told) for i in range(settable)],
         "inputs": [int(n_states <= i < n_states + n_inputs) for i in range(settable)],
-        "restarted": [int(i in base["restarted"]) for i in range(len(rows))],
     }
     templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
     headers = Path(fmpy.__file__).parent / "c-code"
@@ -129,10 +121,9 @@ def _limit(row: dict[str, Any], key: str, without: float) -> str:
 
 def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
     """modelDescription.xml."""
-    token = _token(card, description)
     root = Element(
-        "fmiModelDescription", fmiVersion="2.0", modelName=NAME, guid=token, description=card["description"],
-        variableNamingConvention="structured",
+        "fmiModelDescription", fmiVersion="2.0", modelName=NAME, guid=NO_TOKEN,
+        description=card["description"], variableNamingConvention="structured",
     )  # fmt: skip
     once = {"canBeInstantiatedOnlyOncePerProcess": flag(description.once_per_process)}
     SubElement(root, "CoSimulation", {"modelIdentifier": NAME, **once, **ABILITIES})
