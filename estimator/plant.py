@@ -20,7 +20,7 @@ class Plant:
     def __init__(self, fmu: Fmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
         self.states = tuple(fmu.description.states)
-        self._fine: tuple[Run, Array, dict[str, Array]] | None = None  # refined inputs of the last run
+        self._fine: tuple[Run, Array, dict[str, Array], int] | None = None  # refined inputs of the last run
 
     def simulate(
         self,
@@ -34,20 +34,26 @@ class Plant:
         start: states and parameters by name; push: samples (N,) that are added to inputs. Inputs are samples
         of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic.
         """
-        t, inputs = self._given(run)
-        pieces = (len(t) - 1) // max(1, len(run.t) - 1) or 1
+        t, inputs, pieces = self._given(run)
         if push:
             inputs = dict(inputs)
             for name, samples in push.items():
                 inputs[name] = inputs.get(name, 0.0) + np.interp(t, run.t, samples)
         return self.fmu.simulate(t, inputs, (*self.outputs, *more), start)[::pieces]
 
-    def _given(self, run: Run) -> tuple[Array, dict[str, Array]]:
-        """Times and inputs of a run as set in the FMU, cached for the next simulation of the same run."""
+    def simulate_rows(self, run: Run, starts: Sequence[Mapping[str, float]]) -> list[Array] | None:
+        """As `simulate` for each of several starts with the same names; None if the FMU does not offer it."""
+        t, inputs, pieces = self._given(run)
+        found = self.fmu.simulate_rows(t, inputs, self.outputs, starts)
+        return None if found is None else [y[::pieces] for y in found]
+
+    def _given(self, run: Run) -> tuple[Array, dict[str, Array], int]:
+        """Times and inputs of a run as set in the FMU, and the pieces of a step; cached for the run."""
         if self._fine is None or self._fine[0] is not run:
             inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
             pieces = self._pieces(run.t)
-            self._fine = run, *((run.t, inputs) if pieces == 1 else between(run.t, inputs, pieces))
+            fine = (run.t, inputs) if pieces == 1 else between(run.t, inputs, pieces)
+            self._fine = run, *fine, pieces
         return self._fine[1:]
 
     def _pieces(self, t: Array) -> int:

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from estimator.access.loop import Loop, PythonLoop
+from estimator.access.loop import Loop, PythonLoop, RowsLoop
 from estimator.access.pointers import (
     Functions,
     forget,
@@ -19,6 +19,7 @@ from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
+from fmus.host.rows import offers_rows
 
 
 class Refused(FmuError):
@@ -123,7 +124,9 @@ class Copies:
             np.array(list(self.constants.values()), dtype=float),
             self.t0,
         )
-        return loop_of(f, recipe, self._saved * rows, self._compiled)
+        loop = loop_of(f, recipe, self._saved * rows, self._compiled)
+        at_once = self._compiled and self.way is not Way.SET and offers_rows(one.instance)
+        return RowsLoop(one, recipe, loop) if at_once else loop
 
     def _refuse(self, row: Array, number: int, status: int, t: float) -> None:
         """Raise Refused; the instances are restarted at the next call, since the failed one is undefined."""

@@ -15,7 +15,11 @@ from estimator.access.pointers import (
 )
 from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
+from fmus.host.fmu import Fmu
 from fmus.host.instance import WARNING
+from fmus.host.rows import Rows, base_of
+
+STILL = np.zeros(1)  # s: no step
 
 
 class Loop(Protocol):
@@ -41,6 +45,26 @@ class PythonLoop:
             if status > WARNING:
                 return 8 * i + status
         return -1
+
+
+class RowsLoop:
+    """Runs all copies in one call of the FMU's library; `other` runs those rows that the call refuses."""
+
+    def __init__(self, one: Fmu, recipe: Recipe, other: Loop) -> None:
+        constants = dict(zip(recipe.constant_refs.tolist(), recipe.constants.tolist(), strict=True))
+        base = base_of(one.description, {})
+        base[list(constants)] = list(constants.values())
+        self._rows = Rows(one.instance.library, base, recipe.set_refs, recipe.get_refs)
+        self._other, self._times = other, STILL
+
+    def run(self, values: Array, out: Array, t: float, dt: float) -> int:
+        """See Loop; values and out are C-contiguous."""
+        if dt > 0 and dt != self._times[-1]:
+            self._times = np.array([0.0, dt])  # the equations do not contain time
+        times = self._times if dt > 0 else STILL
+        if self._rows.run(values, times, out[:, None]) < 0:
+            return -1
+        return self._other.run(values, out, t, dt)
 
 
 class _Copy:

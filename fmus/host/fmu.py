@@ -13,6 +13,7 @@ from fmus.host.description import FmuDescription
 from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
 from fmus.host.instance import Array, CallFailed, Instance
+from fmus.host.rows import AT_ONCE, Drive, Rows, base_of, offers_rows
 
 
 class FmuError(RuntimeError):
@@ -79,16 +80,43 @@ class Fmu:
         exact to second order for signals sampled from continuous ones, and outputs are read with the
         sample of their time; or (N-1,), the value held over each step.
         """
-        u = np.column_stack([*inputs.values()]) if inputs else np.empty((len(t) - 1, 0))
-        sampled = len(u) == len(t)
-        first = dict(zip(inputs, u[0].tolist(), strict=True))
+        first, acting, ends = _driving(t, inputs)
         self.restart(float(t[0]), **{**start, **first})
         y0 = self.read(outputs)
-        acting, ends = ((u[1:] + u[:-1]) / 2, u[1:]) if sampled else (u, None)
         run = self._instance.run
         y = self._safely(run, t, acting, self.references(inputs), self.references(outputs), ends)
         self.time = float(t[-1])
         return np.vstack([y0, y])
+
+    @property
+    def at_once(self) -> int:
+        """How many rows `simulate_rows` advances in the time of little more than one."""
+        return AT_ONCE if offers_rows(self._instance) else 1
+
+    def simulate_rows(
+        self,
+        t: Array,
+        inputs: Mapping[str, Array],
+        outputs: Sequence[str],
+        starts: Sequence[Mapping[str, float]],
+    ) -> Array | None:
+        """As `simulate` for each of k starts with the same names: outputs (k, N, n_y).
+
+        None if the FMU does not offer it, or refuses a start; simulations one by one say which and why.
+        """
+        if not offers_rows(self._instance):
+            return None
+        first, acting, ends = _driving(t, inputs)
+        names = [name for name in starts[0] if name not in first]
+        put, get, driven = (np.array(self.references(n), dtype=np.uint32) for n in (names, outputs, inputs))
+        rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
+        found = np.empty((len(starts), len(t), len(outputs)))
+        call = Rows(self._instance.library, base_of(self.description, first), put, get)
+        drive = Drive(
+            driven, np.ascontiguousarray(acting), None if ends is None else np.ascontiguousarray(ends)
+        )
+        refused = call.run(rows, np.ascontiguousarray(t, dtype=float), found, drive) >= 0
+        return None if refused else found
 
     def save(self) -> Any:
         """The FMU's state, for `restore` and then `forget`."""
@@ -140,3 +168,10 @@ class Fmu:
             return call(*args)
         except CallFailed as error:
             raise FmuError(f"{self.name}: {error}") from error
+
+
+def _driving(t: Array, inputs: Mapping[str, Array]) -> tuple[dict[str, float], Array, Array | None]:
+    """The first values of inputs, their values over each step (N-1, n_u), and those after it if sampled."""
+    u = np.column_stack([*inputs.values()]) if inputs else np.empty((len(t) - 1, 0))
+    first = dict(zip(inputs, u[0].tolist(), strict=True)) if inputs else {}
+    return first, *(((u[1:] + u[:-1]) / 2, u[1:]) if len(u) == len(t) else (u, None))

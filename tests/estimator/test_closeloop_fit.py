@@ -27,11 +27,12 @@ from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Run
 from tests.helpers.baselines import baseline
+from tests.helpers.problems import OneByOne
 
 # ---- derivatives along secants
 
 
-class Curved:
+class Curved(OneByOne):
     """An oscillation with unknown size, damping and frequency, and how often it was simulated."""
 
     policy = DEFAULT
@@ -82,7 +83,7 @@ def test_secants_spare_simulations():
 
 
 @dataclass
-class Rugged:
+class Rugged(OneByOne):
     """A valley in x with ripples shorter than the usual step, and a step of the output at a sample."""
 
     policy = DEFAULT
@@ -111,6 +112,11 @@ def test_finer_differences_see_the_slopes_of_a_rugged_valley(phase, t0):
     assert np.any(timed.jacobian[:, 1])  # a moment is not moved less than a sample
 
 
+def each(residual):
+    """The residuals of several x, on a first share."""
+    return lambda xs, share: [residual(x)[: int(share * len(residual(x)))] for x in xs]
+
+
 MOVE = st.one_of(st.just(0.0), st.floats(0.05, 2.0), st.floats(-2.0, -0.05))
 
 
@@ -121,7 +127,7 @@ def test_a_carried_jacobian_keeps_to_the_last_step(moves):
     def residual(x):
         return a @ x + 0.1 * (a @ x) ** 2
 
-    slopes = Slopes(residual, np.array([1.0, 2.0, 0.5]), np.full(3, np.inf), [None] * 3)
+    slopes = Slopes(residual, each(residual), np.array([1.0, 2.0, 0.5]), np.full(3, np.inf), [None] * 3)
     x = np.zeros(3)
     slopes.by_differences(x)
     for step in np.array(moves).reshape(2, 3):
@@ -135,7 +141,11 @@ def test_a_carried_jacobian_keeps_to_the_last_step(moves):
 
 def test_known_columns_stay():
     given_column = np.full(4, 7.0)
-    slopes = Slopes(lambda x: np.full(4, x.sum()), np.ones(2), np.full(2, np.inf), [given_column, None])
+
+    def residual(x):
+        return np.full(4, x.sum())
+
+    slopes = Slopes(residual, each(residual), np.ones(2), np.full(2, np.inf), [given_column, None])
     assert_allclose(slopes.by_differences(np.zeros(2)), [[7.0, 1.0]] * 4)
 
 
@@ -147,10 +157,31 @@ class Fading:
     def __init__(self) -> None:
         self.t, self.samples = np.linspace(0.0, 1.0, 2400), 0
 
+    def begun(self, xs, share):
+        return [self(x, share) for x in xs]
+
     def __call__(self, x, share=1.0):
         t = self.t[: int(share * len(self.t))]
         self.samples += len(t)
         return x[0] * t + x[1] * np.exp(-x[0] * t)
+
+
+@given(st.lists(st.floats(5.0, 400.0), min_size=1, max_size=9), st.integers(1, 5))
+def test_columns_are_the_same_however_many_are_simulated_at_once(rates, at_once):
+    t = np.linspace(0.0, 1.0, 480)
+
+    def residual(x):
+        return x**2 @ np.exp(-np.outer(rates, t))
+
+    high, x = np.full(len(rates), np.inf), np.linspace(0.5, 1.5, len(rates))
+    fading = range(0, len(rates), 2)
+    one, some = (
+        Slopes(residual, each(residual), np.ones(len(rates)), high, [None] * len(rates), fading, at_once=n)
+        for n in (1, at_once)
+    )
+    for _ in range(2):  # the second time with columns that are known to end
+        expected, found = one.by_differences(x), some.by_differences(x)
+        assert_allclose(found, expected, atol=2 * np.sqrt(FADED * np.max(np.sum(expected**2, axis=0))))
 
 
 @given(st.floats(5.0, 400.0), st.floats(5.0, 400.0))
@@ -158,8 +189,8 @@ def test_what_fades_is_not_simulated_to_the_end(before, now):
     asked, whole = Fading(), Fading()
     ones, high = np.ones(2), np.full(2, np.inf)
     slopes, plain = (
-        Slopes(asked, ones, high, [None] * 2, (1,), asked),
-        Slopes(whole, ones, high, [None] * 2),
+        Slopes(asked, asked.begun, ones, high, [None] * 2, (1,)),
+        Slopes(whole, whole.begun, ones, high, [None] * 2),
     )
     for rate in (before, now):
         x = np.array([rate, 0.3])
@@ -189,7 +220,7 @@ def test_what_a_bound_holds_back_is_no_more_free():
 
 
 @dataclass
-class Summed:
+class Summed(OneByOne):
     """An output that shows the sum of two unknowns, a + 2 b, and how often it was simulated."""
 
     policy = DEFAULT
@@ -244,7 +275,7 @@ def test_a_fit_extended_by_another_has_the_unknowns_of_both():
 # ---- errors where the sum of squares is a bent valley
 
 
-class Playing:
+class Playing(OneByOne):
     """A spring with play, over a motion some times wider: stiffness and play make up for each other."""
 
     policy = DEFAULT

@@ -21,6 +21,7 @@ from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Run
 from tests.helpers.baselines import baseline
+from tests.helpers.problems import OneByOne
 
 SIZE = np.array([0.1])
 AMPLITUDE, STIFFNESS = Unknown("q", 1.0, 0.0, np.inf, 1.0), Unknown("k", 10.0, 0.0, np.inf, 10.0)
@@ -28,7 +29,7 @@ AMPLITUDE, STIFFNESS = Unknown("q", 1.0, 0.0, np.inf, 1.0), Unknown("k", 10.0, 0
 BESIDE = 0.25  # N/m too stiff a start, from which the usual differences do not arrive
 
 
-class Swinging:
+class Swinging(OneByOne):
     """A spring that has swung so often that a difference of the usual step is turns of it away."""
 
     policy = DEFAULT

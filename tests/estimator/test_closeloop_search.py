@@ -37,6 +37,7 @@ from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
 from tests.helpers.baselines import baseline
 from tests.helpers.native import native
+from tests.helpers.problems import OneByOne
 
 FREE = (-np.inf, np.inf)
 
@@ -355,7 +356,7 @@ def test_a_law_becomes_a_simpler_one_at_its_own_place_alone(kind, simpler, expec
 
 
 @dataclass
-class Line:
+class Line(OneByOne):
     """y = a t and, from a time on, another slope beside; asks for a."""
 
     t: np.ndarray

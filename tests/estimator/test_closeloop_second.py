@@ -35,6 +35,7 @@ from tests.helpers.carriage import (
     record,
     to_and_fro,
 )
+from tests.helpers.problems import OneByOne
 
 LIMITS = DEFAULT.search
 
@@ -179,7 +180,7 @@ def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_sugg
 # ---- dating
 
 
-class Swinging:
+class Swinging(OneByOne):
     """A force that sets in on an oscillator; the sum of squares over its moment has a minimum a swing."""
 
     policy = DEFAULT

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import least_squares
 
-from estimator.closeloop.fitting.slopes import STEP, Slopes
+from estimator.closeloop.fitting.slopes import STEP, Begun, Slopes
 from estimator.closeloop.hypotheses.fitted import (
     WIDE,
     Fit,
@@ -39,11 +39,27 @@ Named = Callable[[Sequence[float]], dict[str, float]]  # values by name for a ve
 
 def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
     """Residual on the part to identify divided by `size` (n_y,), sample after sample, (m,)."""
+    return several_weighted(problem, [theta], size)[0]
+
+
+def several_weighted(problem: Problem, thetas: Sequence[Mapping[str, float]], size: Array) -> list[Array]:
+    """As `weighted` for each of several unknowns with the same names."""
+    found = problem.identify_residuals(thetas)
+    if found is None:
+        return [_alone(problem, theta, size) for theta in thetas]
+    return [_limited(residual, size) for residual in found]
+
+
+def _alone(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
     try:
-        flat = (problem.identify_residual(theta) / size).ravel()
+        return _limited(problem.identify_residual(theta), size)
     except FmuError:
-        flat = np.full(sum(int(run.fit.sum()) for run in problem.record.runs) * len(size), np.nan)
-    return np.nan_to_num(np.clip(flat, -REFUSED, REFUSED), nan=REFUSED)
+        samples = sum(int(run.fit.sum()) for run in problem.record.runs)
+        return np.full(samples * len(size), REFUSED)
+
+
+def _limited(residual: Array, size: Array) -> Array:
+    return np.nan_to_num(np.clip((residual / size).ravel(), -REFUSED, REFUSED), nan=REFUSED)
 
 
 def fit(
@@ -78,9 +94,12 @@ def fit(
         alone = residual(x0)
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
-    begun = _begun(problem, theta, size) if fading else None
+    if fading and sum(run.fit.any() for run in problem.record.runs) > 1:
+        fading = []  # a first share of each run is no first share of the residual
     steps = np.array([STEP if u.is_onset else step for u in unknowns])
-    slopes = Slopes(residual, scale, high, [(known or {}).get(n) for n in names], fading, begun, steps)
+    given = [(known or {}).get(n) for n in names]
+    begun = _begun(problem, theta, size)
+    slopes = Slopes(residual, begun, scale, high, given, fading, steps, problem.at_once)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
     secants = not known and bool(problem.record.noise_declared.all())
@@ -102,12 +121,10 @@ def _residual(problem: Problem, theta: Named, size: Array, places: int) -> Calla
     return lambda x: simulated(tuple(x.tolist()))
 
 
-def _begun(problem: Problem, theta: Named, size: Array) -> Callable[[Array, float], Array] | None:
-    """The weighted residual on a first share of the part, as a function of x; None for several runs."""
-    if sum(run.fit.any() for run in problem.record.runs) > 1:
-        return None
-    part = lru_cache(problem.beginning)
-    return lambda x, share: weighted(part(share), theta(x.tolist()), size)
+def _begun(problem: Problem, theta: Named, size: Array) -> Begun:
+    """The weighted residuals on a first share of the part, as a function of several x."""
+    part = lru_cache(lambda share: problem if share == 1.0 else problem.beginning(share))
+    return lambda xs, share: several_weighted(part(share), [theta(x.tolist()) for x in xs], size)
 
 
 def _descended(

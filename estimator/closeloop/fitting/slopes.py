@@ -16,50 +16,61 @@ SHORT = 1e-3  # scales: shorter steps do not update the Jacobian, for the solver
 FADED = 1e-6  # share of a column's sum of squares that may be neglected after its end
 PARTS = 24  # pieces of the residual, in which the end of a column is counted
 
-Begun = Callable[[Array, float], Array]
+Begun = Callable[[Sequence[Array], float], Sequence[Array]]
 
 
 class Slopes:
     """Jacobian (m, n) of a residual function, updated from step to step by Broyden's method.
 
-    residual: function of x (n,) that returns (m,); scale, high: (n,) scales and upper bounds of the unknowns;
-    known: for each unknown its column if that is given and kept, else None; fading: indices of unknowns whose
-    influence may decay; begun: function that returns the first share of the residual at x; step: step of the
-    finite differences, in scales. Source: C. G. Broyden, Mathematics of Computation 19 (1965), 577-593.
+    residual: function of x (n,) that returns (m,); begun: function that returns the first share of it for
+    each of several x; scale, high: (n,) scales and upper bounds of the unknowns; known: for each unknown its
+    column if that is given and kept, else None; fading: indices of unknowns whose influence may decay; step:
+    step of the finite differences, in scales; at_once: number of x that `begun` takes in the time of one.
+    Source: C. G. Broyden, Mathematics of Computation 19 (1965), 577-593.
     """
 
     def __init__(
-        self, residual: Callable[[Array], Array], scale: Array, high: Array, known: Sequence[Array | None],
-        fading: Collection[int] = (), begun: Begun | None = None, step: Array | float = STEP,
+        self, residual: Callable[[Array], Array], begun: Begun, scale: Array, high: Array,
+        known: Sequence[Array | None], fading: Collection[int] = (), step: Array | float = STEP,
+        at_once: int = 1,
     ) -> None:  # fmt: skip
         self._residual, self._scale, self._high, self._known = residual, scale, high, list(known)
-        self._step, self._begun, self._parts = step * scale, begun, dict.fromkeys(fading, PARTS)
+        self._step, self._begun, self._at_once = step * scale, begun, at_once
+        self._parts = dict.fromkeys(fading, PARTS)
         self._last: tuple[Array, Array, Array] | None = None  # last x, with its residual and Jacobian
         self.exact = False  # whether the last Jacobian comes from finite differences only
 
     def by_differences(self, x: Array, guess: Sequence[Array | None] | None = None) -> Array:
         """The Jacobian at x by finite differences; columns that are known or guessed are used unchanged."""
-        r, columns = self._residual(x), []
+        r = self._residual(x)
         self.exact = not any(column is not None for column in guess or ())
-        for i, known in enumerate(self._known):
-            given = known if known is not None else guess[i] if guess else None
-            columns.append(given if given is not None else self._column(i, x, r))
-            if i in self._parts:
-                self._parts[i] = faded(columns[i])
-        jacobian: Array = np.column_stack(columns)
+        columns = {
+            i: column
+            for i, known in enumerate(self._known)
+            if (column := known if known is not None else guess[i] if guess else None) is not None
+        }
+        columns |= self._differences([i for i in range(len(x)) if i not in columns], x, r)
+        for i in self._parts:
+            self._parts[i] = faded(columns[i])
+        jacobian: Array = np.column_stack([columns[i] for i in range(len(x))])
         self._last = x.copy(), r, jacobian
         return jacobian
 
-    def _column(self, i: int, x: Array, r: Array) -> Array:
-        h = self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i]
-        aside = x + h * np.eye(len(x))[i]
-        parts = self._parts.get(i, PARTS) + 1  # one more, in which no influence should be left
-        if self._begun and parts < PARTS:
-            begun = self._begun(aside, parts / PARTS)
-            column = np.append((begun - r[: len(begun)]) / h, np.zeros(len(r) - len(begun)))
-            if faded(column) < parts:
-                return column
-        return np.asarray((self._residual(aside) - r) / h)
+    def _differences(self, wanted: Sequence[int], x: Array, r: Array) -> dict[int, Array]:
+        """The columns of these unknowns, some at once; those whose influence ends early together."""
+        found: dict[int, Array] = {}
+        # one part more, in which no influence should be left
+        parts = {i: min(self._parts.get(i, PARTS) + 1, PARTS) for i in wanted}
+        while left := sorted((i for i in wanted if i not in found), key=lambda i: -parts[i])[: self._at_once]:
+            longest = parts[left[0]]
+            h = [self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i] for i in left]
+            aside = [x + step * np.eye(len(x))[i] for i, step in zip(left, h, strict=True)]
+            for i, step, begun in zip(left, h, self._begun(aside, longest / PARTS), strict=True):
+                column = np.append((begun - r[: len(begun)]) / step, np.zeros(len(r) - len(begun)))
+                if longest == PARTS or faded(column) < longest:
+                    found[i] = column
+                parts[i] = PARTS
+        return found
 
     def at(self, x: Array) -> Array:
         """The Jacobian at x, updated from the last one by Broyden's method."""

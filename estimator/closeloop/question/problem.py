@@ -80,6 +80,11 @@ class Problem:
         """The FMU as a function of inputs and parameters; one instance per process."""
         return PLANTS.get(self.builder(self.effects), self.record.inputs, self.record.outputs)
 
+    @property
+    def at_once(self) -> int:
+        """How many unknowns `identify_residuals` takes in the time of little more than one."""
+        return self.plant.fmu.at_once
+
     @cached_property
     def measured_state(self) -> dict[str, int]:
         """Output column of each free state that is measured."""
@@ -96,6 +101,17 @@ class Problem:
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the part to identify, (m, n_y)."""
         return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in self._identified])
+
+    def identify_residuals(self, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
+        """As `identify_residual` for several unknowns with the same names; None if not all at once."""
+        found: list[list[Array]] = [[] for _ in thetas]
+        for run in self._identified:
+            rows = self.plant.simulate_rows(run, [self.start(theta) for theta in thetas])
+            if rows is None:
+                return None
+            for parts, y, theta in zip(found, rows, thetas, strict=True):
+                parts.append((run.y - faulty(y, run.t, self.record.outputs, theta))[run.fit])
+        return [np.concatenate(parts) for parts in found]
 
     @cached_property
     def _identified(self) -> tuple[Run, ...]:

@@ -76,7 +76,7 @@ def build_native(
         libraries = {}
         for where in wanted:
             libraries[where] = Path(folder) / where.name / f"{model.name}{where.suffix}"
-            compile_library(calls[where.name], code / "fmu.c", libraries[where], where)
+            compile_library(calls[where.name], [code / "fmu.c"], libraries[where], where)
         files |= _binaries(libraries, fmi)
     files[PLACE] = sealed(about, files)
     write_at_once(target, packed(files))

@@ -9,6 +9,7 @@ import fmpy
 from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.builders.native.dependencies import stacked
+from fmus.export.builders.native.lanes import lanes_of
 from fmus.export.builders.native.table import Table
 from fmus.model import Equations
 from fmus.variables import Expr
@@ -16,6 +17,7 @@ from fmus.variables import Expr
 HERE = Path(__file__).parent
 WRAPPER = (
     "fmu.c", "quick.c", "instance.h", "instance.c", "values.c", "stepping.c", "states.c", "derivatives.c",
+    "lanes.c", "lanes.h", "lanes_processors.c", "lanes_rows.c",
 )  # fmt: skip
 INTERFACE = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 STANDARD = {  # headers of the standard, under its 2-clause BSD licence, as FMPy brings them
@@ -34,18 +36,23 @@ class Work:
     w: int
 
 
-def sources(table: Table, made: Equations, fmi: int, token: str, derivatives: bool = True) -> dict[str, str]:
+def sources(table: Table, made: Equations, fmi: int, token: str, working: bool = False) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others.
 
-    Calls for derivatives are refused where these are left out, which is for FMI 2.0 only.
+    working: for this machine and FMI 2.0 only, without derivatives, whose calls are refused; what the
+    equations for several rows call is a unit of its own, `lanes_object.c`.
     """
-    code, work = _equations(table.name, made, derivatives)
+    code, work = _equations(table.name, made, derivatives=not working)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
-    if not derivatives:
+    if working:
         wrapper["derivatives.c"] = (HERE / "sources" / "no_derivatives.c").read_text(encoding="utf-8")
+        wrapper["lanes_object.c"] = (HERE / "sources" / "lanes_object.c").read_text(encoding="utf-8")
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
-    return {**wrapper, **standard, "equations.c": code, "model.h": _header(table, work, fmi, token)}
+    lanes = lanes_of((made.f, made.h, made.step))
+    rows = {"lanes_equations.c": lanes.functions, "lanes_called.c": lanes.called} if lanes else {}
+    header = _header(table, work, fmi, token, lanes=bool(lanes), working=working)
+    return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}
 
 
 def _equations(name: str, made: Equations, derivatives: bool = True) -> tuple[str, Work]:
@@ -77,7 +84,7 @@ def _derivatives(made: Equations) -> list[cs.Function]:
     return found
 
 
-def _header(table: Table, work: Work, fmi: int, token: str) -> str:
+def _header(table: Table, work: Work, fmi: int, token: str, **about: bool) -> str:
     templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
     facts = {
         "settable": table.entries[: sum(table.sizes[:3])],
@@ -86,7 +93,7 @@ def _header(table: Table, work: Work, fmi: int, token: str) -> str:
         "inf": math.inf,
     }
     template = templates.get_template("model.h.j2")
-    return template.render(table=table, work=work, fmi=fmi, token=token, **facts)
+    return template.render(table=table, work=work, fmi=fmi, token=token, **facts, **about)
 
 
 def _c(value: float | None, missing: float = math.nan) -> str:

@@ -33,6 +33,7 @@ class Platform:
         return self.folder2 if fmi == 2 else self.name
 
 
+OBJECT = ".o"
 ELF = ("-Wl,--build-id=none",)
 PLATFORMS = {
     p.name: p
@@ -87,15 +88,16 @@ def command(compiler: str | None, wanted: Sequence[Platform]) -> dict[str, list[
 
 
 def compile_library(
-    call: Sequence[str], source: Path, target: Path, where: Platform, linked: Sequence[str] = ()
+    call: Sequence[str], sources: Sequence[Path], target: Path, where: Platform, linked: Sequence[str] = ()
 ) -> None:
-    """Compile a C file to the library `target`; BadInput with the compiler's first error.
+    """Compile C files and objects to the library, or the object, `target`; BadInput with the first error.
 
     linked: libraries of the platform beside that of mathematics.
     """
     target.parent.mkdir(parents=True)
     # a relative name, for the linker writes it into the library
-    files = [*DEFINED, str(source), "-o", target.name, "-lm", *linked]
+    whole = ["-c"] if target.suffix == OBJECT else ["-lm", *linked]
+    files = [*DEFINED, *map(str, sources), "-o", target.name, *whole]
     try:
         done = subprocess.run([*call, *files], cwd=target.parent, capture_output=True, text=True, check=False)
     except OSError as error:

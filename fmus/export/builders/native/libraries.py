@@ -22,31 +22,44 @@ def folder() -> Path:
     return user_cache_path("railfmi") / "libraries"
 
 
-def library(code: Mapping[str, bytes], main: str, linked: Sequence[str] = ()) -> bytes:
+def library(
+    code: Mapping[str, bytes], main: str, linked: Sequence[str] = (), apart: Sequence[str] = ()
+) -> bytes:
     """A library for this machine from sources by name, of which `main` includes the others.
 
-    linked: see compile_library. It is kept by a key from the sources, the compiler's call and its version.
-    BadInput without a compiler.
+    linked: see compile_library. apart: a file that is compiled to an object of its own, with the files that
+    it includes, which are the same in many libraries. Both are kept by a key from the sources, the
+    compiler's call and its version. BadInput without a compiler.
     """
+    objects = {"apart.o": _made({n: code[n] for n in apart}, apart[:1])} if apart else {}
+    return _made({**code, **objects}, [main, *objects], linked, host().suffix)
+
+
+def _made(
+    code: Mapping[str, bytes], whole: Sequence[str], linked: Sequence[str] = (), ending: str = ".o"
+) -> bytes:
+    """What the compiler makes of the files `whole`, or what was kept of it."""
     where = host()
     call = command(None, [where])[where.name]
-    made_from = [*call, *DEFINED, version("ziglang"), where.name, main, *linked]
+    made_from = [*call, *DEFINED, version("ziglang"), where.name, *whole, *linked, ending]
     parts = [*(part.encode() for part in made_from), *(f"{n}\n".encode() + code[n] for n in sorted(code))]
     key = sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()
     found = _load(key)
     if found is None:
-        found = _compiled(code, main, call, linked)
+        found = _compiled(code, whole, call, linked, ending)
         _save(key, found)
     return found
 
 
-def _compiled(code: Mapping[str, bytes], main: str, call: Sequence[str], linked: Sequence[str]) -> bytes:
+def _compiled(
+    code: Mapping[str, bytes], whole: Sequence[str], call: Sequence[str], linked: Sequence[str], ending: str
+) -> bytes:
     with tempfile.TemporaryDirectory(prefix="railfmi_") as name:
-        place, made = Path(name) / "sources", Path(name) / "library" / f"model{host().suffix}"
+        place, made = Path(name) / "sources", Path(name) / "library" / f"model{ending}"
         place.mkdir()
         for file, data in code.items():
             (place / file).write_bytes(data)
-        compile_library(call, place / main, made, host(), linked)
+        compile_library(call, [place / file for file in whole], made, host(), linked)
         return made.read_bytes()
 
 

@@ -11,6 +11,8 @@ from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import table
 from fmus.model import Model, equations
 
+CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes_processors.c", "lanes.h", "quick.c")
+
 
 def build_working(model: Model, out: Path) -> Path:
     """Write the file `out`, an FMI 2.0 FMU of a model for this machine, and return its path.
@@ -21,11 +23,12 @@ def build_working(model: Model, out: Path) -> Path:
     """
     made = equations(model)
     about = table(model, made)
-    code = sources(about, made, 2, NO_TOKEN, derivatives=False)
+    code = sources(about, made, 2, NO_TOKEN, working=True)
     files = identified(
         description2(about, NO_TOKEN, complete=False) | {n: text.encode() for n, text in code.items()}
     )
-    built = library({name: files.pop(name) for name in code}, "fmu.c")
+    apart = CALLED_BY_LANES if code.get("lanes_called.c") else ()
+    built = library({name: files.pop(name) for name in code}, "fmu.c", apart=apart)
     files[f"binaries/{host().folder(2)}/{model.name}{host().suffix}"] = built
     write_at_once(out, packed(files, zipfile.ZIP_STORED))
     return out

@@ -35,6 +35,7 @@
 #include "stepping.c"
 #include "states.c"
 #include "derivatives.c"
+#include "lanes.c"
 
 #if FMI_VERSION == 2
 #include "fmi2.c"

@@ -43,7 +43,8 @@ static bool advance(Instance *m, double duration) {
         if (!failed && error <= 1.0 && all_finite(m->next)) { /* the error may be blind to NaN */
             memcpy(x, m->next, sizeof m->next);
             done += h_now;
-            if (error > 0) h_now *= least(GROWTH, SAFETY * pow(error, -1.0 / ORDER));
+            bool more = duration - done > TIME_TOLERANCE * duration;
+            if (more && error > 0) h_now *= least(GROWTH, SAFETY * pow(error, -1.0 / ORDER));
         } else {
             bool known = !failed && 1.0 < error && error < 1e300;
             h_now *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;

@@ -62,12 +62,16 @@ static Status settable(const Instance *m, const char *call, unsigned i) {
     return OK;
 }
 
+/* Whether a value is finite and, but for a state, within the variable's bounds. */
+static bool within(unsigned i, double x) {
+    return isfinite(x) && (i < FIRST_INPUT || (VARIABLES[i].min <= x && x <= VARIABLES[i].max));
+}
+
 static Status acceptable(const Instance *m, const char *call, unsigned i, double x) {
     const Variable *v = &VARIABLES[i];
+    if (within(i, x)) return OK;
     if (!isfinite(x)) return refuse(m, ERROR, "%s: %s = %g is not a finite number", call, v->name, x);
-    if (i >= FIRST_INPUT && !(v->min <= x && x <= v->max))
-        return refuse(m, ERROR, "%s: %s = %g is outside %g to %g", call, v->name, x, v->min, v->max);
-    return OK;
+    return refuse(m, ERROR, "%s: %s = %g is outside %g to %g", call, v->name, x, v->min, v->max);
 }
 
 static Status set_values(Instance *m, const char *call, const unsigned *references, size_t n, const double *values) {

@@ -1,0 +1,79 @@
+/* Rows of values through one step or a whole record, four at once; not a part of FMI, for hosts that know it.
+
+   Every row is advanced as one instance of its own would be: the same internal steps, divided the same way. */
+
+#if defined(__GNUC__) && HAS_LANES
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+
+/* Whether processor and system have vectors of four doubles. */
+static bool found_avx2(void) {
+    unsigned a, b, c, d, low, high;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX)) return false;
+    __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & bit_AVX2);
+}
+
+static bool has_avx2(void) { /* asked once, since the question takes longer than a step */
+    static volatile int known; /* 0: not asked; threads that ask at once write the same */
+    if (!known) known = found_avx2() ? 2 : 1;
+    return known == 2;
+}
+#endif
+
+/* What is asked: rows of values to set at first, samples of inputs that all rows share, what to read. */
+typedef struct {
+    size_t n_base;
+    const double *base; /* all that can be set, (N_SET) */
+    size_t n_rows, n_put;
+    const unsigned *put;
+    const double *rows; /* (n_rows, n_put) */
+    size_t n_samples;
+    const double *t;    /* (n_samples) */
+    size_t n_inputs;
+    const unsigned *inputs;
+    const double *during, *after; /* (n_samples - 1, n_inputs) over a step, and set once it is made, or none */
+    size_t n_get;
+    const unsigned *get;
+    int first;          /* whether values before the first step are read too */
+    double *found;      /* (n_rows, n_samples - 1 + first, n_get) */
+} Rows;
+
+#define WITH_ROWS
+#ifdef FOR_THIS_MACHINE
+#define CALLED __attribute__((visibility("hidden")))
+#else
+#define CALLED static __attribute__((noinline))
+#define WITH_CALLED
+#endif
+#include "lanes_processors.c"
+
+/* -1, or the first row that cannot be set or advanced; an instance of its own tells why. */
+__attribute__((visibility("default"))) long long railfmi_rows(const Rows *asked) {
+    if (asked->n_base != N_SET || asked->n_samples == 0) return 0;
+    for (size_t k = 0; k < N_SET; k++)
+        if (!within((unsigned)k, asked->base[k])) return 0;
+    for (size_t k = 0; k < asked->n_put; k++)
+        if (asked->put[k] >= N_SET) return 0;
+    for (size_t k = 0; k < asked->n_inputs; k++)
+        if (asked->inputs[k] >= N_SET) return 0;
+    for (size_t k = 0; k < asked->n_get; k++)
+        if (asked->get[k] >= N_VARIABLES) return 0;
+    for (size_t i = 0; i < asked->n_rows; i++)
+        for (size_t k = 0; k < asked->n_put; k++)
+            if (!within(asked->put[k], asked->rows[i * asked->n_put + k])) return (long long)i;
+    long long (*four_rows)(const Rows *, size_t) = NULL;
+#ifdef FOR_ANY
+    four_rows = four_rows_any;
+#endif
+#if defined(__x86_64__)
+    if (has_avx2()) four_rows = four_rows_avx2;
+#endif
+    if (!four_rows) return 0;
+    long long failed = -1;
+    for (size_t row = 0; row < asked->n_rows && failed < 0; row += 4) failed = four_rows(asked, row);
+    return failed;
+}
+
+#endif

@@ -1,0 +1,89 @@
+/* Four rows through the samples. Included once for each processor. */
+
+typedef struct {
+    Lanes values[N_SET], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
+} LANES(Four);
+
+/* The arguments of the equations one after the other: states, inputs and parameters are so already. */
+static bool LANES(advance_four)(LANES(Four) *m, double duration, int active) {
+    Lanes given[N_SET + 1], next[N_STATES + 1];
+    double done[4] = {0}, h_now[4];
+    bool moving[4];
+    double whole = duration / number_of_parts(duration * (1 - TIME_TOLERANCE), LONGEST_STEP);
+    EACH(i) {
+        h_now[i] = whole;
+        moving[i] = i < active;
+    }
+    while (moving[0] || moving[1] || moving[2] || moving[3]) {
+        Lanes h = ALL(whole);
+        EACH(i) if (moving[i]) h[i] = h_now[i] = least(least(h_now[i], LONGEST_STEP), duration - done[i]);
+        memcpy(given, m->values, sizeof m->values);
+        given[N_SET] = h;
+        LANES(step)(given, next);
+        EACH(i) {
+            if (!moving[i]) continue;
+            double error = next[N_STATES][i];
+            bool finite = error <= 1.0;
+            for (int k = 0; k < N_STATES; k++) finite = finite && isfinite(next[k][i]);
+            if (finite) {
+                for (int k = 0; k < N_STATES; k++) m->values[k][i] = next[k][i];
+                done[i] += h_now[i];
+                moving[i] = duration - done[i] > TIME_TOLERANCE * duration;
+                if (moving[i] && error > 0) h_now[i] *= least(GROWTH, SAFETY * pow(error, -1.0 / ORDER));
+            } else {
+                bool known = 1.0 < error && error < 1e300;
+                h_now[i] *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;
+                if (h_now[i] < SHORTEST * duration) return false;
+            }
+        }
+    }
+    return true;
+}
+
+static void LANES(read_four)(LANES(Four) *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
+    bool outputs = false, slopes = false;
+    for (size_t k = 0; k < asked->n_get; k++) {
+        outputs = outputs || (asked->get[k] >= N_SET && asked->get[k] < FIRST_LOCAL);
+        slopes = slopes || asked->get[k] >= FIRST_LOCAL;
+    }
+    if (outputs) LANES(h)(m->values, m->outputs);
+    if (slopes) LANES(f)(m->values, m->slopes);
+    for (size_t k = 0; k < asked->n_get; k++) {
+        unsigned from = asked->get[k];
+        const Lanes *value = from < N_SET         ? &m->values[from]
+                             : from < FIRST_LOCAL ? &m->outputs[from - N_SET]
+                                                  : &m->slopes[LOCALS[from - FIRST_LOCAL]];
+        for (int i = 0; i < active; i++)
+            asked->found[((row + (size_t)i) * n_found + sample) * asked->n_get + k] = (*value)[i];
+    }
+}
+
+static bool LANES(set_inputs)(LANES(Four) *m, const Rows *asked, const double *samples, size_t k) {
+    for (size_t j = 0; j < asked->n_inputs; j++) {
+        double x = samples[k * asked->n_inputs + j];
+        if (!within(asked->inputs[j], x)) return false;
+        m->values[asked->inputs[j]] = ALL(x);
+    }
+    return true;
+}
+
+/* -1, or the first of the four rows from this one on, if one of them cannot be advanced. */
+static long long LANES(four_rows)(const Rows *asked, size_t row) {
+    LANES(Four) m;
+    int active = asked->n_rows - row < 4 ? (int)(asked->n_rows - row) : 4;
+    size_t first = asked->first ? 1 : 0, n_found = asked->n_samples - 1 + first;
+    for (int k = 0; k < N_SET; k++) m.values[k] = ALL(asked->base[k]);
+    for (size_t k = 0; k < asked->n_put; k++)
+        EACH(i) {
+            size_t from = row + (size_t)(i < active ? i : 0); /* lanes without a row do as the first one */
+            m.values[asked->put[k]][i] = asked->rows[from * asked->n_put + k];
+        }
+    if (first) LANES(read_four)(&m, asked, row, 0, n_found, active);
+    for (size_t k = 0; k + 1 < asked->n_samples; k++) {
+        if (!LANES(set_inputs)(&m, asked, asked->during, k)) return (long long)row;
+        if (!LANES(advance_four)(&m, asked->t[k + 1] - asked->t[k], active)) return (long long)row;
+        if (asked->after && !LANES(set_inputs)(&m, asked, asked->after, k)) return (long long)row;
+        LANES(read_four)(&m, asked, row, k + first, n_found, active);
+    }
+    return -1;
+}

@@ -1,0 +1,98 @@
+"""Many rows of values through one step or a record in one call, of FMUs that offer it: railfmi's native ones.
+
+The call is no part of FMI. It gives what instances would give that are reset, set, initialised and stepped
+one after the other, and takes a third of the time, since it advances four rows at once.
+"""
+
+from collections.abc import Mapping
+from ctypes import Structure, byref, c_int, c_longlong, c_size_t, c_void_p
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.host.description import FmuDescription
+from fmus.host.instance import Array, Instance
+
+NAME = "railfmi_rows"
+AT_ONCE = 4  # rows, in the time of little more than one
+References = NDArray[np.uint32]
+
+
+class _Asked(Structure):
+    """The C structure of the call, see lanes.c."""
+
+    _fields_ = (
+        ("n_base", c_size_t), ("base", c_void_p), ("n_rows", c_size_t), ("n_put", c_size_t),
+        ("put", c_void_p), ("rows", c_void_p), ("n_samples", c_size_t), ("t", c_void_p),
+        ("n_inputs", c_size_t), ("inputs", c_void_p), ("during", c_void_p), ("after", c_void_p),
+        ("n_get", c_size_t), ("get", c_void_p), ("first", c_int), ("found", c_void_p),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Inputs that all rows share: references (n_u,), values (N-1, n_u) over each step, and after it."""
+
+    references: References
+    during: Array
+    after: Array | None
+
+
+class Rows:
+    """The call for chosen variables: base (n,) of all that can be set, by reference; put, get: references."""
+
+    def __init__(self, library: Any, base: Array, put: References, get: References) -> None:
+        self._call = getattr(library, NAME)
+        self._call.restype = c_longlong
+        self._kept = (base, put, get)  # their memory is read by its address
+        self._asked = _Asked(
+            n_base=len(base), base=_at(base), n_put=len(put), put=_at(put), n_get=len(get), get=_at(get)
+        )
+        self._address = byref(self._asked)
+        self._t = np.empty(0)
+        self._drive: Drive | None = None
+
+    def run(self, rows: Array, t: Array, found: Array, drive: Drive | None = None) -> int:
+        """Fill `found` (k, N - 1 or N, n_get) from rows (k, n_put) at times t (N,), s; all C-contiguous.
+
+        With N results for each row the first is that before the first step. Returns -1, or a row of four of
+        which one cannot be set or advanced; then instances have to be asked why, and for the other rows.
+        """
+        asked = self._asked
+        asked.n_rows, asked.rows, asked.found = len(rows), _at(rows), _at(found)
+        if t is not self._t:
+            self._t = t
+            asked.n_samples, asked.t = len(t), _at(t)
+        asked.first = int(found.shape[1] == len(t))
+        if drive is not self._drive:
+            self._drive = drive
+            self._driven(drive)
+        failed: int = self._call(self._address)
+        return failed
+
+    def _driven(self, drive: Drive | None) -> None:
+        asked = self._asked
+        asked.n_inputs, asked.inputs, asked.during, asked.after = 0, None, None, None
+        if drive is not None:
+            asked.n_inputs, asked.inputs = len(drive.references), _at(drive.references)
+            asked.during = _at(drive.during)
+            asked.after = None if drive.after is None else _at(drive.after)
+
+
+def offers_rows(instance: Instance) -> bool:
+    """Whether the FMU's library has the call."""
+    return hasattr(instance.library, NAME)
+
+
+def base_of(description: FmuDescription, start: Mapping[str, float]) -> Array:
+    """Values of all variables that can be set, by reference: from `start`, by default their start values."""
+    settable = {n: v for n, v in description.variables.items() if v.start is not None}
+    by_reference = sorted(settable, key=lambda n: settable[n].reference)
+    return np.array([float(start.get(n, settable[n].start or 0.0)) for n in by_reference])
+
+
+def _at(array: NDArray[Any]) -> int:
+    address: int = array.__array_interface__["data"][0]  # half the time of array.ctypes.data
+    return address

@@ -1,0 +1,143 @@
+"""Many rows in one call of a native FMU give what instances one after the other give."""
+
+import casadi as cs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fmus.export.builders.native.lanes import BINARY, CALLED, ONE_BY_ONE, UNARY, lanes_of
+from fmus.export.builders.native.working import build_working
+from fmus.host.fmu import Fmu, FmuError
+from fmus.model import Model
+from fmus.models import MODELS
+from fmus.variables import Input, Output, Parameter, State
+from tests.helpers.everything import near_start
+from tests.helpers.native import every_native, native
+from tests.helpers.runs import names, start_of
+
+ALIKE = 1e-12  # relative to the size of a variable, the greatest difference between rows and instances
+ALONG = 1e-9  # the same after many steps, over which contact and friction enlarge what rounding leaves
+ROUNDED = 4.0  # units in the last place by which a function may differ from C's library
+TWO = {cs.OP_POW, cs.OP_ATAN2, cs.OP_HYPOT, cs.OP_FMOD, *BINARY}
+CODES = sorted({*UNARY, *BINARY, *CALLED, *ONE_BY_ONE} - {cs.OP_ASSIGN, cs.OP_CONSTPOW})
+
+
+class Operations(Model):
+    """Every operation of two inputs as an output."""
+
+    name = "Operations"
+    step_size = 1.0
+    z = State("1", doc="nothing")
+    a = Input("1", doc="first argument")
+    b = Input("1", doc="second argument")
+    vars().update({f"y_{code}": Output("1", doc="an operation") for code in CODES})
+
+    def derivatives(m):
+        return {"z": -m.z}
+
+    def outputs(m):
+        a, b = cs.SX.sym("a"), cs.SX.sym("b")
+        found = {}
+        for code in CODES:
+            one = cs.Function(
+                "one", [a, b], [cs.SX.binary(code, a, b) if code in TWO else cs.SX.unary(code, a)]
+            )
+            found[f"y_{code}"] = one(m.a, m.b)
+        return found
+
+
+@pytest.fixture(scope="module")
+def operations(tmp_path_factory):
+    with Fmu(build_working(Operations(), tmp_path_factory.mktemp("operations") / "model.fmu")) as fmu:
+        yield fmu
+
+
+def record(model, seed, k, n=60):
+    """Times and inputs of a run, and k starts that differ in every state and parameter that may differ."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(model.step_size * rng.uniform(0.3, 2.5, n))
+    u = np.array([near_start(model, rng)[1] for _ in t])
+    fixed = {v.name: v.start for v in model.of(Parameter) if v.fixed}
+    starts = [start_of(model, near_start(model, rng)) | fixed for _ in range(k)]
+    return t, dict(zip(names(model, Input), u.T, strict=True)), starts
+
+
+@every_native
+def test_rows_are_simulated_as_instances_are(name):
+    model = MODELS[name]()
+    with Fmu(native(name)) as fmu:
+        for seed, k in enumerate((1, 4, 6)):
+            t, inputs, starts = record(model, seed, k)
+            held = {name: samples[:-1] for name, samples in inputs.items()}  # over each step
+            for driven in (inputs, held):
+                expected = np.array([fmu.simulate(t, driven, fmu.description.outputs, s) for s in starts])
+                found = fmu.simulate_rows(t, driven, fmu.description.outputs, starts)
+                off = np.abs(found - expected) / np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-9)
+                assert off[:, :2].max() <= ALIKE
+                assert off.max() <= ALONG
+                assert k == 1 or np.ptp(found[:, -1], axis=0).max() > 0
+
+
+def test_a_row_out_of_its_bounds_is_left_to_an_instance_that_says_why():
+    model = MODELS["testrig"]()
+    t, inputs, starts = record(model, 0, 5)
+    heavy = next(v.name for v in model.of(Parameter) if v.min == 0.0 and not v.fixed)
+    with Fmu(native("testrig")) as fmu:
+        outputs = fmu.description.outputs[:2]
+        assert fmu.simulate_rows(t, inputs, outputs, starts) is not None
+        for wrong in (-1.0, np.nan):
+            assert fmu.simulate_rows(t, inputs, outputs, [*starts[:4], starts[4] | {heavy: wrong}]) is None
+        with pytest.raises(FmuError, match=heavy):
+            fmu.simulate(t, inputs, outputs, starts[4] | {heavy: -1.0})
+        spoilt = {name: np.where(t == t[7], np.nan, samples) for name, samples in inputs.items()}
+        assert fmu.simulate_rows(t, spoilt, outputs, starts) is None
+
+
+ORDINARY = st.floats(-30.0, 30.0) | st.sampled_from([0.0, 1.0, -1.0, 0.66, 0.625, 1e-300, 1e300, 1e5, -2e6])
+
+
+@settings(max_examples=200)
+@given(st.lists(st.tuples(ORDINARY, ORDINARY), min_size=1, max_size=9))
+def test_every_operation_is_that_of_the_library(operations, pairs):
+    starts = [{"a": a, "b": b} for a, b in pairs]
+    asked = [f"y_{code}" for code in CODES]
+    found = operations.simulate_rows(np.zeros(1), {}, asked, starts)[:, 0]
+    expected = np.array([operations.simulate(np.zeros(1), {}, asked, s)[0] for s in starts])
+    assert_array_equal(np.isnan(found), np.isnan(expected))
+    same = (found == expected) | np.isnan(expected)
+    with np.errstate(invalid="ignore"):
+        near = np.abs(found - expected) <= ROUNDED * np.spacing(np.abs(expected))
+    assert np.all(same | near), [CODES[j] for j in np.flatnonzero(~(same | near).all(axis=0))]
+
+
+def test_a_function_with_an_operation_without_lanes_has_none():
+    x = cs.SX.sym("x")
+    assert lanes_of([cs.Function("plain", [x], [cs.sin(x)])]) is not None
+    assert lanes_of([cs.Function("erf", [x], [cs.erf(x)])]) is None
+
+
+def test_a_choice_that_differs_from_row_to_row_is_made_for_each(tmp_path):
+    cases = [cs.Function(f"c{i}", [q := cs.SX.sym("q")], [q**i + i]) for i in range(3)]
+    chosen = cs.Function.conditional("chosen", cases[:-1], cases[-1])
+
+    class Chosen(Model):
+        name = "Chosen"
+        step_size = 0.1
+        z = State("1", doc="a state")
+        case = Parameter("1", 0.0, doc="which one")
+        y = Output("1", doc="result")
+
+        def derivatives(m):
+            return {"z": -m.z}
+
+        def outputs(m):
+            return {"y": m.call(chosen, m.case, m.z)[0]}
+
+    with Fmu(build_working(Chosen(), tmp_path / "model.fmu")) as fmu:
+        rows = [{"case": float(i), "z": 2.0 + i} for i in (0, 1, 2, 5, -1, 1, 1)]
+        found = fmu.simulate_rows(np.zeros(1), {}, ["y"], rows)[:, 0, 0]
+        expected = [fmu.simulate(np.zeros(1), {}, ["y"], row)[0, 0] for row in rows]
+    assert_allclose(found, expected, rtol=1e-15)
+    assert len(set(found)) == len({(min(r["case"], 2.0) % 3, r["z"]) for r in rows})
