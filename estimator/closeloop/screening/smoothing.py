@@ -1,4 +1,4 @@
-"""Kalman filter and smoother on a linearised FMU, with forces as random walks, for many ports at once."""
+"""Kalman filter and smoother on a linearised FMU, with forces as random walks."""
 
 from dataclasses import dataclass
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.screening.linear import Linearised
+from estimator.filters.algebra import compiled, symmetric
 from estimator.record import Array
 
 WALKS = (0.01, 0.1, 1.0)  # random walk intensities that are tried, in units of the force's first guess
@@ -32,12 +33,14 @@ def smooth(local: Linearised, residual: Array, noise: Array, dt: Array) -> Smoot
     The intensity of the random walk is the one with the largest likelihood of the residual.
     """
     guess = _first_guess(local, residual, dt)
-    alone = np.arange(len(guess))[:, None]
-    scored = [_Filter(local, residual, noise, dt, alone, w * guess[:, None]).run(keep=False) for w in WALKS]
-    walk = guess * np.array(WALKS)[np.argmax(scored, axis=0)]
-    x, force, std = _Filter(local, residual, noise, dt, alone, walk[:, None]).smoothed()
-    together = _Filter(local, residual, noise, dt, alone.T, walk[None, :]).smoothed()[0]
-    return Smoothed(x, force[..., 0], std[..., 0], together[0])
+    filters = [_Filter(local, residual, noise, dt, np.array([i])) for i in range(len(guess))]
+    tried = guess[:, None] * np.array(WALKS)
+    scored = [[f.likelihood(walk[None]) for walk in walks] for f, walks in zip(filters, tried, strict=True)]
+    walk = guess * np.array(WALKS)[np.argmax(scored, axis=1)]
+    alone = [f.smoothed(w[None]) for f, w in zip(filters, walk, strict=True)]
+    x, force, std = (np.array(of_all) for of_all in zip(*alone, strict=True))
+    together = _Filter(local, residual, noise, dt, np.arange(len(guess))).smoothed(walk)[0]
+    return Smoothed(x, force[..., 0], std[..., 0], together)
 
 
 def _first_guess(local: Linearised, residual: Array, dt: Array) -> Array:
@@ -54,85 +57,117 @@ def _first_guess(local: Linearised, residual: Array, dt: Array) -> Array:
 
 
 class _Filter:
-    """Kalman filters in parallel, one per group of levers, whose forces are additional states.
-
-    groups: (n_g, r) levers; walk: (n_g, r) random walk intensities of their forces, per root of a second.
-    """
+    """Kalman filter and smoother whose additional states are the forces of some levers (r,), as random walks."""
 
     def __init__(
-        self,
-        local: Linearised,
-        residual: Array,
-        noise: Array,
-        dt: Array,
-        groups: NDArray[np.intp],
-        walk: Array,
+        self, local: Linearised, residual: Array, noise: Array, dt: Array, levers: NDArray[np.intp]
     ) -> None:
-        n, (n_g, r) = local.A.shape[1], groups.shape
-        self.n, self.near, self.residual, self.dt = n, local.near(len(residual)), residual, dt
-        self.R, self.Q = np.diag(noise**2), np.zeros((n_g, n + r, n + r))
-        self.Q[:, range(n, n + r), range(n, n + r)] = walk**2
-        points = len(local.index)
-        self.A = np.zeros((points, n_g, n + r, n + r))
-        self.A[:, :, :n, :n], self.A[:, :, n:, n:] = local.A[:, None], np.eye(r)
-        self.A[:, :, :n, n:] = np.moveaxis(local.B[:, :, groups], 2, 1)
-        self.C = np.zeros((points, n_g, residual.shape[1], n + r))
-        self.C[:, :, :, :n], self.C[:, :, :, n:] = local.C[:, None], np.moveaxis(local.D[:, :, groups], 2, 1)
-        self.x, self.P = np.empty((0, n_g, n + r)), np.empty((0, n_g, n + r, n + r))
-        self.score, self.weight, self.rest = self.x, self.P, self.P  # see `run`
+        points, n_y, n = local.C.shape
+        m = n + len(levers)
+        A, C = np.zeros((points, m, m)), np.zeros((points, n_y, m))
+        A[:, :n, :n], A[:, :n, n:], A[:, n:, n:] = local.A, local.B[:, :, levers], np.eye(len(levers))
+        C[:, :, :n], C[:, :, n:] = local.C, local.D[:, :, levers]
+        self.n, self.A, self.C, self.near = n, A, C, local.near(len(residual))
+        self.residual, self.R, self.dt = residual, noise**2, dt
 
-    def run(self, keep: bool) -> Array:
-        """Run the filters; returns the log likelihood of each group, (n_g,).
+    def likelihood(self, walk: Array) -> float:
+        """Log likelihood of the residual, with the intensities (r,) of the random walks, per root of a second."""
+        return self._run(walk, np.empty((0, *self.A.shape[1:])))[0]
 
-        keep: whether to store what the smoother needs, the states and covariances after each sample,
-        C' S⁻¹ e (score), C' S⁻¹ C (weight) and I - K C (rest).
-        """
-        steps, (n_g, m) = len(self.residual), self.Q.shape[:2]
-        x, P, likelihood = np.zeros((n_g, m)), self.Q.copy(), np.zeros(n_g)
-        if keep:
-            self.x, self.score = np.empty((steps, n_g, m)), np.empty((steps, n_g, m))
-            self.P, self.weight, self.rest = (np.empty((steps, n_g, m, m)) for _ in range(3))
-        for k in range(steps):
-            C = self.C[self.near[k]]
-            Ct = np.swapaxes(C, 1, 2)
-            PC = P @ Ct
-            S = C @ PC + self.R
-            e = self.residual[k] - (C @ x[..., None])[..., 0]
-            solved = np.linalg.solve(S, np.concatenate([e[..., None], np.swapaxes(PC, 1, 2)], axis=2))
-            likelihood -= 0.5 * (np.sum(e * solved[..., 0], axis=1) + np.linalg.slogdet(S)[1])
-            K = np.swapaxes(solved[..., 1:], 1, 2)
-            rest = np.eye(m) - K @ C
-            x = x + (K @ e[..., None])[..., 0]
-            P = rest @ P @ np.swapaxes(rest, 1, 2) + K @ self.R @ np.swapaxes(K, 1, 2)  # Joseph's form
-            if keep:
-                self.x[k], self.P[k], self.rest[k] = x, P, rest
-                self.score[k] = (Ct @ solved[..., :1])[..., 0]
-                self.weight[k] = Ct @ np.linalg.solve(S, C)
-            if k < steps - 1:
-                F = self.A[self.near[k]]
-                x, P = (F @ x[..., None])[..., 0], F @ P @ np.swapaxes(F, 1, 2) + self.Q * self.dt[k]
-        return likelihood
+    def smoothed(self, walk: Array) -> tuple[Array, Array, Array]:
+        """Smoothed states (N, n), forces and their standard deviations (N, r)."""
+        P = np.empty((len(self.residual), *self.A.shape[1:]))
+        _, x, gains, errors = self._run(walk, P)
+        variance = np.empty((len(x), len(walk)))
+        _backward(self.A, self.C, self.near, P, gains, errors, x, variance)
+        return x[:, : self.n], x[:, self.n :], np.sqrt(np.maximum(variance, 0))
 
-    def smoothed(self) -> tuple[Array, Array, Array]:
-        """Smoothed states (n_g, N, n), forces and their standard deviations (n_g, N, r).
+    def _run(self, walk: Array, P: Array) -> tuple[float, Array, Array, Array]:
+        """Log likelihood, and what `_forward` keeps if P (N, m, m) has room for each sample."""
+        m, n_y = len(self.A[0]), len(self.R)
+        Q, x = np.diag(np.concatenate([np.zeros(self.n), walk**2])), np.empty((len(P), m))
+        gains, errors = np.empty((len(P), n_y, m)), np.empty((len(P), n_y, 2))
+        found: float = _forward(
+            self.A, self.C, self.near, self.residual, self.R, Q, self.dt, x, P, gains, errors
+        )
+        return found, x, gains, errors
 
-        The backward pass is that of Bryson and Frazier, which inverts no covariance (Bierman 1973).
-        """
-        self.run(keep=True)
-        n, last = self.n, len(self.x) - 1
-        x, variance = self.x.copy(), np.empty((*self.x.shape[:2], self.x.shape[2] - n))
-        adjoint, information = np.zeros_like(x[0]), np.zeros_like(self.P[0])
-        for k in range(last, -1, -1):
-            if k < last:
-                F = self.A[self.near[k]]
-                Ft = np.swapaxes(F, 1, 2)
-                adjoint, information = (Ft @ adjoint[..., None])[..., 0], Ft @ information @ F
-            P = self.P[k]
-            x[k] += (P @ adjoint[..., None])[..., 0]
-            gained = P[..., n:, :] @ information @ P[..., :, n:]
-            variance[k] = np.diagonal(P[..., n:, n:] - gained, axis1=1, axis2=2)
-            back = np.swapaxes(self.rest[k], 1, 2)
-            adjoint = self.score[k] + (back @ adjoint[..., None])[..., 0]
-            information = self.weight[k] + back @ information @ self.rest[k]
-        std = np.sqrt(np.maximum(variance, 0))
-        return np.swapaxes(x[..., :n], 0, 1), np.swapaxes(x[..., n:], 0, 1), np.swapaxes(std, 0, 1)
+
+@compiled
+def _forward(
+    A: Array, C: Array, near: NDArray[np.intp], residual: Array, R: Array, Q: Array, dt: Array,
+    states: Array, covariances: Array, gains: Array, errors: Array,
+) -> float:  # fmt: skip
+    """Run the filter on a residual (N, n_y) with noise variances R (n_y,); returns the log likelihood.
+
+    The outputs of a sample are independent, so that each corrects the state in turn. If `states` is not
+    empty, each sample's state (m,) and covariance (m, m), and each output's gain (m,), error e / s and
+    variance s are written.
+    """
+    x, P, likelihood = np.zeros(len(Q)), Q.copy(), 0.0
+    for k in range(len(residual)):
+        for i in range(len(R)):
+            c = C[near[k], i]
+            h = P @ c
+            s, e = c @ h + R[i], residual[k, i] - c @ x
+            likelihood -= 0.5 * (e * e / s + np.log(s))
+            g = h / s
+            x += g * e
+            _correct(P, c, h, g, R[i])
+            if len(states):
+                gains[k, i], errors[k, i, 0], errors[k, i, 1] = g, e / s, s
+        if len(states):
+            states[k], covariances[k] = x, P
+        if k < len(residual) - 1:
+            F = A[near[k]]
+            x, P = F @ x, symmetric(F @ P @ F.T + Q * dt[k])
+    return likelihood
+
+
+@compiled
+def _correct(P: Array, c: Array, h: Array, g: Array, r: float) -> None:
+    """Replace P (m, m) by (I - g c') P (I - g c')' + g r g' (Joseph's form); h: P c."""
+    m = len(P)
+    for i in range(m):
+        left = 0.0
+        for j in range(m):
+            P[i, j] -= g[i] * h[j]
+            left += P[i, j] * c[j]
+        left -= r * g[i]
+        for j in range(m):
+            P[i, j] -= left * g[j]
+
+
+@compiled
+def _backward(
+    A: Array,
+    C: Array,
+    near: NDArray[np.intp],
+    P: Array,
+    gains: Array,
+    errors: Array,
+    x: Array,
+    variance: Array,
+) -> None:
+    """Smooth the states x (N, m) of `_forward`, and write the variances (N, r) of the last r of them.
+
+    The backward pass is that of Bryson and Frazier, which inverts no covariance (Bierman 1973).
+    """
+    last, m, r = len(x) - 1, x.shape[1], variance.shape[1]
+    adjoint, information = np.zeros(m), np.zeros((m, m))
+    for k in range(last, -1, -1):
+        if k < last:
+            F = A[near[k]]
+            adjoint, information = F.T @ adjoint, symmetric(F.T @ information @ F)
+        x[k] += P[k] @ adjoint
+        for j in range(r):
+            p = P[k, m - r + j]
+            variance[k, j] = p[m - r + j] - p @ (information @ p)
+        for i in range(errors.shape[1] - 1, -1, -1):
+            c, g = C[near[k], i], gains[k, i]
+            taken = information @ g
+            own = 1 / errors[k, i, 1] + g @ taken
+            adjoint += c * (errors[k, i, 0] - g @ adjoint)
+            for a in range(m):
+                for b in range(m):
+                    information[a, b] += own * c[a] * c[b] - c[a] * taken[b] - taken[a] * c[b]
