@@ -11,10 +11,12 @@ from estimator.closeloop.question.problem import Problem
 from estimator.filters.algebra import compiled
 from estimator.plant import PLANTS
 from estimator.record import Array
+from fmus.host.description import FmuVariable
 
 LINEARISATIONS = 200  # at most this many linearisations along the run
 PROBES = 5  # samples at which a restart is compared with the simulation
 HIDDEN = 1e-3  # share of a state's largest step; a restart that differs by more lacks a hidden state
+SAMPLES_AT_ONCE = 1000  # samples of the influences that are brought together in one array
 LEVER_NUDGE = 1e-4  # finite difference of an input or parameter (lever), as share of its size
 
 
@@ -74,7 +76,7 @@ def linearise(
     record, run = problem.record, problem.record.runs[0]
     plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
     index = np.unique(np.linspace(0, len(keep) - 2, min(LINEARISATIONS, len(keep) - 1)).astype(int))
-    start = problem.start(theta)
+    start, known = problem.start(theta), plant.fmu.description.variables
     nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))
     parts: list[tuple[Array, Array, Array, Array]] = []
     for k in index:
@@ -88,23 +90,22 @@ def linearise(
         c = np.column_stack([(y1 - y0) / d for (_, y1), d in zip(columns, size, strict=True)])
         b, e = np.empty((len(x0), len(levers))), np.empty((len(y0), len(levers)))
         for i, name in enumerate(levers):
-            h = LEVER_NUDGE * _size(problem, name, given)
-            x1, y1 = plant.response(x[here], {**given, name: _value(problem, name, given) + h}, dt)
+            h = LEVER_NUDGE * _size(known[name], given)
+            x1, y1 = plant.response(x[here], {**given, name: _value(known[name], given) + h}, dt)
             b[:, i], e[:, i] = (x1 - x0) / h, (y1 - y0) / h
         parts.append((a, b, c, e))
     A, B, C, D = (np.array(p) for p in zip(*parts, strict=True))
     return Linearised(index, A, B, C, D)
 
 
-def _value(problem: Problem, name: str, given: Mapping[str, float]) -> float:
-    return given.get(name, problem.plant.fmu.description.variables[name].start or 0.0)
+def _value(v: FmuVariable, given: Mapping[str, float]) -> float:
+    return given.get(v.name, v.start or 0.0)
 
 
-def _size(problem: Problem, name: str, given: Mapping[str, float]) -> float:
+def _size(v: FmuVariable, given: Mapping[str, float]) -> float:
     """Size of a lever; negative if the finite difference would exceed its upper limit."""
-    v = problem.plant.fmu.description.variables[name]
-    size = abs(_value(problem, name, given)) or v.nominal or 1.0
-    at_the_top = v.max is not None and _value(problem, name, given) + LEVER_NUDGE * size > v.max
+    size = abs(_value(v, given)) or v.nominal or 1.0
+    at_the_top = v.max is not None and _value(v, given) + LEVER_NUDGE * size > v.max
     return -size if at_the_top else size
 
 
@@ -117,6 +118,7 @@ def influences(
     linearisations. It is therefore computed from a simulation with the parameter changed.
     """
     plant = problem.plant
+    known = plant.fmu.description.variables
     inputs = [name for name in levers if name in plant.fmu.description.inputs]
     local = linearise(problem, theta, x, keep, inputs)
     near = local.near(len(keep))
@@ -125,8 +127,8 @@ def influences(
     n_y, a, c = len(plant.outputs), local.A[near[:-1]], local.C[near]
     before = plant.simulate(run, start, plant.states)[keep]
     for name in (n for n in levers if n not in found):
-        h = LEVER_NUDGE * _size(problem, name, start)
-        after = plant.simulate(run, {**start, name: _value(problem, name, start) + h}, plant.states)[keep]
+        h = LEVER_NUDGE * _size(known[name], start)
+        after = plant.simulate(run, {**start, name: _value(known[name], start) + h}, plant.states)[keep]
         dy, dx = np.split((after - before) / h, (n_y,), axis=1)
         steps = dx[1:] - np.einsum("kmn,kn->km", a, dx[:-1])
         steps[0] = dx[1]  # a change of the start state is not part of a step
@@ -139,34 +141,40 @@ def responses(
 ) -> Array:
     """Change of the outputs (samples, n_y, k) by each of k sets of lever changes (samples,)."""
     n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
-    force, found = np.zeros((samples, n, k)), np.zeros((samples, n_y, k))
-    for i, changes in enumerate(moved):
-        for name, change in changes.items():
-            lever = levers[name]
-            _act(change[:samples], lever.states, lever.outputs, force[:, :, i], found[:, :, i])
-    _respond(local.A, local.C, local.near(samples), force, found)
+    names = list(dict.fromkeys(name for changes in moved for name in changes))
+    acting = [(names.index(name), i) for i, changes in enumerate(moved) for name in changes]
+    pairs, near = np.array(acting, np.intp).reshape(-1, 2), local.near(samples)
+    now = [change[:samples] for changes in moved for change in changes.values()]
+    held = [np.append((w[1:] + w[:-1]) / 2, w[-1:]) for w in now]
+    x, found = np.zeros((n, k)), np.empty((samples, n_y, k))
+    for first in range(0, samples, SAMPLES_AT_ONCE):
+        part = slice(first, first + SAMPLES_AT_ONCE)
+        m = len(near[part])
+        states = np.array([levers[name].states[part] for name in names]).reshape(-1, m, n)
+        outputs = np.array([levers[name].outputs[part] for name in names]).reshape(-1, m, n_y)
+        pushed, shown = (np.array([w[part] for w in of_all]).reshape(-1, m) for of_all in (held, now))
+        x = _respond(local.A, local.C, near[part], states, outputs, pairs, pushed, shown, x, found[part])
     return found
 
 
 @compiled
-def _act(w: Array, states: Array, outputs: Array, force: Array, direct: Array) -> None:
-    """Add the influence of a lever's change w (N,) to the states per step and to the outputs."""
-    last = len(w) - 1
-    for s in range(len(w)):
-        mean = (w[s] + w[s + 1]) / 2 if s < last else w[s]
-        for j in range(states.shape[1]):
-            force[s, j] += states[s, j] * mean
-        for j in range(outputs.shape[1]):
-            direct[s, j] += outputs[s, j] * w[s]
+def _respond(
+    A: Array, C: Array, near: NDArray[np.intp], states: Array, outputs: Array, pairs: NDArray[np.intp],
+    pushed: Array, shown: Array, x: Array, found: Array,
+) -> Array:  # fmt: skip
+    """Write the outputs (m, n_y, k) of k columns of states x (n, k); returns the states after the samples.
 
-
-@compiled
-def _respond(A: Array, C: Array, near: NDArray[np.intp], force: Array, found: Array) -> None:
-    """Add y = C x to found (N, n_y, k), with x+ = A x + force (N, n, k) and x = 0 at the start.
-
-    A: (p, n, n), C: (p, n_y, n), of which `near` (N,) names one for each sample.
+    A: (p, n, n), C: (p, n_y, n), of which `near` (m,) names one for each sample; states: (n_w, m, n) and
+    outputs: (n_w, m, n_y), the influences of the levers; pairs: (q, 2) lever and column of each change, which
+    is pushed (q, m) over the step and shown (q, m) at the sample.
     """
-    x = np.zeros(force.shape[1:])
-    for s in range(len(force)):
-        found[s] += C[near[s]] @ x
-        x = A[near[s]] @ x + force[s]
+    for s in range(len(near)):
+        found[s] = C[near[s]] @ x
+        x = A[near[s]] @ x
+        for q in range(len(pairs)):
+            lever, i = pairs[q]
+            for j in range(states.shape[2]):
+                x[j, i] += states[lever, s, j] * pushed[q, s]
+            for j in range(outputs.shape[2]):
+                found[s, j, i] += outputs[lever, s, j] * shown[q, s]
+    return x
