@@ -16,9 +16,11 @@ from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.screening.regressors import Calibration
 from estimator.record import Array
 
 LIKENESS = "likeness to an effect"
+ROWS_AT_ONCE = 2000  # rows of all regressors that are brought together in one array
 
 
 @dataclass(frozen=True)
@@ -64,21 +66,21 @@ def detect(
     fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
     left = np.concatenate(baseline.hypothesis.residuals)[unseen] / baseline.noise.std
     slopes = _sensitivities(baseline)
-    g = _directions(screened.jacobian, regressors) if regressors else None
     observed = _figures(left, limits.slow_blocks)
     n = slopes.shape[2]
     # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(slopes[fitted].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
-    late, copies = slopes[unseen], []
+    late, copies = slopes[unseen].reshape(-1, n), []
     for _ in range(limits.replicates):
         e = rng.standard_normal(left.shape)
         if n:
-            e -= late @ (root @ rng.standard_normal(root.shape[1]))
+            e -= (late @ (root @ rng.standard_normal(root.shape[1]))).reshape(e.shape)
         copies.append(_figures(e, limits.slow_blocks))
     references = {name: np.array([c[name] for c in copies]) for name in observed}
-    if g is not None:
-        observed[LIKENESS] = float(np.max((g.T @ screened.residual) ** 2))
-        references[LIKENESS] = _likeness_of_noise(g, limits.replicates, rng)
+    if regressors:
+        along, cosines = _directions(screened, regressors)
+        observed[LIKENESS] = float(np.max(along**2))
+        references[LIKENESS] = _likeness_of_noise(cosines, limits.replicates, rng)
     p_values, figures = [], {}
     for name, value in observed.items():
         reference = references[name]
@@ -100,27 +102,37 @@ def _sensitivities(baseline: Baseline) -> Array:
     return np.stack(columns, axis=2) if columns else np.zeros((*here.shape, 0))
 
 
-def _directions(jacobian: Array, regressors: Sequence[Array]) -> Array:
-    """Regressors projected orthogonal to the columns of the calibration, of length 1, (m, k)."""
-    g = np.hstack(regressors)
-    if jacobian.shape[1]:
-        q = np.linalg.qr(jacobian)[0]
-        g = g - q @ (q.T @ g)
-    directions: Array = g / (np.linalg.norm(g, axis=0) + 1e-300)
-    return directions
+def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
+    """Products (k,) of the residual with all regressors, and of these with one another (k, k).
+
+    The regressors are projected orthogonal to the columns of the calibration, and have the length 1.
+    """
+    q = Calibration.of(screened).basis
+    within = np.vstack([g.T @ q for g in regressors])
+    along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
+    for first in range(0, len(q), ROWS_AT_ONCE):
+        rows = slice(first, first + ROWS_AT_ONCE)
+        left = np.vstack([g[rows].T for g in regressors]) - within @ q[rows].T
+        along += left @ screened.residual[rows]
+        gram += left @ left.T
+    size = np.sqrt(np.diag(gram)) + 1e-300
+    return along / size, gram / size[:, None] / size
 
 
-def _likeness_of_noise(g: Array, replicates: int, rng: np.random.Generator) -> Array:
-    """The largest squared projection of white noise onto the columns of g (m, k), (replicates,)."""
-    values, vectors = np.linalg.eigh(g.T @ g)
+def _likeness_of_noise(cosines: Array, replicates: int, rng: np.random.Generator) -> Array:
+    """The largest squared projection of white noise onto directions with given cosines, (replicates,)."""
+    values, vectors = np.linalg.eigh(cosines)
     root = vectors * np.sqrt(np.maximum(values, 0))
-    drawn = rng.standard_normal((replicates, g.shape[1])) @ root.T
+    drawn = rng.standard_normal((replicates, len(cosines))) @ root.T
     return np.asarray(np.max(drawn**2, axis=1))
 
 
 def _figures(left: Array, pieces: int) -> dict[str, float]:
-    means = np.array([b.mean(axis=0) * np.sqrt(len(b)) for b in np.array_split(left, pieces)])
+    ends = [b[0] for b in np.array_split(np.arange(len(left)), min(pieces, len(left)))]
+    lengths = np.diff([*ends, len(left)])
+    means = np.add.reduceat(left, ends, axis=0) / np.sqrt(lengths)[:, None]
+    squares = np.einsum("ij,ij->j", left, left) / len(left)
     return {
-        "size of the residual that no fit has seen": float(np.max(np.mean(left**2, axis=0))),
+        "size of the residual that no fit has seen": float(np.max(squares)),
         "slow part of the residual that no fit has seen": float(np.max(np.mean(means**2, axis=0))),
     }

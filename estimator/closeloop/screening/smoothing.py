@@ -57,7 +57,7 @@ def _first_guess(local: Linearised, residual: Array, dt: Array) -> Array:
 
 
 class _Filter:
-    """Kalman filter and smoother whose additional states are the forces of some levers (r,), as random walks."""
+    """Kalman filter and smoother with the forces of some levers (r,), as random walks, as further states."""
 
     def __init__(
         self, local: Linearised, residual: Array, noise: Array, dt: Array, levers: NDArray[np.intp]
@@ -71,7 +71,7 @@ class _Filter:
         self.residual, self.R, self.dt = residual, noise**2, dt
 
     def likelihood(self, walk: Array) -> float:
-        """Log likelihood of the residual, with the intensities (r,) of the random walks, per root of a second."""
+        """Log likelihood of the residual; walk: (r,) intensities of the forces, per root of a second."""
         return self._run(walk, np.empty((0, *self.A.shape[1:])))[0]
 
     def smoothed(self, walk: Array) -> tuple[Array, Array, Array]:
