@@ -126,7 +126,7 @@ def test_what_a_parameter_changes_is_what_a_simulation_says(lever, share):
     plant, k = problem.plant, int(share * len(t))
     states = problem.simulate({}, plant.states)[0][:, 3:]
     local, found = influences(problem, {}, states, np.arange(len(t)), [lever])
-    linear = responses(local, found, [{lever: 1.0 * (np.arange(len(t)) >= k)}], len(t))[k:, :, 0]
+    linear = responses(local, found, [{lever: 1.0 * (np.arange(len(t)) >= k)}], len(t))[0, k:]
     h, start, rest = 1e-4, dict(zip(plant.states, states[k], strict=True)), run.part(k, len(t))
     value = plant.fmu.description.variables[lever].start
     moved = plant.simulate(rest, {**start, lever: value * (1 - h)})

@@ -61,14 +61,14 @@ def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
     names = [s.name for s in made.states]
     if set(names) <= set(known):
         return np.array([known[name] for name in names]).reshape(len(names), len(course.t))
-    step, seen = _step(made)
+    n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / LONGEST_STEP - ROUNDING)))
+    run, seen = _run(made, (len(course.t) - 1) * n)
     start = np.array([s.start for s in made.states])
     w = np.array([np.broadcast_to((m if i == 0 else z)[row], len(course.t)) for i, row in seen])
-    n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / LONGEST_STEP - ROUNDING)))
     at = np.arange((len(course.t) - 1) * n + 1) / n
     t, w = (_between(at, rows) for rows in (course.t[None, :], w))
-    run = step.mapaccum(len(at) - 1)(start, w[:, :-1], w[:, 1:], np.diff(t))
-    return np.column_stack([start, np.asarray(run)[:, n - 1 :: n]])
+    x = run(start, w[:, :-1], w[:, 1:], np.diff(t)).full()
+    return np.column_stack([start, x[:, n - 1 :: n]])
 
 
 def _between(at: Array, rows: Array) -> Array:
@@ -77,8 +77,8 @@ def _between(at: Array, rows: Array) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _step(made: Around) -> tuple[cs.Function, list[tuple[int, int]]]:
-    """A Runge-Kutta step of the effect's states, step(x, w0, w1, dt) -> x, and the rows of (m, x, z) in w.
+def _run(made: Around, steps: int) -> tuple[cs.Function, list[tuple[int, int]]]:
+    """Runge-Kutta steps of the effect's states, run(x, w0, w1, dt) -> x, and the rows of (m, x, z) in w.
 
     w holds the motion, inputs and parameters that the states depend on; it is linear between w0 and w1.
     """
@@ -91,7 +91,8 @@ def _step(made: Around) -> tuple[cs.Function, list[tuple[int, int]]]:
         given = iter(cs.vertsplit(w))
         return rates(*(state[row] if i == 1 else next(given) for i, row in rows))
 
-    return cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, dt, straight(w0, w1))]), seen
+    step = cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, dt, straight(w0, w1))])
+    return step.mapaccum(steps), seen
 
 
 def names_of(levers: Sequence[Mapping[str, Array]]) -> list[str]:

@@ -139,21 +139,21 @@ def influences(
 def responses(
     local: Linearised, levers: Mapping[str, Influence], moved: Sequence[Mapping[str, Array]], samples: int
 ) -> Array:
-    """Change of the outputs (samples, n_y, k) by each of k sets of lever changes (samples,)."""
+    """Change of the outputs (k, samples, n_y) by each of k sets of lever changes (samples,)."""
     n, n_y, k = local.A.shape[1], local.C.shape[1], len(moved)
     names = list(dict.fromkeys(name for changes in moved for name in changes))
     acting = [(names.index(name), i) for i, changes in enumerate(moved) for name in changes]
     pairs, near = np.array(acting, np.intp).reshape(-1, 2), local.near(samples)
     now = [change[:samples] for changes in moved for change in changes.values()]
     held = [np.append((w[1:] + w[:-1]) / 2, w[-1:]) for w in now]
-    x, found = np.zeros((n, k)), np.empty((samples, n_y, k))
+    x, found = np.zeros((n, k)), np.empty((k, samples, n_y))
     for first in range(0, samples, SAMPLES_AT_ONCE):
         part = slice(first, first + SAMPLES_AT_ONCE)
         m = len(near[part])
         states = np.array([levers[name].states[part] for name in names]).reshape(-1, m, n)
         outputs = np.array([levers[name].outputs[part] for name in names]).reshape(-1, m, n_y)
         pushed, shown = (np.array([w[part] for w in of_all]).reshape(-1, m) for of_all in (held, now))
-        x = _respond(local.A, local.C, near[part], states, outputs, pairs, pushed, shown, x, found[part])
+        x = _respond(local.A, local.C, near[part], states, outputs, pairs, pushed, shown, x, found[:, part])
     return found
 
 
@@ -162,19 +162,19 @@ def _respond(
     A: Array, C: Array, near: NDArray[np.intp], states: Array, outputs: Array, pairs: NDArray[np.intp],
     pushed: Array, shown: Array, x: Array, found: Array,
 ) -> Array:  # fmt: skip
-    """Write the outputs (m, n_y, k) of k columns of states x (n, k); returns the states after the samples.
+    """Write the outputs (k, m, n_y) of k columns of states x (n, k); returns the states after the samples.
 
     A: (p, n, n), C: (p, n_y, n), of which `near` (m,) names one for each sample; states: (n_w, m, n) and
     outputs: (n_w, m, n_y), the influences of the levers; pairs: (q, 2) lever and column of each change, which
     is pushed (q, m) over the step and shown (q, m) at the sample.
     """
     for s in range(len(near)):
-        found[s] = C[near[s]] @ x
+        found[:, s] = (C[near[s]] @ x).T
         x = A[near[s]] @ x
         for q in range(len(pairs)):
             lever, i = pairs[q]
             for j in range(states.shape[2]):
                 x[j, i] += states[lever, s, j] * pushed[q, s]
             for j in range(outputs.shape[2]):
-                found[s, j, i] += outputs[lever, s, j] * shown[q, s]
+                found[i, s, j] += outputs[lever, s, j] * shown[q, s]
     return x

@@ -128,14 +128,15 @@ class Screening:
         if self._states is None:
             return [self._simulated(change) for change in moved]
         local, levers = self._linearised(names_of(moved), self._states)
-        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size[:, None]
+        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size
         found: list[Array] = []
         for i in range(0, len(moved), CHANGES_AT_ONCE):
             some = moved[i : i + CHANGES_AT_ONCE]
             with np.errstate(over="ignore", invalid="ignore"):
-                y = responses(local, levers, some, len(self._at))[fit]
-                columns = (y * scale).reshape(-1, y.shape[2]).T
-                sound = np.all(np.abs(columns) < RUNAWAY, axis=1)
+                columns = (responses(local, levers, some, len(self._at))[:, fit] * scale).reshape(
+                    len(some), -1
+                )
+                sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
             # the linearised response of a model with stick and slip may diverge, so that it is simulated
             found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
         return found

@@ -143,7 +143,8 @@ def around(site: Outside, effects: Sequence[tuple[str, str]]) -> Around:
     states = [v for v in brought if isinstance(v, State)]
     parameters = [v for v in brought if isinstance(v, Parameter)]
     symbols = site.free_symbols
-    told = [n for n in symbols if n not in site.brought and not cs.is_equal(site.symbols[n], symbols[n])]
+    changed = [n for n, own in symbols.items() if site.symbols[n] is not own and n not in site.brought]
+    told = [n for n in changed if not cs.is_equal(site.symbols[n], symbols[n])]
     given = [*site.description.inputs, *site.description.parameters]
     x = cs.vertcat(*(symbols[s.name] for s in states))
     z = cs.vertcat(*(symbols[n] for n in given), *(symbols[p.name] for p in parameters))
