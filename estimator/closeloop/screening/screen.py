@@ -192,45 +192,39 @@ def _last(problem: Problem) -> int:
 def screen(base: Fit, sets: Sequence[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
     """The promise of each set of candidates from its changes (m, k) by linear regression, best first."""
     basis = np.linalg.qr(base.jacobian)
-    known = basis[0].T @ base.residual
-    r = base.residual - basis[0] @ known
-    return sorted((_promise(base, *basis, known, r, c, raw) for c, raw in sets), key=lambda p: -p.gain)
+    r = base.residual - basis[0] @ (basis[0].T @ base.residual)
+    return sorted((_promise(base, *basis, r, c, raw) for c, raw in sets), key=lambda p: -p.gain)
 
 
-def _bounded(gram: Array, along: Array, low: Array, high: Array) -> Array:
-    """Least-squares amplitudes (k,) of regressors for a residual, within bounds, with a small ridge.
-
-    gram: (k, k) products of the regressors with one another; along: (k,) with the residual.
-    """
-    if not len(gram):
+def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:
+    """Least-squares amplitudes (k,) of regressors g (m, k) for r, within bounds, with a small ridge."""
+    if not g.shape[1]:
         return np.zeros(0)
-    size = np.sqrt(np.diag(gram))
-    factor = np.linalg.cholesky(gram / size[:, None] / size + NEARLY_PARALLEL**2 * np.eye(len(size)))
-    found = lsq_linear(
-        factor.T, np.linalg.solve(factor, along / size), (low * size, high * size), method="bvls"
-    )
+    size = np.linalg.norm(g, axis=0)
+    q, triangle = np.linalg.qr(np.vstack([g / size, NEARLY_PARALLEL * np.eye(len(size))]))
+    whole = np.concatenate([r, np.zeros(len(size))])
+    found = lsq_linear(triangle, q.T @ whole, (low * size, high * size), method="bvls")
     return np.asarray(found.x / size)
 
 
 def _promise(
-    base: Fit, basis: Array, triangle: Array, known: Array, r: Array, candidates: tuple[Candidate, ...],
-    raw: Array,
-) -> Promise:  # fmt: skip
-    """The promise of candidates; known: (n,) part of the residual within the basis, r: (m,) the rest."""
-    within = basis.T @ raw
-    g = raw - basis @ within
-    gram, along = g.T @ g, g.T @ r
+    base: Fit, basis: Array, triangle: Array, r: Array, candidates: tuple[Candidate, ...], raw: Array
+) -> Promise:
+    """The promise of candidates; r: (m,) the residual orthogonal to the basis (m, n) of the calibration."""
+    g = raw - basis @ (basis.T @ raw)
     amplitudes = [u for c in candidates for u in c.amplitudes]
-    usable = np.sqrt(np.diag(gram)) > USABLE * (np.linalg.norm(raw, axis=0) + 1e-300)
+    size, left = np.linalg.norm(raw, axis=0) + 1e-300, np.linalg.norm(g, axis=0)
+    usable = left > USABLE * size
     low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
     beta = np.zeros(len(amplitudes))
-    beta[usable] = _bounded(gram[np.ix_(usable, usable)], -along[usable], low[usable], high[usable])
-    gain = float(-beta @ (2 * along + gram @ beta))
+    beta[usable] = _bounded(g[:, usable], -r, low[usable], high[usable])
+    gain = float(r @ r - np.sum((r + g @ beta) ** 2))
     beta = np.clip(beta, -TRUSTED, TRUSTED)
     start = {u.name: float(b * u.scale) for u, b in zip(amplitudes, beta, strict=True)}
     start |= {u.name: u.start for c in candidates for u in c.shape}
     if len(base.values):
-        shift = np.linalg.lstsq(triangle, -(known + within @ beta), rcond=None)[0]
+        rest = basis.T @ (base.residual + raw @ beta)
+        shift = np.linalg.lstsq(triangle, -rest, rcond=None)[0]
         low, high = (np.array([getattr(u, side) for u in base.unknowns]) for side in ("low", "high"))
         trusted = TRUSTED * np.array([u.scale for u in base.unknowns])
         moved = np.clip(base.values + np.clip(shift, -trusted, trusted), low, high)
