@@ -19,28 +19,11 @@ LEADING = 10  # number of effects that count as leading, each with its best shap
 
 
 @dataclass(frozen=True)
-class _Own:
-    """The columns of the calibration and the residual over blocks of the record, and the halves of these.
+class _Pieces:
+    """Products of columns with each other (B, n, n) and with the residual (B, n), summed over each block."""
 
-    columns: (m, n + 1), the residual last; edges: the rows of each block; halves: (h, B) indicators;
-    inverse: (h, n, n) pseudoinverse of the products of the columns in each half; along: (h, n) their
-    products with the residual.
-    """
-
-    columns: Array
-    edges: list[slice]
-    halves: Array
-    inverse: Array
+    gram: Array
     along: Array
-
-    @classmethod
-    def of(cls, base: Fit, halves: Array) -> "_Own":
-        blocks = np.array_split(np.arange(len(base.residual)), BLOCKS)
-        edges = [slice(int(b[0]), int(b[-1]) + 1) if len(b) else slice(0, 0) for b in blocks]
-        columns, n = np.column_stack([base.jacobian, base.residual]), base.jacobian.shape[1]
-        held = np.einsum("hb,bnm->hnm", halves, np.array([columns[e, :n].T @ columns[e] for e in edges]))
-        inverse = np.linalg.pinv(held[:, :, :n], hermitian=True) if n else held[:, :, :n]
-        return cls(columns, edges, halves, inverse, held[:, :, n])
 
 
 def stability(
@@ -50,10 +33,14 @@ def stability(
 
     base: fit of the calibrated FMU; the columns of the calibration are projected out in each half separately.
     """
-    own = _Own.of(base, _halves(rng, pairs))
+    halves = _halves(rng, pairs)
+    blocks = np.array_split(np.arange(len(base.residual)), BLOCKS)
+    edges = [slice(int(b[0]), int(b[-1]) + 1) if len(b) else slice(0, 0) for b in blocks]
+    own = _pieces(base.jacobian, base.residual, edges)
+    inverse = np.linalg.pinv(np.einsum("hb,bnm->hnm", halves, own.gram), hermitian=True)
     gains: dict[str, Array] = {}
     for c, g in change:
-        found = _gains(c, g, own)
+        found = _gains(c, g, base, own, inverse, edges, halves)
         gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
     if not gains:
         return {}
@@ -70,15 +57,26 @@ def _halves(rng: np.random.Generator, pairs: int) -> Array:
     return np.vstack([one, ~one]).astype(float)
 
 
-def _gains(c: Candidate, g: Array, own: _Own) -> Array:
-    """Reduction of the sum of squares of each half by a candidate, (h,); 0 if its sign is out of bounds."""
-    grams = np.array([g[e].T @ g[e] for e in own.edges])
-    products = np.einsum("hb,bnk->hnk", own.halves, np.array([own.columns[e].T @ g[e] for e in own.edges]))
-    across, along = products[:, :-1], products[:, -1]
-    whole, taken = np.einsum("hb,bkl->hkl", own.halves, grams), own.inverse @ across
-    gram = whole - np.swapaxes(across, 1, 2) @ taken
-    along = along - np.einsum("hnk,hn->hk", taken, own.along)
-    left, whole = np.einsum("hkk->hk", gram), np.einsum("hkk->hk", whole)
+def _pieces(columns: Array, residual: Array, edges: list[slice]) -> _Pieces:
+    gram = np.array([columns[e].T @ columns[e] for e in edges])
+    return _Pieces(gram, np.array([columns[e].T @ residual[e] for e in edges]))
+
+
+def _gains(
+    c: Candidate, g: Array, base: Fit, own: _Pieces, inverse: Array, edges: list[slice], halves: Array
+) -> Array:
+    """Reduction of the sum of squares of each half by a candidate, (h,); 0 if its sign is out of bounds.
+
+    inverse: (h, n, n) pseudoinverse of the products of the calibration's columns in each half.
+    """
+    mine = _pieces(g, base.residual, edges)
+    across = np.einsum("hb,bnk->hnk", halves, np.array([base.jacobian[e].T @ g[e] for e in edges]))
+    gram, along = np.einsum("hb,bkl->hkl", halves, mine.gram), halves @ mine.along
+    if base.jacobian.shape[1]:
+        taken = inverse @ across
+        gram = gram - np.swapaxes(across, 1, 2) @ taken
+        along = along - np.einsum("hnk,hn->hk", taken, halves @ own.along)
+    left, whole = np.einsum("hkk->hk", gram), halves @ np.einsum("bkk->bk", mine.gram)
     size = np.where(left > NOTHING**2 * whole, np.sqrt(np.maximum(left, 0.0)), np.inf)
     scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(g.shape[1])
     z = along / size
