@@ -70,7 +70,7 @@ def detect(
     n = slopes.shape[2]
     # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(slopes[fitted].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
-    late, copies = slopes[unseen].reshape(-1, n), []
+    late, copies = slopes[unseen].reshape(left.size, n), []
     for _ in range(limits.replicates):
         e = rng.standard_normal(left.shape)
         if n:
@@ -103,10 +103,7 @@ def _sensitivities(baseline: Baseline) -> Array:
 
 
 def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
-    """Products (k,) of the residual with all regressors, and of these with one another (k, k).
-
-    The regressors are projected orthogonal to the columns of the calibration, and have the length 1.
-    """
+    """Products (k,) of the residual with the regressors, projected and of length 1, and of these (k, k)."""
     q = Calibration.of(screened).basis
     within = np.vstack([g.T @ q for g in regressors])
     along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
@@ -129,8 +126,7 @@ def _likeness_of_noise(cosines: Array, replicates: int, rng: np.random.Generator
 
 def _figures(left: Array, pieces: int) -> dict[str, float]:
     ends = [b[0] for b in np.array_split(np.arange(len(left)), min(pieces, len(left)))]
-    lengths = np.diff([*ends, len(left)])
-    means = np.add.reduceat(left, ends, axis=0) / np.sqrt(lengths)[:, None]
+    means = np.add.reduceat(left, ends, axis=0) / np.sqrt(np.diff([*ends, len(left)]))[:, None]
     squares = np.einsum("ij,ij->j", left, left) / len(left)
     return {
         "size of the residual that no fit has seen": float(np.max(squares)),
