@@ -11,6 +11,7 @@ from benchmarks.timing import Run, in_turns
 from fmus.contact.forces.laws import LAWS
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
+from fmus.host.rows import AT_ONCE
 from fmus.models import MODELS
 from fmus.variables import State
 from fmus.wheelset.model import Wheelset
@@ -41,6 +42,7 @@ class StepGroup(Group):
                 yield from _model(name, fmu, loops, steps, work.of(15, 3))
                 if name == "wheelset":
                     yield from _laws(fmu, loops, work.of(2000, 100), work.of(9, 3))
+                yield _rows(name, fmu, loops, steps)
             yield _restarts(name, loops, work)
 
 
@@ -90,6 +92,29 @@ def _laws(fmu: Fmu, loops: Loops, steps: int, rounds: int) -> Iterator[Row]:
         if law != default:
             how = f"doStep of 1 ms of the native FMU with creep law {law}, and with the default, {default}"
             yield times.row(f"wheelset: step with {law}", law, default, "µs", how, factor=1e6 / steps)
+
+
+def _rows(name: str, fmu: Fmu, loops: Loops, steps: int) -> Row:
+    """Rows of values side by side through a record in one call, beside steps of one instance."""
+    start, t = start_of(MODELS[name]()), DT * np.arange(steps + 1)
+    states = [v.name for v in MODELS[name]().of(State)]
+    found = fmu.simulate_rows(t[:101], {}, states, [start] * AT_ONCE)
+    loops.steps(fmu, start, DT, 100)
+    agreed(
+        np.array([] if found is None else found[-1, -1]), np.array(fmu.read(states)), SAME, f"{name}, rows"
+    )
+    times = in_turns(
+        {
+            "ours": lambda: fmu.simulate_rows(t, {}, states[:1], [start] * AT_ONCE),
+            "one instance": lambda: loops.steps(fmu, start, DT, steps),
+        },
+        9,
+    )
+    how = f"{AT_ONCE} rows through {steps} steps of 1 ms in one call; doStep of one instance, called from C"
+    return times.row(
+        f"{name}: row and step", "ours", "one instance", "µs", how, factor=1e6 / steps / AT_ONCE,
+        peer_factor=1e6 / steps,
+    )  # fmt: skip
 
 
 def _restarts(name: str, loops: Loops, work: Work) -> Row:

@@ -13,7 +13,7 @@ from fmus.host.description import FmuDescription
 from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
 from fmus.host.instance import Array, CallFailed, Instance
-from fmus.host.rows import AT_ONCE, Drive, Rows, base_of, offers_rows
+from fmus.host.rows import AT_ONCE, Inputs, Rows, base_of, offers_rows
 
 
 class FmuError(RuntimeError):
@@ -112,10 +112,9 @@ class Fmu:
         rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
         found = np.empty((len(starts), len(t), len(outputs)))
         call = Rows(self._instance.library, base_of(self.description, first), put, get)
-        drive = Drive(
-            driven, np.ascontiguousarray(acting), None if ends is None else np.ascontiguousarray(ends)
-        )
-        refused = call.run(rows, np.ascontiguousarray(t, dtype=float), found, drive) >= 0
+        last = None if ends is None else np.ascontiguousarray(ends)
+        held = Inputs(driven, np.ascontiguousarray(acting), last)
+        refused = call.run(rows, np.ascontiguousarray(t, dtype=float), found, held) >= 0
         return None if refused else found
 
     def save(self) -> Any:

@@ -27,12 +27,12 @@ class _Asked(Structure):
         ("n_base", c_size_t), ("base", c_void_p), ("n_rows", c_size_t), ("n_put", c_size_t),
         ("put", c_void_p), ("rows", c_void_p), ("n_samples", c_size_t), ("t", c_void_p),
         ("n_inputs", c_size_t), ("inputs", c_void_p), ("during", c_void_p), ("after", c_void_p),
-        ("n_get", c_size_t), ("get", c_void_p), ("first", c_int), ("found", c_void_p),
+        ("n_get", c_size_t), ("get", c_void_p), ("first", c_int), ("found", c_void_p), ("processor", c_int),
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Drive:
+class Inputs:
     """Inputs that all rows share: references (n_u,), values (N-1, n_u) over each step, and after it."""
 
     references: References
@@ -52,9 +52,9 @@ class Rows:
         )
         self._address = byref(self._asked)
         self._t = np.empty(0)
-        self._drive: Drive | None = None
+        self._inputs: Inputs | None = None
 
-    def run(self, rows: Array, t: Array, found: Array, drive: Drive | None = None) -> int:
+    def run(self, rows: Array, t: Array, found: Array, inputs: Inputs | None = None) -> int:
         """Fill `found` (k, N - 1 or N, n_get) from rows (k, n_put) at times t (N,), s; all C-contiguous.
 
         With N results for each row the first is that before the first step. Returns -1, or a row of four of
@@ -66,19 +66,19 @@ class Rows:
             self._t = t
             asked.n_samples, asked.t = len(t), _at(t)
         asked.first = int(found.shape[1] == len(t))
-        if drive is not self._drive:
-            self._drive = drive
-            self._driven(drive)
+        if inputs is not self._inputs:
+            self._inputs = inputs
+            self._set_inputs(inputs)
         failed: int = self._call(self._address)
         return failed
 
-    def _driven(self, drive: Drive | None) -> None:
+    def _set_inputs(self, inputs: Inputs | None) -> None:
         asked = self._asked
         asked.n_inputs, asked.inputs, asked.during, asked.after = 0, None, None, None
-        if drive is not None:
-            asked.n_inputs, asked.inputs = len(drive.references), _at(drive.references)
-            asked.during = _at(drive.during)
-            asked.after = None if drive.after is None else _at(drive.after)
+        if inputs is not None:
+            asked.n_inputs, asked.inputs = len(inputs.references), _at(inputs.references)
+            asked.during = _at(inputs.during)
+            asked.after = None if inputs.after is None else _at(inputs.after)
 
 
 def offers_rows(instance: Instance) -> bool:

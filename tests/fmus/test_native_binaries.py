@@ -18,6 +18,7 @@ from fmus.export.builders.native.compilers import PLATFORMS, chosen, host
 from fmus.export.builders.native.universal import universal
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
+from fmus.host.rows import NAME
 from fmus.models import MODELS
 from fmus.variables import (
     Input,
@@ -80,13 +81,13 @@ def needs_only_libc_of_old(path):
 
 def shows_only_the_interface(path, fmi):
     symbols = re.findall(r"(?:GLOBAL|WEAK)\s+DEFAULT\s+\d+ (\w+)$", readelf("--dyn-syms", path), re.MULTILINE)
-    assert set(symbols) == functions(fmi)
+    assert set(symbols) == {*functions(fmi), NAME}
 
 
 @ELF
 @every_native
 @every_version
-def test_a_linux_library_shows_fmi_alone_and_needs_an_old_libc_alone(name, fmi, tmp_path):
+def test_a_linux_library_shows_fmi_and_rows_alone_and_needs_an_old_libc_alone(name, fmi, tmp_path):
     path = library(native(name, fmi=fmi), tmp_path)
     needs_only_libc_of_old(path)
     shows_only_the_interface(path, fmi)
@@ -326,7 +327,7 @@ def test_one_machine_builds_for_all_platforms(fmi, tmp_path):
             shows_only_the_interface(one, fmi)
         elif where.suffix == ".dll":
             read = pefile.PE(one)
-            assert {s.name.decode() for s in read.DIRECTORY_ENTRY_EXPORT.symbols} == functions(fmi)
+            assert {s.name.decode() for s in read.DIRECTORY_ENTRY_EXPORT.symbols} == {*functions(fmi), NAME}
             needed = {entry.dll.decode().lower() for entry in read.DIRECTORY_ENTRY_IMPORT}
             assert all(n == "kernel32.dll" or n.startswith("api-ms-win-crt-") for n in needed), needed
             assert read.FILE_HEADER.Machine == 0x8664

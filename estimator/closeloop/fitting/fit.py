@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import least_squares
 
-from estimator.closeloop.fitting.slopes import STEP, Begun, Slopes
+from estimator.closeloop.fitting.slopes import STEP, Residuals, Slopes
 from estimator.closeloop.hypotheses.fitted import (
     WIDE,
     Fit,
@@ -89,46 +89,34 @@ def fit(
     def theta(x: Sequence[float]) -> dict[str, float]:
         return {**(fixed or {}), **dict(zip(names, x, strict=True))}
 
-    residual = _residual(problem, theta, size, len(names) + 2)
     if not unknowns:
-        alone = residual(x0)
+        alone = weighted(problem, theta(x0.tolist()), size)
         return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
     if fading and sum(run.fit.any() for run in problem.record.runs) > 1:
         fading = []  # a first share of each run is no first share of the residual
     steps = np.array([STEP if u.is_onset else step for u in unknowns])
     given = [(known or {}).get(n) for n in names]
-    begun = _begun(problem, theta, size)
-    slopes = Slopes(residual, begun, scale, high, given, fading, steps, problem.at_once)
+    slopes = Slopes(_residuals(problem, theta, size), scale, high, given, fading, steps, problem.at_once)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
     secants = not known and bool(problem.record.noise_declared.all())
-    x, converged = _descended(residual, slopes, x, (low, high), scale, evaluations, gain, secants)
-    r, jacobian = residual(x), slopes.at(x)
+    x, converged = _descended(slopes, x, (low, high), scale, evaluations, gain, secants)
+    r, jacobian = slopes.residual(x), slopes.at(x)
     middle = _middle(x, jacobian, scale, low, high)
-    if np.any(middle != x) and np.sum(residual(middle) ** 2) < r @ r + len(x):
-        x, r = middle, residual(middle)
+    if np.any(middle != x) and np.sum(slopes.residual(middle) ** 2) < r @ r + len(x):
+        x, r = middle, slopes.residual(middle)
     return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)
 
 
-def _residual(problem: Problem, theta: Named, size: Array, places: int) -> Callable[[Array], Array]:
-    """The weighted residual (m,) as a function of x; the last results are cached."""
-
-    @lru_cache(places)
-    def simulated(x: tuple[float, ...]) -> Array:
-        return weighted(problem, theta(x), size)
-
-    return lambda x: simulated(tuple(x.tolist()))
-
-
-def _begun(problem: Problem, theta: Named, size: Array) -> Begun:
+def _residuals(problem: Problem, theta: Named, size: Array) -> Residuals:
     """The weighted residuals on a first share of the part, as a function of several x."""
     part = lru_cache(lambda share: problem if share == 1.0 else problem.beginning(share))
     return lambda xs, share: several_weighted(part(share), [theta(x.tolist()) for x in xs], size)
 
 
 def _descended(
-    residual: Callable[[Array], Array], slopes: Slopes, x: Array, bounds: tuple[Array, Array], scale: Array,
+    slopes: Slopes, x: Array, bounds: tuple[Array, Array], scale: Array,
     evaluations: int, gain: float, secants: bool,
 ) -> tuple[Array, bool]:  # fmt: skip
     """The optimum from start x, and whether the fit converged.
@@ -138,10 +126,10 @@ def _descended(
     """
     left = evaluations
     while True:
-        exact, before = slopes.exact, float(np.sum(residual(x) ** 2))
-        near = secants and before < NEAR_NOISE * len(residual(x))
+        exact, before = slopes.exact, float(np.sum(slopes.residual(x) ** 2))
+        near = secants and before < NEAR_NOISE * len(slopes.residual(x))
         found = least_squares(
-            residual, x, slopes.at if near else slopes.by_differences, bounds,
+            slopes.residual, x, slopes.at if near else slopes.by_differences, bounds,
             x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,
         )  # fmt: skip
         x, left = found.x, left - found.nfev

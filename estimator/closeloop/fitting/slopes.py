@@ -16,33 +16,55 @@ SHORT = 1e-3  # scales: shorter steps do not update the Jacobian, for the solver
 FADED = 1e-6  # share of a column's sum of squares that may be neglected after its end
 PARTS = 24  # pieces of the residual, in which the end of a column is counted
 
-Begun = Callable[[Sequence[Array], float], Sequence[Array]]
+Residuals = Callable[[Sequence[Array], float], Sequence[Array]]
 
 
 class Slopes:
     """Jacobian (m, n) of a residual function, updated from step to step by Broyden's method.
 
-    residual: function of x (n,) that returns (m,); begun: function that returns the first share of it for
-    each of several x; scale, high: (n,) scales and upper bounds of the unknowns; known: for each unknown its
-    column if that is given and kept, else None; fading: indices of unknowns whose influence may decay; step:
-    step of the finite differences, in scales; at_once: number of x that `begun` takes in the time of one.
+    residuals: function of several x (n,) and a share that returns the first share of the residual (m,) for
+    each; scale, high: (n,) scales and upper bounds of the unknowns; known: for each unknown its column if
+    that is given and kept, else None; fading: indices of unknowns whose influence may decay; step: step of
+    the finite differences, in scales; at_once: number of x that `residuals` takes in the time of one.
     Source: C. G. Broyden, Mathematics of Computation 19 (1965), 577-593.
     """
 
     def __init__(
-        self, residual: Callable[[Array], Array], begun: Begun, scale: Array, high: Array,
-        known: Sequence[Array | None], fading: Collection[int] = (), step: Array | float = STEP,
-        at_once: int = 1,
+        self, residuals: Residuals, scale: Array, high: Array, known: Sequence[Array | None],
+        fading: Collection[int] = (), step: Array | float = STEP, at_once: int = 1,
     ) -> None:  # fmt: skip
-        self._residual, self._scale, self._high, self._known = residual, scale, high, list(known)
-        self._step, self._begun, self._at_once = step * scale, begun, at_once
+        self._residuals, self._scale, self._high, self._known = residuals, scale, high, list(known)
+        self._step, self._at_once = step * scale, at_once
         self._parts = dict.fromkeys(fading, PARTS)
+        self._whole: dict[bytes, Array] = {}  # the last whole residuals, by x
         self._last: tuple[Array, Array, Array] | None = None  # last x, with its residual and Jacobian
         self.exact = False  # whether the last Jacobian comes from finite differences only
 
+    def residual(self, x: Array) -> Array:
+        """The residual (m,) at x; what is simulated in the same time is kept for the Jacobian there."""
+        if x.tobytes() not in self._whole:
+            free = [i for i, known in enumerate(self._known) if known is None and i not in self._parts]
+            self._simulated([x, *(self._aside(i, x)[1] for i in free[: self._at_once - 1])], 1.0)
+        return self._whole[x.tobytes()]
+
+    def _simulated(self, xs: Sequence[Array], share: float) -> list[Array]:
+        """The first share of the residuals at several x, of which whole ones are kept for a while."""
+        new = [x for x in xs if share < 1.0 or x.tobytes() not in self._whole]
+        found = dict(zip((x.tobytes() for x in new), self._residuals(new, share), strict=True)) if new else {}
+        kept = self._whole | found
+        if share == 1.0:
+            most = len(self._known) + self._at_once + 1
+            self._whole = dict(list(kept.items())[-most:])
+        return [kept[x.tobytes()] for x in xs]
+
+    def _aside(self, i: int, x: Array) -> tuple[float, Array]:
+        """The step of a finite difference at x, and the x that it leads to."""
+        h = float(self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i])
+        return h, x + h * np.eye(len(x))[i]
+
     def by_differences(self, x: Array, guess: Sequence[Array | None] | None = None) -> Array:
         """The Jacobian at x by finite differences; columns that are known or guessed are used unchanged."""
-        r = self._residual(x)
+        r = self.residual(x)
         self.exact = not any(column is not None for column in guess or ())
         columns = {
             i: column
@@ -63,10 +85,10 @@ class Slopes:
         parts = {i: min(self._parts.get(i, PARTS) + 1, PARTS) for i in wanted}
         while left := sorted((i for i in wanted if i not in found), key=lambda i: -parts[i])[: self._at_once]:
             longest = parts[left[0]]
-            h = [self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i] for i in left]
-            aside = [x + step * np.eye(len(x))[i] for i, step in zip(left, h, strict=True)]
-            for i, step, begun in zip(left, h, self._begun(aside, longest / PARTS), strict=True):
-                column = np.append((begun - r[: len(begun)]) / step, np.zeros(len(r) - len(begun)))
+            aside = [self._aside(i, x) for i in left]
+            some = self._simulated([there for _, there in aside], longest / PARTS)
+            for i, (h, _), begun in zip(left, aside, some, strict=True):
+                column = np.append((begun - r[: len(begun)]) / h, np.zeros(len(r) - len(begun)))
                 if longest == PARTS or faded(column) < longest:
                     found[i] = column
                 parts[i] = PARTS
@@ -79,7 +101,7 @@ class Slopes:
         before, r_before, jacobian = self._last
         step = (x - before) / self._scale
         if (length := float(step @ step)) > SHORT**2:
-            r = self._residual(x)
+            r = self.residual(x)
             missed = r - r_before - jacobian @ (x - before)
             jacobian = jacobian + np.outer(missed, step / self._scale / length)
             self._last, self.exact = (x.copy(), r, jacobian), False

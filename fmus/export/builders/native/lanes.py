@@ -67,7 +67,7 @@ ONE_BY_ONE = {  # functions of C's library, lane after lane
 
 
 class Lanes(NamedTuple):
-    """C code of functions, and of all that they call, which is the same for many models and may be nothing."""
+    """C code of functions, and of what they call, which is the same for many models and may be nothing."""
 
     functions: str
     called: str

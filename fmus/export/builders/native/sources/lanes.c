@@ -8,17 +8,11 @@
 #include <cpuid.h>
 
 /* Whether processor and system have vectors of four doubles. */
-static bool found_avx2(void) {
+static bool has_avx2(void) {
     unsigned a, b, c, d, low, high;
     if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX)) return false;
     __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
     return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & bit_AVX2);
-}
-
-static bool has_avx2(void) { /* asked once, since the question takes longer than a step */
-    static volatile int known; /* 0: not asked; threads that ask at once write the same */
-    if (!known) known = found_avx2() ? 2 : 1;
-    return known == 2;
 }
 #endif
 
@@ -38,7 +32,10 @@ typedef struct {
     const unsigned *get;
     int first;          /* whether values before the first step are read too */
     double *found;      /* (n_rows, n_samples - 1 + first, n_get) */
+    int processor;      /* 0 at first; then what is known, for the question takes longer than a step */
 } Rows;
+
+enum { ANY = 1, AVX2 };
 
 #define WITH_ROWS
 #ifdef FOR_THIS_MACHINE
@@ -49,8 +46,18 @@ typedef struct {
 #endif
 #include "lanes_processors.c"
 
+#if defined(FMI2_OVERRIDE_FUNCTION_PREFIX) || defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
+#define ROWS railfmi_rows
+#elif FMI_VERSION == 2
+#define ROWS LANES_PREFIXED(FMI2_FUNCTION_PREFIX, railfmi_rows)
+#else
+#define ROWS LANES_PREFIXED(FMI3_FUNCTION_PREFIX, railfmi_rows)
+#endif
+#define LANES_JOINED(prefix, name) prefix##name
+#define LANES_PREFIXED(prefix, name) LANES_JOINED(prefix, name)
+
 /* -1, or the first row that cannot be set or advanced; an instance of its own tells why. */
-__attribute__((visibility("default"))) long long railfmi_rows(const Rows *asked) {
+__attribute__((visibility("default"))) long long ROWS(Rows *asked) {
     if (asked->n_base != N_SET || asked->n_samples == 0) return 0;
     for (size_t k = 0; k < N_SET; k++)
         if (!within((unsigned)k, asked->base[k])) return 0;
@@ -68,7 +75,8 @@ __attribute__((visibility("default"))) long long railfmi_rows(const Rows *asked)
     four_rows = four_rows_any;
 #endif
 #if defined(__x86_64__)
-    if (has_avx2()) four_rows = four_rows_avx2;
+    if (!asked->processor) asked->processor = has_avx2() ? AVX2 : ANY;
+    if (asked->processor == AVX2) four_rows = four_rows_avx2;
 #endif
     if (!four_rows) return 0;
     long long failed = -1;
