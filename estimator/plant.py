@@ -39,7 +39,9 @@ class Plant:
             inputs = dict(inputs)
             for name, samples in push.items():
                 inputs[name] = inputs.get(name, 0.0) + np.interp(t, run.t, samples)
-        return self.fmu.simulate(t, inputs, (*self.outputs, *more), start)[::pieces]
+        names = (*self.outputs, *more)
+        alone = self.fmu.simulate_rows(t, inputs, names, [start])  # half the time of a loop over steps
+        return (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
 
     def simulate_rows(self, run: Run, starts: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """As `simulate` for each of several starts with the same names; None if the FMU does not offer it."""

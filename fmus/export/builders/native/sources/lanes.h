@@ -147,8 +147,13 @@ ONLY LANES(lanes_tanh)(const Lanes *a, Lanes *y) {
 
 ONLY LANES(lanes_pow)(const Lanes *a, const Lanes *b, Lanes *y) {
     Lanes base = *a, exponent = *b, r = base;
-    Bits plain = (Bits)(exponent == 1.0);
-    if (!USUALLY(LANES(everywhere)(&plain))) EACH(i) r[i] = quick_pow(base[i], exponent[i]);
+    Bits plain = (Bits)(exponent == 1.0), alike = (Bits)(base == ALL(base[0])) & (Bits)(exponent == ALL(exponent[0]));
+    if (!USUALLY(LANES(everywhere)(&plain))) {
+        if (LANES(everywhere)(&alike)) /* as for parameters that all rows share */
+            r = ALL(1.0) * quick_pow(base[0], exponent[0]);
+        else
+            EACH(i) r[i] = quick_pow(base[i], exponent[i]);
+    }
     *y = r;
 }
 
