@@ -9,9 +9,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
 
 from estimator.closeloop.fitting import likelihood_profile as likelihood
-from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.fit import compressed, fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.slopes import (
     FADED,
@@ -147,6 +148,26 @@ def test_known_columns_stay():
 
     slopes = Slopes(each(residual), np.ones(2), np.full(2, np.inf), [given_column, None])
     assert_allclose(slopes.by_differences(np.zeros(2)), [[7.0, 1.0]] * 4)
+
+
+@given(st.integers(0, 99), st.booleans())
+def test_a_compressed_problem_takes_the_same_steps(seed, bounded):
+    rng = np.random.default_rng(seed)
+    a, b = rng.standard_normal((200, 3)), rng.standard_normal(200)
+
+    def residual(x):
+        return a @ x + 0.2 * (a @ x) ** 2 - b
+
+    def jacobian(x):
+        return a * (1 + 0.4 * (a @ x))[:, None]
+
+    bounds = (-0.3, 0.3) if bounded else (-np.inf, np.inf)
+    how = {"bounds": bounds, "max_nfev": 4, "x_scale": np.array([1.0, 2.0, 0.5])}
+    expected = least_squares(residual, np.full(3, 0.1), jacobian, **how)
+    found = least_squares(*compressed(residual, jacobian, np.full(3, 0.1)), **how)
+    assert_allclose(found.x, expected.x, rtol=1e-9, atol=1e-12)
+    assert_allclose(found.cost, expected.cost)
+    assert found.nfev == expected.nfev
 
 
 class Fading:

@@ -28,12 +28,16 @@ NEAR_NOISE = 5.0  # mean square, in units of noise, below which derivatives are 
 LITTLE = 1e-4  # relative reduction with new derivatives, below which the secants were accurate enough
 
 
+PIECE = 4000  # samples that are decomposed at once
+
+
 SLIGHT = 0.1  # standard errors: smaller shifts are ignored
 
 
 REFUSED = 1e6  # weighted residual that is assigned if the FMU cannot be simulated
 
 
+Function = Callable[[Array], Array]
 Named = Callable[[Sequence[float]], dict[str, float]]  # values by name for a vector of unknowns
 
 
@@ -129,7 +133,7 @@ def _descended(
         exact, before = slopes.exact, float(np.sum(slopes.residual(x) ** 2))
         near = secants and before < NEAR_NOISE * len(slopes.residual(x))
         found = least_squares(
-            slopes.residual, x, slopes.at if near else slopes.by_differences, bounds,
+            *compressed(slopes.residual, slopes.at if near else slopes.by_differences, x), bounds,
             x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,
         )  # fmt: skip
         x, left = found.x, left - found.nfev
@@ -140,6 +144,28 @@ def _descended(
     if near and not (slopes.exact or (exact and little)):
         slopes.by_differences(x)
     return x, found.status > 0
+
+
+def compressed(residual: Function, jacobian: Function, x: Array) -> tuple[Function, Array, Function]:
+    """Residual (n + 1,), start and Jacobian (n + 1, n) with the same steps as those of m samples.
+
+    They are turned into a basis that begins with the residual, so that all but its first element is zero; a
+    decomposition of samples by samples at each step is not needed then.
+    """
+
+    def length(at: Array) -> Array:
+        return np.append(np.linalg.norm(residual(at)), np.zeros(len(x)))
+
+    def turned(at: Array) -> Array:
+        r, j = residual(at), jacobian(at)
+        R = np.zeros((len(x) + 1,) * 2)
+        for piece in (
+            slice(i, i + PIECE) for i in range(0, len(r), PIECE)
+        ):  # each fits into the processor's cache
+            R = np.asarray(np.linalg.qr(np.vstack([R, np.column_stack([r[piece], j[piece]])]), mode="r"))
+        return np.asarray(np.copysign(1.0, R[0, 0]) * R[:, 1:])
+
+    return length, x, turned
 
 
 def _middle(x: Array, jacobian: Array, scale: Array, low: Array, high: Array) -> Array:
