@@ -133,3 +133,25 @@ def test_names_may_hold_any_character(tmp_path):
         assert fmu[odd] == 123.0
         with pytest.raises(FmuError, match=re.escape(f"{odd} = nan is outside")):
             fmu.set(**{odd: np.nan})
+
+
+@pytest.mark.parametrize("build", [build_carrier, build_coupled], ids=["native", "Python"])
+def test_a_motion_that_is_no_longer_finite_is_refused(vdp, build, tmp_path):
+    path = build(vdp, (PortNames("mass", "u", "x1", "x0"),), (), tmp_path / "container.fmu")
+    with Fmu(path) as fmu:
+        t = np.arange(5) * 1e-3
+        with pytest.raises(
+            FmuError, match="step at t = 0 s: the carried FMU is no longer finite after t = 0 s"
+        ):
+            fmu.simulate(t, {}, ["x0", "x1"], {"x0": 1e200})
+        assert np.isfinite(fmu.simulate(t, {}, ["x0", "x1"], {})).all()
+
+
+def test_a_variable_may_be_set_and_asked_for_more_than_once(base, tmp_path):
+    path = build_carrier(base, (PORT,), (), tmp_path / "native.fmu")
+    with Fmu(path) as fmu:
+        fmu.restart(q=0.1)
+        many = 3 * len(fmu.description.variables)
+        (force,) = fmu.references(["F"])
+        fmu.instance.set([force] * many, [float(k) for k in range(many)])
+        assert fmu.read(["q", "F"] * many) == [0.1, many - 1.0] * many
