@@ -80,13 +80,10 @@ class Fmu:
         sample of their time; or (N-1,), the value held over each step.
         """
         u = np.column_stack([*inputs.values()]) if inputs else np.empty((len(t) - 1, 0))
-        sampled = len(u) == len(t)
         first = dict(zip(inputs, u[0].tolist(), strict=True))
         self.restart(float(t[0]), **{**start, **first})
         y0 = self.read(outputs)
-        acting, ends = ((u[1:] + u[:-1]) / 2, u[1:]) if sampled else (u, None)
-        run = self._instance.run
-        y = self._safely(run, t, acting, self.references(inputs), self.references(outputs), ends)
+        y = self._safely(self._instance.run, t, u, self.references(inputs), self.references(outputs))
         self.time = float(t[-1])
         return np.vstack([y0, y])
 

@@ -157,25 +157,23 @@ class Instance(ABC):
         """What failed and why, for a raw call whose status is above WARNING."""
         return self._failed(what, status)
 
-    def run(
-        self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int], ends: Array | None = None
-    ) -> Array:
-        """Step from t[0] through t with inputs u (N-1, n_u) held over each step; outputs (N-1, n_y).
+    def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
+        """Step from t[0] through t (N,); outputs (N-1, n_y).
 
-        ends: (N-1, n_u), inputs at the end of each step, set before the outputs are read: what depends on
-        an input directly is then that of this very time. The loop of every simulation: raw calls on arrays
-        made once.
+        u: (N-1, n_u), held over each step; or (N, n_u) samples, of which the mean of both ends acts over a
+        step, and the last is set before the outputs are read: what depends on an input directly is then that
+        of this very time. The loop of every simulation: raw calls on arrays made once.
         """
         self._refuse_after_fatal()
         n_u, n_y = len(set_refs), len(get_refs)
         y = np.empty((len(t) - 1, n_y))
         march = _march() if len(t) > LONG else None
         if march is not None:
-            self._compiled(march, t, u, set_refs, get_refs, ends, y)
+            self._compiled(march, t, u, set_refs, get_refs, y)
             return y
         (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
-        times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
-        last = None if ends is None or not n_u else np.ascontiguousarray(ends, dtype=float)
+        times, steps = t.tolist(), np.diff(t).tolist()
+        rows, last = ((u[1:] + u[:-1]) / 2, u[1:]) if n_u and len(u) == len(t) else (u, None)
         into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
         for k, dt in enumerate(steps):
             into[:] = rows[k]
@@ -199,7 +197,6 @@ class Instance(ABC):
         u: Array,
         set_refs: Sequence[int],
         get_refs: Sequence[int],
-        ends: Array | None,
         y: Array,
     ) -> None:
         """The same loop compiled, into y."""
@@ -210,7 +207,6 @@ class Instance(ABC):
             self.component,
             np.ascontiguousarray(t, dtype=float),
             np.ascontiguousarray(u, dtype=float),
-            np.ascontiguousarray(np.empty((0, u.shape[1])) if ends is None else ends, dtype=float),
             np.array(set_refs, dtype=np.uint32),
             np.array(get_refs, dtype=np.uint32),
             y,
