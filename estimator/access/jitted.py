@@ -18,7 +18,7 @@ SET, GET, STEP, RESET, SETUP, ENTER, EXIT, RESTORE = range(8)  # in order of poi
 one, restore = external(WHOLE), external(WHOLE, WHOLE)
 setup2 = external(WHOLE, INT, REAL, REAL, INT, REAL)
 enter3 = external(WHOLE, BOOL, REAL, REAL, BOOL, REAL)
-NO = np.uint8(0)
+NO, REFUSED = np.uint8(0), 3
 
 
 def _initialise(fmi3, fn, component, t0):  # type: ignore[no-untyped-def]
@@ -38,6 +38,7 @@ def _run(fmi3, way, fn, components, saved, set_refs, get_refs, values, out, t, d
     """The loop; see Loop.run."""
     told = np.zeros(4, np.int64)  # event, ends, early, reached
     n, m = values.shape[1], out.shape[1]
+    answers = told.ctypes.data
     into, read = set_refs.ctypes.data, get_refs.ctypes.data
     rows, found = values.ctypes.data, out.ctypes.data
     for i in range(values.shape[0]):
@@ -54,7 +55,9 @@ def _run(fmi3, way, fn, components, saved, set_refs, get_refs, values, out, t, d
         if status <= WARNING and way == 2:
             status = initialise(fmi3, fn, c, t)
         if status <= WARNING and dt > 0:
-            status = advance(fmi3, fn[STEP], c, t, dt, told)
+            status = advance(fmi3, fn[STEP], c, t, dt, answers)
+            if fmi3 and (told[1] | told[2]) != 0:
+                status = np.int32(REFUSED)
         if status <= WARNING:
             status = transfer(fmi3, fn[GET], c, read, m, found + 8 * m * i)
         if status > WARNING:

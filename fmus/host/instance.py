@@ -213,8 +213,9 @@ class Instance(ABC):
             told,
         )
         if k >= 0:
-            ends_run, early = (bool(told[i] & 255) for i in (1, 2))
-            self._refuse_to_stop(float(t[k]), ends_run, early, float(told[3:].view(np.float64)[0]))
+            if status <= WARNING:
+                reached = float(told[3:].view(np.float64)[0])
+                self._refuse_to_stop(float(t[k]), bool(told[1]), bool(told[2]), reached)
             raise CallFailed(self._failed(f"step at t = {t[k]:g} s", status))
 
     def _refuse_to_stop(self, t: float, ends: bool, early: bool, reached: float) -> None:

@@ -17,7 +17,8 @@ types: Any = numba.types
 
 WHOLE, REAL, BOOL, INT = ir.IntType(64), ir.DoubleType(), ir.IntType(8), ir.IntType(32)
 KINDS = {WHOLE: types.int64, REAL: types.float64, BOOL: types.uint8, INT: types.int32}
-WARNING, REFUSED = 1, 3
+WARNING = 1
+STOPPED = -1  # an FMI 3.0 FMU ended a step early, or wants to end the simulation
 YES = np.uint8(1)
 
 
@@ -49,38 +50,34 @@ def _transfer(fmi3, address, component, refs, n, values):  # type: ignore[no-unt
 
 
 def _advance(fmi3, address, component, t, dt, told):  # type: ignore[no-untyped-def]
-    """Make a step; one that an FMI 3.0 FMU ends early counts as refused, and told holds what it answered."""
-    if not fmi3:
-        return step2(address, (component, t, dt, np.int32(1)))
-    told[:] = 0
-    at = told.ctypes.data
-    status = step3(address, (component, t, dt, YES, at, at + 8, at + 16, at + 24))
-    if status > WARNING:
-        told[:] = 0
-    if (told[1] & 255) != 0 or (told[2] & 255) != 0:
-        return np.int32(REFUSED)
-    return status
+    """Make a step; told: address of what FMI 3.0 answers, 8 bytes each for event, ends, early, time."""
+    if fmi3:
+        return step3(address, (component, t, dt, YES, told, told + 8, told + 16, told + 24))
+    return step2(address, (component, t, dt, np.int32(1)))
 
 
 transfer, advance = (numba.njit(cache=True)(function) for function in (_transfer, _advance))
 
 
 def _march(fmi3, calls, component, t, u, set_refs, get_refs, y, told):  # type: ignore[no-untyped-def]
-    """Steps through t; (-1, 0), or the step that failed and its status."""
+    """Steps through t; (-1, 0), or the step that failed and its status or STOPPED."""
     push, step, pull = calls
     n, m = u.shape[1], y.shape[1]
-    into, read = set_refs.ctypes.data, get_refs.ctypes.data
-    rows, found = u.ctypes.data, y.ctypes.data
     mean, sampled = np.empty(n), n > 0 and u.shape[0] == t.shape[0]
+    # addresses are taken once, for every `ctypes` counts a reference
+    into, read = set_refs.ctypes.data, get_refs.ctypes.data
+    rows, found, middle, answers = u.ctypes.data, y.ctypes.data, mean.ctypes.data, told.ctypes.data
     for k in range(t.shape[0] - 1):
         status = np.int32(0)
         for i in range(n if sampled else 0):
             mean[i] = (u[k + 1, i] + u[k, i]) / 2
         if n > 0:
-            acting = mean.ctypes.data if sampled else rows + 8 * n * k
+            acting = middle if sampled else rows + 8 * n * k
             status = transfer(fmi3, push, component, into, n, acting)
         if status <= WARNING:
-            status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], told)
+            status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], answers)
+            if fmi3 and status <= WARNING and (told[1] | told[2]) != 0:
+                return k, np.int32(STOPPED)
         if status <= WARNING and sampled:
             status = transfer(fmi3, push, component, into, n, rows + 8 * n * (k + 1))
         if status <= WARNING:
@@ -94,8 +91,8 @@ def _march(fmi3, calls, component, t, u, set_refs, get_refs, y, told):  # type: 
 def march() -> Callable[..., tuple[int, int]]:
     """The compiled loop with the arguments of _march; it lets other threads run.
 
-    calls: addresses of the functions that set, step and get; u: see Instance.run; told: (4,) int64, what
-    the last step of an FMI 3.0 FMU answered: event, ends, early, the time that it reached.
+    calls: addresses of the functions that set, step and get; u: see Instance.run; told: (4,) int64, all
+    0, becomes what the last step of an FMI 3.0 FMU answered: event, ends, early, the time that it reached.
     """
     compiled: Callable[..., tuple[int, int]] = numba.njit(cache=True, nogil=True)(_march)
     return compiled
