@@ -54,15 +54,16 @@ class ForeignGroup(Group):
 
 
 def _all(work: Work) -> Iterator[Foreign]:
-    """A drive whose step costs next to nothing, by both versions of FMI, and a vehicle on track."""
-    port = PortNames("carriage", "F_ext", "q_dot", "q")
+    """A drive whose step costs next to nothing, by both versions of FMI; a vehicle; a wheelset."""
+    port, folder = PortNames("carriage", "F_ext", "q_dot", "q"), work.folder / "foreign"
     for fmi in (2, 3):
-        path = build_native(Drive(), work.folder / "foreign" / f"drive{fmi}.fmu", fmi=fmi)
+        path = build_native(Drive(), folder / f"drive{fmi}.fmu", fmi=fmi)
         yield Foreign(f"drive, FMI {fmi}", path, (port,), ("F",), ("q", "q_dot", "q_ddot"))
-    vehicle = ModelBuilder("vehicle7dof", work.folder / "foreign")
-    ports = tuple(p for p in vehicle.ports if p.name == "body")
+    vehicle, wheelset = (ModelBuilder(name, folder / name) for name in ("vehicle7dof", "wheelset"))
     inputs = tuple(f"u_{wheel}{of}" for wheel in ("fl", "fr", "rl", "rr") for of in ("", "_dot"))
-    yield Foreign("vehicle, FMI 2", vehicle(()), ports, inputs, ("z1", "phi_y1", "phi_x1"))
+    yield Foreign("vehicle, FMI 2", vehicle(()), vehicle.ports[:1], inputs, ("z1", "phi_y1", "phi_x1"))
+    inputs, outputs = ("y_irr", "y_irr_dot"), ("y", "psi", "y_dot", "psi_dot")
+    yield Foreign("wheelset, FMI 2", wheelset(()), wheelset.ports[:1], inputs, outputs)
 
 
 def _inputs(foreign: Foreign, t: Array) -> dict[str, Array]:

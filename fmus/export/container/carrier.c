@@ -356,8 +356,8 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
         if (!(value[k] >= LEAST[i] && value[k] <= MOST[i]))
             return refuse(m, fmi2Error, "%s = %g is outside %g to %g", NAMES[i], value[k], LEAST[i], MOST[i]);
         m->values[i] = value[k];
-        m->touched[i] = true;
-        laws = laws || !PASSED[i];
+        if (!at_once) m->touched[i] = true;
+        if (!PASSED[i]) laws = true;
         if (!at_once || !PASSED[i]) continue;
         if (passed == N_SET) { /* one of them is set twice */
             if (status <= WARNING) status = set_base(m, references, passed, values);
