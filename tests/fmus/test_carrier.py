@@ -66,6 +66,16 @@ def test_both_containers_move_alike(base, kind, tmp_path):
         assert np.max(np.abs(off[:, 0] - found[:, 0])) > 1e-4  # the effect acts
 
 
+@pytest.mark.parametrize("velocity", ["q_dot", "q_ddot"])
+def test_a_motion_that_an_input_changes_at_once_is_read_after_it(base, velocity, tmp_path):
+    """The carrier reads the motion once a step only where no input acts on it directly."""
+    port, effects = PortNames("carriage", "F_ext", velocity, "q"), EFFECTS["laws at a port"][0]
+    values = {"hysteresis_carriage_F_h": 35.0}
+    native = build_carrier(base, (port,), effects, tmp_path / "native.fmu")
+    python = build_coupled(base, (port,), effects, tmp_path / "python.fmu")
+    assert motion(native, values) == pytest.approx(motion(python, values), rel=1e-12, abs=1e-15)
+
+
 def test_both_containers_have_the_same_variables(base, tmp_path):
     effects = EFFECTS["laws at a port"][0]
     native = build_carrier(base, (PORT,), effects, tmp_path / "native.fmu")

@@ -61,7 +61,7 @@ typedef struct {
     char name[128];
     double values[N_VALUES];
     bool touched[N_VALUES]; /* settable variables whose value the carried FMU must be told */
-    bool failed, running, entered, stepped;
+    bool failed, running, entered, stepped, seen; /* seen: the motion is that of now */
     double start, time; /* s, beginning of the simulation and of its last step */
     double before[AT_LEAST_1(N_MOTION)], motion[AT_LEAST_1(N_MOTION)], told[AT_LEAST_1(N_TOLD)];
     double memory[AT_LEAST_1(N_MEMORY)];
@@ -156,6 +156,15 @@ static bool folder_of(const char *uri, char *folder) {
 
 /* ---- the laws ---- */
 
+/* Read the motion at the ports; once between two steps where no input acts on it directly, for a carried FMU
+   may compute all of its outputs anew after every input. */
+static int see(Instance *m) {
+    if (m->seen) return 0;
+    int status = get_base(m, MOTION, N_MOTION, m->motion);
+    m->seen = MOTION_IS_STATE && status <= WARNING;
+    return status;
+}
+
 /* Set what the laws give, for the middle of a step of length dt. */
 static int by_the_laws(Instance *m, double dt) {
     if (!N_TOLD) return 0;
@@ -207,7 +216,7 @@ static void begin(Instance *m) {
     memcpy(m->values, START, sizeof START);
     memset(m->touched, 0, sizeof m->touched);
     memset(m->motion, 0, sizeof m->motion);
-    m->failed = m->running = m->stepped = false;
+    m->failed = m->running = m->stepped = m->seen = false;
 }
 
 #define TEXT_OF(name) #name
@@ -340,7 +349,9 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
         references[asked] = REFERENCES[i];
         places[asked++] = k;
     }
-    return asked ? read_base(m, references, places, asked, value) : fmi2OK;
+    fmi2Status status = asked ? read_base(m, references, places, asked, value) : fmi2OK;
+    if (!asked || status != fmi2OK || !MOTION_IS_STATE) return status;
+    return answer(m, see(m), __func__); /* while the outputs are computed */
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
@@ -357,6 +368,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
             return refuse(m, fmi2Error, "%s = %g is outside %g to %g", NAMES[i], value[k], LEAST[i], MOST[i]);
         m->values[i] = value[k];
         if (!at_once) m->touched[i] = true;
+        if (!INPUTS[i]) m->seen = false;
         if (!PASSED[i]) laws = true;
         if (!at_once || !PASSED[i]) continue;
         if (passed == N_SET) { /* one of them is set twice */
@@ -369,7 +381,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     if (!at_once) return fmi2OK;
     if (status <= WARNING) status = set_base(m, references, passed, values);
     if (laws) {
-        if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
+        if (status <= WARNING) status = see(m);
         if (status <= WARNING) status = by_the_laws(m, 0.0);
     }
     return answer(m, status, __func__);
@@ -379,13 +391,14 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 static int advance(Instance *m, double t, double duration) {
     bool single = duration <= LONGEST_STEP * (1 + TIME_TOLERANCE / 2); /* as the general case finds, slowly */
     double steps = single ? 1.0 : fmax(1.0, ceil(duration / LONGEST_STEP - TIME_TOLERANCE)), dt = duration / steps;
-    int status = N_TOLD || N_MEMORY ? get_base(m, MOTION, N_MOTION, m->motion) : 0;
+    int status = N_TOLD || N_MEMORY ? see(m) : 0;
     for (double k = 0; k < steps && status <= WARNING; k++) {
         status = by_the_laws(m, dt);
         if (status <= WARNING) status = step_base(m, t + k * dt, dt);
+        m->seen = false;
         if (!N_MEMORY && (!N_TOLD || k + 1 == steps)) continue; /* nobody asks how it moves */
         memcpy(m->before, m->motion, sizeof m->motion);
-        if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
+        if (status <= WARNING) status = see(m);
         if (status <= WARNING) status = remember(m, dt);
     }
     return status;
