@@ -2,11 +2,10 @@
 
 import atexit
 from collections.abc import Callable, Sequence
-from ctypes import CDLL, byref, c_void_p, cast
+from ctypes import CDLL, byref
 from functools import cache, partial
 from typing import Any
 
-import numpy as np
 import pythonfmu  # noqa: F401  the installed one first: FMUs bring copies of it that cannot build
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -19,7 +18,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from fmus.host.instance import Array, Instance, heard
+from fmus.host.instance import Instance, heard
 
 
 @cache
@@ -32,6 +31,9 @@ def _let_go_in_time(binary: str) -> None:
 
 class Fmi2Instance(Instance):
     """An instance by FMI 2.0; its variables are Real ones."""
+
+    FMI3 = False
+    CALLS = ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")
 
     def _started(self, **identity: str) -> Any:
         slave = FMU2Slave(**identity)
@@ -94,43 +96,6 @@ class Fmi2Instance(Instance):
             return status
 
         return step
-
-    def _compiled(
-        self,
-        t: Array,
-        u: Array,
-        set_refs: Sequence[int],
-        get_refs: Sequence[int],
-        ends: Array | None,
-        y: Array,
-    ) -> tuple[int, int] | None:
-        march = _march()
-        if march is None or self._slave.component is None:
-            return None
-        dll = self._slave.dll
-        calls = [cast(f, c_void_p).value for f in (dll.fmi2SetReal, dll.fmi2DoStep, dll.fmi2GetReal)]
-        pointer = self._slave.component
-        k, _, status = march(
-            np.array(calls, dtype=np.int64),
-            int(getattr(pointer, "value", pointer)),
-            np.ascontiguousarray(t, dtype=float),
-            np.ascontiguousarray(u, dtype=float),
-            np.ascontiguousarray(np.empty((0, u.shape[1])) if ends is None else ends, dtype=float),
-            np.array(set_refs, dtype=np.uint32),
-            np.array(get_refs, dtype=np.uint32),
-            y,
-        )
-        return int(k), int(status)
-
-
-@cache
-def _march() -> Callable[..., tuple[int, int, int]] | None:
-    """The compiled loop, or None where numba is not installed."""
-    try:
-        from fmus.host.jitted import march
-    except ImportError:
-        return None
-    return march()
 
 
 def _log(_environment: int, instance: bytes, status: int, _category: bytes, message: bytes) -> None:

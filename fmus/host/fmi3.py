@@ -10,16 +10,14 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from fmus.host.instance import (
-    WARNING,
-    CallFailed,
-    Instance,
-    heard,
-)
+from fmus.host.instance import WARNING, Instance, heard
 
 
 class Fmi3Instance(Instance):
     """An instance by FMI 3.0; its variables are scalar Float64 ones."""
+
+    FMI3 = True
+    CALLS = ("fmi3SetFloat64", "fmi3DoStep", "fmi3GetFloat64")
 
     def _started(self, **identity: str) -> Any:
         name = identity["instanceName"]
@@ -90,10 +88,3 @@ class Fmi3Instance(Instance):
             return status
 
         return step
-
-    def _refuse_to_stop(self, t: float, ends: bool, early: bool, reached: float) -> None:
-        """A step that is not done, or after which no other may follow, is no step here."""
-        if ends:
-            raise CallFailed(self._reason(f"step at t = {t:g} s: it asks to end the simulation"))
-        if early:
-            raise CallFailed(self._reason(f"step at t = {t:g} s: it returned early, at t = {reached:g} s"))

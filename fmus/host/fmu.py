@@ -80,11 +80,10 @@ class Fmu:
         exact to second order for signals sampled from continuous ones, and outputs are read with the
         sample of their time; or (N-1,), the value held over each step.
         """
-        first, acting, ends = _driving(t, inputs)
+        first, u = _driving(t, inputs)
         self.restart(float(t[0]), **{**start, **first})
         y0 = self.read(outputs)
-        run = self._instance.run
-        y = self._safely(run, t, acting, self.references(inputs), self.references(outputs), ends)
+        y = self._safely(self._instance.run, t, u, self.references(inputs), self.references(outputs))
         self.time = float(t[-1])
         return np.vstack([y0, y])
 
@@ -106,7 +105,8 @@ class Fmu:
         """
         if not offers_rows(self._instance):
             return None
-        first, acting, ends = _driving(t, inputs)
+        first, u = _driving(t, inputs)
+        acting, ends = ((u[1:] + u[:-1]) / 2, u[1:]) if len(u) == len(t) else (u, None)
         names = [name for name in starts[0] if name not in first]
         put, get, driven = (np.array(self.references(n), dtype=np.uint32) for n in (names, outputs, inputs))
         rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
@@ -169,8 +169,7 @@ class Fmu:
             raise FmuError(f"{self.name}: {error}") from error
 
 
-def _driving(t: Array, inputs: Mapping[str, Array]) -> tuple[dict[str, float], Array, Array | None]:
-    """The first values of inputs, their values over each step (N-1, n_u), and those after it if sampled."""
+def _driving(t: Array, inputs: Mapping[str, Array]) -> tuple[dict[str, float], Array]:
+    """The first values of inputs by name, and all of them, (N, n_u) or (N-1, n_u)."""
     u = np.column_stack([*inputs.values()]) if inputs else np.empty((len(t) - 1, 0))
-    first = dict(zip(inputs, u[0].tolist(), strict=True)) if inputs else {}
-    return first, *(((u[1:] + u[:-1]) / 2, u[1:]) if len(u) == len(t) else (u, None))
+    return dict(zip(inputs, u[0].tolist(), strict=True)) if inputs else {}, u

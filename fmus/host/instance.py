@@ -5,11 +5,12 @@ import sys
 from abc import ABC, abstractmethod
 from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
-from ctypes import c_double, c_uint
+from ctypes import c_double, c_uint, c_void_p, cast
+from functools import cache
 from itertools import count
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -31,6 +32,9 @@ class CallFailed(Exception):
 
 class Instance(ABC):
     """One instance between instantiation and free; references are FMI value references."""
+
+    FMI3: ClassVar[bool]
+    CALLS: ClassVar[tuple[str, str, str]]  # names of the functions that set, step and get
 
     def __init__(self, archive: Archive, name: str) -> None:
         unique = f"{name}_{next(NUMBERS)}"
@@ -153,27 +157,23 @@ class Instance(ABC):
         """What failed and why, for a raw call whose status is above WARNING."""
         return self._failed(what, status)
 
-    def run(
-        self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int], ends: Array | None = None
-    ) -> Array:
-        """Step from t[0] through t with inputs u (N-1, n_u) held over each step; outputs (N-1, n_y).
+    def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
+        """Step from t[0] through t (N,); outputs (N-1, n_y).
 
-        ends: (N-1, n_u), inputs at the end of each step, set before the outputs are read: what depends on
-        an input directly is then that of this very time. The loop of every simulation: raw calls on arrays
-        made once.
+        u: (N-1, n_u), held over each step; or (N, n_u) samples, of which the mean of both ends acts over a
+        step, and the last is set before the outputs are read: what depends on an input directly is then that
+        of this very time. The loop of every simulation: raw calls on arrays made once.
         """
         self._refuse_after_fatal()
         n_u, n_y = len(set_refs), len(get_refs)
         y = np.empty((len(t) - 1, n_y))
-        failed = self._compiled(t, u, set_refs, get_refs, ends, y) if len(t) > LONG else None
-        if failed is not None:
-            k, status = failed
-            if k >= 0:
-                raise CallFailed(self._failed(f"step at t = {t[k]:g} s", status))
+        march = _march() if len(t) > LONG else None
+        if march is not None:
+            self._compiled(march, t, u, set_refs, get_refs, y)
             return y
         (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
-        times, steps, rows = t.tolist(), np.diff(t).tolist(), np.ascontiguousarray(u, dtype=float)
-        last = None if ends is None or not n_u else np.ascontiguousarray(ends, dtype=float)
+        times, steps = t.tolist(), np.diff(t).tolist()
+        rows, last = ((u[1:] + u[:-1]) / 2, u[1:]) if n_u and len(u) == len(t) else (u, None)
         into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
         for k, dt in enumerate(steps):
             into[:] = rows[k]
@@ -192,18 +192,38 @@ class Instance(ABC):
 
     def _compiled(
         self,
+        march: Callable[..., tuple[int, int]],
         t: Array,
         u: Array,
         set_refs: Sequence[int],
         get_refs: Sequence[int],
-        ends: Array | None,
         y: Array,
-    ) -> tuple[int, int] | None:
-        """The same loop compiled, into y: the step that failed, -1 where none did, and the status.
+    ) -> None:
+        """The same loop compiled, into y."""
+        told = np.zeros(4, dtype=np.int64)
+        k, status = march(
+            self.FMI3,
+            tuple(cast(getattr(self.library, name), c_void_p).value for name in self.CALLS),
+            self.component,
+            np.ascontiguousarray(t, dtype=float),
+            np.ascontiguousarray(u, dtype=float),
+            np.array(set_refs, dtype=np.uint32),
+            np.array(get_refs, dtype=np.uint32),
+            y,
+            told,
+        )
+        if k >= 0:
+            if status <= WARNING:
+                reached = float(told[3:].view(np.float64)[0])
+                self._refuse_to_stop(float(t[k]), bool(told[1]), bool(told[2]), reached)
+            raise CallFailed(self._failed(f"step at t = {t[k]:g} s", status))
 
-        None where there is no compiled loop for this FMU here.
-        """
-        return None
+    def _refuse_to_stop(self, t: float, ends: bool, early: bool, reached: float) -> None:
+        """A step that is not done, or after which no other may follow, is no step here."""
+        if ends:
+            raise CallFailed(self._reason(f"step at t = {t:g} s: it asks to end the simulation"))
+        if early:
+            raise CallFailed(self._reason(f"step at t = {t:g} s: it returned early, at t = {reached:g} s"))
 
     def close(self) -> None:
         """Free the instance and unload the library; one that failed fatally stays where it is."""
@@ -234,6 +254,16 @@ class Instance(ABC):
     def _reason(self, what: str) -> str:
         said = f": {self.messages[-1]}" if self.messages else ""
         return what + said
+
+
+@cache
+def _march() -> Callable[..., tuple[int, int]] | None:
+    """The compiled loop, or None where numba is not installed."""
+    try:
+        from fmus.host.jitted import march
+    except ImportError:
+        return None
+    return march()
 
 
 def address_of(pointer: Any) -> int:

@@ -1,4 +1,4 @@
-"""The loop of a simulation by FMI 2.0, compiled by numba over raw function pointers.
+"""The loop of a simulation, compiled by numba over raw function pointers.
 
 A step of a small native FMU costs less than a call from Python.
 """
@@ -15,13 +15,14 @@ numba: Any = import_module("numba")
 ir: Any = import_module("llvmlite.ir")
 types: Any = numba.types
 
-WHOLE, REAL, INT = ir.IntType(64), ir.DoubleType(), ir.IntType(32)
-KINDS = {WHOLE: types.int64, REAL: types.float64, INT: types.int32}
+WHOLE, REAL, BOOL, INT = ir.IntType(64), ir.DoubleType(), ir.IntType(8), ir.IntType(32)
+KINDS = {WHOLE: types.int64, REAL: types.float64, BOOL: types.uint8, INT: types.int32}
 WARNING = 1
-PUSH, STEP, PULL = range(3)  # which call failed
+STOPPED = -1  # an FMI 3.0 FMU ended a step early, or wants to end the simulation
+YES = np.uint8(1)
 
 
-def _external(*kinds: Any) -> Any:
+def external(*kinds: Any) -> Any:
     """A function f(address, arguments) -> status that compiled code can call; pointers are whole numbers."""
     signature = types.int32(types.int64, types.Tuple([KINDS[k] for k in kinds]))
 
@@ -36,36 +37,62 @@ def _external(*kinds: Any) -> Any:
     return numba.extending.intrinsic(function)
 
 
-transfer = _external(WHOLE, WHOLE, WHOLE, WHOLE)
-advance = _external(WHOLE, REAL, REAL, INT)
+values2, values3 = external(WHOLE, WHOLE, WHOLE, WHOLE), external(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE)
+step2 = external(WHOLE, REAL, REAL, INT)
+step3 = external(WHOLE, REAL, REAL, BOOL, WHOLE, WHOLE, WHOLE, WHOLE)
 
 
-def _march(calls, component, t, u, ends, set_refs, get_refs, y):  # type: ignore[no-untyped-def]
-    """Steps through t; (-1, 0, 0), or the step that failed, the call and its status."""
+def _transfer(fmi3, address, component, refs, n, values):  # type: ignore[no-untyped-def]
+    """Set or get n values."""
+    if fmi3:
+        return values3(address, (component, refs, n, values, n))
+    return values2(address, (component, refs, n, values))
+
+
+def _advance(fmi3, address, component, t, dt, told):  # type: ignore[no-untyped-def]
+    """Make a step; told: address of what FMI 3.0 answers, 8 bytes each for event, ends, early, time."""
+    if fmi3:
+        return step3(address, (component, t, dt, YES, told, told + 8, told + 16, told + 24))
+    return step2(address, (component, t, dt, np.int32(1)))
+
+
+transfer, advance = (numba.njit(cache=True)(function) for function in (_transfer, _advance))
+
+
+def _march(fmi3, calls, component, t, u, set_refs, get_refs, y, told):  # type: ignore[no-untyped-def]
+    """Steps through t; (-1, 0), or the step that failed and its status or STOPPED."""
+    push, step, pull = calls
     n, m = u.shape[1], y.shape[1]
+    mean, sampled = np.empty(n), n > 0 and u.shape[0] == t.shape[0]
+    # addresses are taken once, for every `ctypes` counts a reference
     into, read = set_refs.ctypes.data, get_refs.ctypes.data
-    rows, last, found = u.ctypes.data, ends.ctypes.data, y.ctypes.data
-    settles = ends.shape[0] > 0
+    rows, found, middle, answers = u.ctypes.data, y.ctypes.data, mean.ctypes.data, told.ctypes.data
     for k in range(t.shape[0] - 1):
-        call, status = PUSH, np.int32(0)
+        status = np.int32(0)
+        for i in range(n if sampled else 0):
+            mean[i] = (u[k + 1, i] + u[k, i]) / 2
         if n > 0:
-            status = transfer(calls[PUSH], (component, into, n, rows + 8 * n * k))
+            acting = middle if sampled else rows + 8 * n * k
+            status = transfer(fmi3, push, component, into, n, acting)
         if status <= WARNING:
-            call = STEP
-            status = advance(calls[STEP], (component, t[k], t[k + 1] - t[k], np.int32(1)))
-        if status <= WARNING and settles:
-            call = PUSH
-            status = transfer(calls[PUSH], (component, into, n, last + 8 * n * k))
+            status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], answers)
+            if fmi3 and status <= WARNING and (told[1] | told[2]) != 0:
+                return k, np.int32(STOPPED)
+        if status <= WARNING and sampled:
+            status = transfer(fmi3, push, component, into, n, rows + 8 * n * (k + 1))
         if status <= WARNING:
-            call = PULL
-            status = transfer(calls[PULL], (component, read, m, found + 8 * m * k))
+            status = transfer(fmi3, pull, component, read, m, found + 8 * m * k)
         if status > WARNING:
-            return k, call, status
-    return -1, 0, 0
+            return k, status
+    return -1, 0
 
 
 @cache
-def march() -> Callable[..., tuple[int, int, int]]:
-    """The compiled loop (calls, component, t, u, ends, set_refs, get_refs, y); it lets other threads run."""
-    compiled: Callable[..., tuple[int, int, int]] = numba.njit(cache=True, nogil=True)(_march)
+def march() -> Callable[..., tuple[int, int]]:
+    """The compiled loop with the arguments of _march; it lets other threads run.
+
+    calls: addresses of the functions that set, step and get; u: see Instance.run; told: (4,) int64, all
+    0, becomes what the last step of an FMI 3.0 FMU answered: event, ends, early, the time that it reached.
+    """
+    compiled: Callable[..., tuple[int, int]] = numba.njit(cache=True, nogil=True)(_march)
     return compiled

@@ -66,6 +66,16 @@ def test_both_containers_move_alike(base, kind, tmp_path):
         assert np.max(np.abs(off[:, 0] - found[:, 0])) > 1e-4  # the effect acts
 
 
+@pytest.mark.parametrize("velocity", ["q_dot", "q_ddot"])
+def test_a_motion_that_an_input_changes_at_once_is_read_after_it(base, velocity, tmp_path):
+    """The carrier reads the motion once a step only where no input acts on it directly."""
+    port, effects = PortNames("carriage", "F_ext", velocity, "q"), EFFECTS["laws at a port"][0]
+    values = {"hysteresis_carriage_F_h": 35.0}
+    native = build_carrier(base, (port,), effects, tmp_path / "native.fmu")
+    python = build_coupled(base, (port,), effects, tmp_path / "python.fmu")
+    assert motion(native, values) == pytest.approx(motion(python, values), rel=1e-12, abs=1e-15)
+
+
 def test_both_containers_have_the_same_variables(base, tmp_path):
     effects = EFFECTS["laws at a port"][0]
     native = build_carrier(base, (PORT,), effects, tmp_path / "native.fmu")
@@ -133,3 +143,25 @@ def test_names_may_hold_any_character(tmp_path):
         assert fmu[odd] == 123.0
         with pytest.raises(FmuError, match=re.escape(f"{odd} = nan is outside")):
             fmu.set(**{odd: np.nan})
+
+
+@pytest.mark.parametrize("build", [build_carrier, build_coupled], ids=["native", "Python"])
+def test_a_motion_that_is_no_longer_finite_is_refused(vdp, build, tmp_path):
+    path = build(vdp, (PortNames("mass", "u", "x1", "x0"),), (), tmp_path / "container.fmu")
+    with Fmu(path) as fmu:
+        t = np.arange(5) * 1e-3
+        with pytest.raises(
+            FmuError, match="step at t = 0 s: the carried FMU is no longer finite after t = 0 s"
+        ):
+            fmu.simulate(t, {}, ["x0", "x1"], {"x0": 1e200})
+        assert np.isfinite(fmu.simulate(t, {}, ["x0", "x1"], {})).all()
+
+
+def test_a_variable_may_be_set_and_asked_for_more_than_once(base, tmp_path):
+    path = build_carrier(base, (PORT,), (), tmp_path / "native.fmu")
+    with Fmu(path) as fmu:
+        fmu.restart(q=0.1)
+        many = 3 * len(fmu.description.variables)
+        (force,) = fmu.references(["F"])
+        fmu.instance.set([force] * many, [float(k) for k in range(many)])
+        assert fmu.read(["q", "F"] * many) == [0.1, many - 1.0] * many

@@ -13,6 +13,7 @@ from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.search.dating import dated
+from estimator.closeloop.search.duration import duration_said
 from estimator.closeloop.search.growing import from_the_beginning
 from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.search.nomination import nominated, overlooked
@@ -90,7 +91,8 @@ class Search:
         faults, rest = s.stages.done("faults", lambda: self._faults_first(chosen))
         self.tell(
             "brief fits",
-            f"fitting the {len(rest)} most promising effects in the FMU, with the calibrated parameters",
+            f"fitting the {len(rest)} most promising effects in the FMU, with the calibrated parameters"
+            + duration_said(self.fitter, rest),
         )
         brief = s.stages.done("brief", lambda: self.fitter.briefly(rest))
         brief = best_by_label([*faults, *brief])

@@ -61,8 +61,8 @@ typedef struct {
     char name[128];
     double values[N_VALUES];
     bool touched[N_VALUES]; /* settable variables whose value the carried FMU must be told */
-    bool failed, stale, running, entered;
-    double start;
+    bool failed, running, entered, stepped, seen; /* seen: the motion is that of now */
+    double start, time; /* s, beginning of the simulation and of its last step */
     double before[AT_LEAST_1(N_MOTION)], motion[AT_LEAST_1(N_MOTION)], told[AT_LEAST_1(N_TOLD)];
     double memory[AT_LEAST_1(N_MEMORY)];
     const double *arg[AT_LEAST_1(WORK_ARG)];
@@ -156,6 +156,15 @@ static bool folder_of(const char *uri, char *folder) {
 
 /* ---- the laws ---- */
 
+/* Read the motion at the ports; once between two steps where no input acts on it directly, for a carried FMU
+   may compute all of its outputs anew after every input. */
+static int see(Instance *m) {
+    if (m->seen) return 0;
+    int status = get_base(m, MOTION, N_MOTION, m->motion);
+    m->seen = MOTION_IS_STATE && status <= WARNING;
+    return status;
+}
+
 /* Set what the laws give, for the middle of a step of length dt. */
 static int by_the_laws(Instance *m, double dt) {
     if (!N_TOLD) return 0;
@@ -177,12 +186,6 @@ static int remember(Instance *m, double dt) {
     if (go_on(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
     memcpy(m->values + FIRST_MEMORY, m->memory, N_MEMORY * sizeof(double));
     return 0;
-}
-
-static int look(Instance *m) {
-    int status = get_base(m, REFERENCES, FIRST_MEMORY, m->values);
-    if (status <= WARNING) status = get_base(m, REFERENCES + N_SET, N_VALUES - N_SET, m->values + N_SET);
-    return status;
 }
 
 /* Tell the carried FMU the values of some of the settable variables. */
@@ -213,8 +216,7 @@ static void begin(Instance *m) {
     memcpy(m->values, START, sizeof START);
     memset(m->touched, 0, sizeof m->touched);
     memset(m->motion, 0, sizeof m->motion);
-    m->failed = m->running = false;
-    m->stale = true;
+    m->failed = m->running = m->stepped = m->seen = false;
 }
 
 #define TEXT_OF(name) #name
@@ -317,40 +319,89 @@ fmi2Status fmi2Reset(fmi2Component c) {
     return fmi2OK;
 }
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
-    Instance *m = c;
-    if (m->stale && m->running) {
-        int status = look(m);
-        if (status > WARNING) return answer(m, status, __func__);
-        m->stale = false;
-    }
-    for (size_t i = 0; i < n; i++) {
-        if (vr[i] >= N_VALUES) return refuse(m, fmi2Error, "there is no variable with reference %u", vr[i]);
-        value[i] = m->values[vr[i]];
+/* Read some variables of the carried FMU to their places; after a step they must be finite. */
+static fmi2Status read_base(Instance *m, const unsigned *references, const size_t *places, size_t n, double *value) {
+    double read[N_VALUES];
+    int status = get_base(m, references, n, read);
+    if (status > WARNING) return answer(m, status, "fmi2GetReal");
+    for (size_t k = 0; k < n; k++) {
+        if (m->stepped && !isfinite(read[k]))
+            return refuse(m, fmi2Discard, "the carried FMU is no longer finite after t = %g s", m->time);
+        value[places[k]] = read[k];
     }
     return fmi2OK;
 }
 
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    Instance *m = c;
+    unsigned references[N_VALUES];
+    size_t places[N_VALUES], asked = 0;
+    for (size_t k = 0; k < n; k++) {
+        unsigned i = vr[k];
+        if (i >= N_VALUES) return refuse(m, fmi2Error, "there is no variable with reference %u", i);
+        value[k] = m->values[i];
+        if (!m->running || (i >= FIRST_MEMORY && i < N_SET)) continue;
+        if (asked == N_VALUES) { /* one of them is asked for twice */
+            fmi2Status status = read_base(m, references, places, asked, value);
+            if (status != fmi2OK) return status;
+            asked = 0;
+        }
+        references[asked] = REFERENCES[i];
+        places[asked++] = k;
+    }
+    fmi2Status status = asked ? read_base(m, references, places, asked, value) : fmi2OK;
+    if (!asked || status != fmi2OK || !MOTION_IS_STATE) return status;
+    return answer(m, see(m), __func__); /* while the outputs are computed */
+}
+
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     Instance *m = c;
-    bool some[AT_LEAST_1(N_SET)] = {false}, laws = false;
-    m->stale = true;
+    unsigned references[AT_LEAST_1(N_SET)];
+    double values[AT_LEAST_1(N_SET)];
+    size_t passed = 0;
+    bool at_once = m->running && !m->failed, laws = false;
+    int status = 0;
     for (size_t k = 0; k < n; k++) {
         unsigned i = vr[k];
         if (i >= N_SET) return refuse(m, fmi2Error, "the variable with reference %u is computed and cannot be set", i);
         if (!(value[k] >= LEAST[i] && value[k] <= MOST[i]))
             return refuse(m, fmi2Error, "%s = %g is outside %g to %g", NAMES[i], value[k], LEAST[i], MOST[i]);
         m->values[i] = value[k];
-        m->touched[i] = some[i] = true;
-        laws = laws || !PASSED[i];
+        if (!at_once) m->touched[i] = true;
+        if (!INPUTS[i]) m->seen = false;
+        if (!PASSED[i]) laws = true;
+        if (!at_once || !PASSED[i]) continue;
+        if (passed == N_SET) { /* one of them is set twice */
+            if (status <= WARNING) status = set_base(m, references, passed, values);
+            passed = 0;
+        }
+        references[passed] = REFERENCES[i];
+        values[passed++] = value[k];
     }
-    if (!m->running || m->failed) return fmi2OK;
-    int status = pass_on(m, some);
+    if (!at_once) return fmi2OK;
+    if (status <= WARNING) status = set_base(m, references, passed, values);
     if (laws) {
-        if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
+        if (status <= WARNING) status = see(m);
         if (status <= WARNING) status = by_the_laws(m, 0.0);
     }
     return answer(m, status, __func__);
+}
+
+/* Coupling steps, as many as `duration` needs; the status of the first call that was refused. */
+static int advance(Instance *m, double t, double duration) {
+    bool single = duration <= LONGEST_STEP * (1 + TIME_TOLERANCE / 2); /* as the general case finds, slowly */
+    double steps = single ? 1.0 : fmax(1.0, ceil(duration / LONGEST_STEP - TIME_TOLERANCE)), dt = duration / steps;
+    int status = N_TOLD || N_MEMORY ? see(m) : 0;
+    for (double k = 0; k < steps && status <= WARNING; k++) {
+        status = by_the_laws(m, dt);
+        if (status <= WARNING) status = step_base(m, t + k * dt, dt);
+        m->seen = false;
+        if (!N_MEMORY && (!N_TOLD || k + 1 == steps)) continue; /* nobody asks how it moves */
+        memcpy(m->before, m->motion, sizeof m->motion);
+        if (status <= WARNING) status = see(m);
+        if (status <= WARNING) status = remember(m, dt);
+    }
+    return status;
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real duration, fmi2Boolean no_state_before) {
@@ -358,25 +409,12 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real duration, fmi2Boolea
     (void)no_state_before;
     if (m->failed) return refuse(m, fmi2Discard, "it failed before; reset it");
     if (!(duration > 0 && duration < HUGE_VAL)) return refuse(m, fmi2Discard, "step size %g s is not positive", duration);
-    double steps = fmax(1.0, ceil(duration / LONGEST_STEP - TIME_TOLERANCE)), dt = duration / steps;
-    int status = get_base(m, MOTION, N_MOTION, m->motion);
-    for (double k = 0; k < steps && status <= WARNING; k++) {
-        status = by_the_laws(m, dt);
-        if (status <= WARNING) status = step_base(m, t + k * dt, dt);
-        memcpy(m->before, m->motion, sizeof m->motion);
-        if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
-        if (status <= WARNING) status = remember(m, dt);
-    }
-    if (status <= WARNING) status = look(m);
-    m->stale = false;
-    if (status > WARNING) {
-        m->failed = true;
-        return refuse(m, fmi2Discard, "the carried FMU cannot make the step at t = %g s (status %d)", t, status);
-    }
-    for (size_t i = 0; i < N_VALUES; i++)
-        if (!isfinite(m->values[i]))
-            return refuse(m, fmi2Discard, "the carried FMU is no longer finite after t = %g s", t);
-    return fmi2OK;
+    int status = advance(m, t, duration);
+    m->stepped = true;
+    m->time = t;
+    if (status <= WARNING) return fmi2OK;
+    m->failed = true;
+    return refuse(m, fmi2Discard, "the carried FMU cannot make the step at t = %g s (status %d)", t, status);
 }
 
 #define NONE_OF_TYPE(type)                                                                                    \

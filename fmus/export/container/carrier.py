@@ -92,6 +92,7 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
         "most": [_limit(r, "max", LARGEST) for r in rows[:settable]],
         "references": [max(reference, 0) for reference in references],
         "motion": [references[i] for i in base["motion"]],
+        "motion_is_state": int(_is_state(description, [rows[i]["name"] for i in base["motion"]], made)),
         "told": [references[i] for i in base["told"]],
         "passed": [int(references[i] >= 0 and i not in told) for i in range(settable)],
         "inputs": [int(n_states <= i < n_states + n_inputs) for i in range(settable)],
@@ -105,6 +106,15 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     }
     standard = {n: (headers / n).read_bytes() for n in (*STANDARD[2], *STANDARD[3])}
     return standard | {name: content.encode() for name, content in files.items()}
+
+
+def _is_state(description: FmuDescription, motion: Sequence[str], made: Laws) -> bool:
+    """Whether laws want the motion at the ports and no input changes it before the next step, as declared.
+
+    A law that sets a parameter may change it.
+    """
+    depends = [description.dependencies.get(name, ("unknown",)) for name in motion]
+    return bool(made.told) and {*made.told} <= {*description.inputs} and not any(depends)
 
 
 def _c(words: str) -> str:
