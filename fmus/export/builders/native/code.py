@@ -17,7 +17,7 @@ from fmus.variables import Expr
 HERE = Path(__file__).parent
 WRAPPER = (
     "fmu.c", "quick.c", "instance.h", "instance.c", "values.c", "stepping.c", "states.c", "derivatives.c",
-    "lanes.c", "lanes.h", "lanes_processors.c", "lanes_rows.c",
+    "lanes.c", "lanes.h", "lanes_rows.c",
 )  # fmt: skip
 INTERFACE = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 STANDARD = {  # headers of the standard, under its 2-clause BSD licence, as FMPy brings them

@@ -83,15 +83,18 @@ def lanes_of(functions: Sequence[cs.Function]) -> Lanes | None:
         bodies = [printer.body(function) for function in functions]
     except NotImplementedError:
         return None
-    declared = [f"CALLED void LANES({name}){ARGUMENTS};" for name in printer.functions]
-    own = [_definition("static", f.name(), body) for f, body in zip(functions, bodies, strict=True)]
+    declared = [f"CALLED {name}{ARGUMENTS};" for name in printer.functions]
+    own = [
+        _definition("VECTORS static void", f"lanes_{f.name()}", body)
+        for f, body in zip(functions, bodies, strict=True)
+    ]
     called = [_definition("CALLED", name, body) for name, body in printer.functions.items()]
     return Lanes(_file([*declared, *own]), _file([*printer.tables.values(), *called]) if called else "")
 
 
 def _definition(kind: str, name: str, body: Sequence[str]) -> str:
     lines = "\n".join(f"    {line}" for line in body)
-    return f"{kind} void LANES({name}){ARGUMENTS} {{\n    (void)x;\n{lines}\n}}\n"
+    return f"{kind} {name}{ARGUMENTS} {{\n    (void)x;\n{lines}\n}}\n"
 
 
 def _file(parts: Sequence[str]) -> str:
@@ -112,7 +115,7 @@ class _Printer:
         key = hash(function)
         if key not in self._names:
             body = self.body(function)
-            self._names[key] = f"{function.name()}_{_digest(body)}"
+            self._names[key] = f"lanes_{function.name()}_{_digest(body)}"
             self._kept.append(function)
             self.functions[self._names[key]] = body
         return self._names[key]
@@ -138,7 +141,7 @@ class _Printer:
         into = [f"in[{i}] = {value};" for i, value in enumerate(given)]
         out = [f"{place} = out[{i}];" for i, place in enumerate(wanted) if place]
         declared = f"Lanes in[{max(1, len(given))}], out[{n}];"
-        return ["{", declared, *into, f"LANES({name})(in, out);", *out, "}"]
+        return ["{", declared, *into, f"{name}(in, out);", *out, "}"]
 
     def _scalars(self, function: cs.Function) -> list[str]:
         """An SX function: its instructions, one after the other."""
@@ -165,16 +168,16 @@ class _Printer:
 
     def _switch(self, function: cs.Function) -> list[str]:
         """A choice of one of several functions by the first argument: one call if all lanes agree."""
-        calls = [f"LANES({self._of(case)})" for case in _cases(function)]
+        calls = [self._of(case) for case in _cases(function)]
         n = function.nnz_out()
-        lines = [f"int chosen[4], one = LANES(same_case)(x, {len(calls) - 1}, chosen);", f"Lanes part[{n}];"]
+        lines = [f"int chosen[4], one = lanes_same_case(x, {len(calls) - 1}, chosen);", f"Lanes part[{n}];"]
         for i, call in enumerate(calls):
             lines.append(f"if (one == {i}) {call}(x + 1, y);")
         lines.append(f"if (one < 0) for (int k = 0; k < {len(calls)}; k++) {{")
         lines.append("if (k != chosen[0] && k != chosen[1] && k != chosen[2] && k != chosen[3]) continue;")
         for i, call in enumerate(calls):
             lines.append(f"if (k == {i}) {call}(x + 1, part);")
-        lines.append(f"LANES(take_lanes)(part, y, {n}, chosen, k);")
+        lines.append(f"lanes_taken(part, y, {n}, chosen, k);")
         return [*lines, "}"]
 
     def _matrices(self, function: cs.Function) -> list[str]:
@@ -228,9 +231,8 @@ class _Printer:
         values = table.nonzeros()
         written = ", ".join(map(_number, values))
         name = f"TABLE_{_digest([written])}"
-        guard = f"#ifndef {name}_KNOWN\n#define {name}_KNOWN"
-        self.tables[name] = f"{guard}\nstatic const double {name}[] = {{{written}}};\n#endif"
-        return f"LANES(lanes_rows)({name}, {len(values)}, &{number}, {inner['stop']}, {to});"
+        self.tables[name] = f"static const double {name}[] = {{{written}}};"
+        return f"lanes_rows({name}, {len(values)}, &{number}, {inner['stop']}, {to});"
 
 
 def _digest(lines: Sequence[str]) -> str:
@@ -283,7 +285,7 @@ def _operation(code: int, to: str, of: list[str]) -> str:
     if code in BINARY:
         return f"{to} = {BINARY[code].format(a=of[0], b=of[1])};"
     if code in CALLED:
-        return f"{{ Lanes r; LANES({CALLED[code]})({', '.join(f'&{name}' for name in of)}, &r); {to} = r; }}"
+        return f"{{ Lanes r; {CALLED[code]}({', '.join(f'&{name}' for name in of)}, &r); {to} = r; }}"
     if code in ONE_BY_ONE:
         given = ", ".join(f"({name})[i]" for name in of)
         return f"{{ Lanes r; for (int i = 0; i < 4; i++) r[i] = {ONE_BY_ONE[code]}({given}); {to} = r; }}"

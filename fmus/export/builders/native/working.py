@@ -11,7 +11,7 @@ from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import table
 from fmus.model import Model, equations
 
-CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes_processors.c", "lanes.h", "quick.c")
+CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes.h", "quick.c")
 
 
 def build_working(model: Model, out: Path) -> Path:

@@ -4,16 +4,18 @@
 
 #if defined(__GNUC__) && HAS_LANES
 
+/* Whether processor and system have the vectors that the code is for. */
 #if defined(__x86_64__)
 #include <cpuid.h>
 
-/* Whether processor and system have vectors of four doubles. */
-static bool has_avx2(void) {
+static bool has_vectors(void) {
     unsigned a, b, c, d, low, high;
     if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX)) return false;
     __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
     return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & bit_AVX2);
 }
+#else
+static bool has_vectors(void) { return true; }
 #endif
 
 /* What is asked: rows of values to set at first, samples of inputs that all rows share, what to read. */
@@ -35,16 +37,19 @@ typedef struct {
     int processor;      /* 0 at first; then what is known, for the question takes longer than a step */
 } Rows;
 
-enum { ANY = 1, AVX2 };
+enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
 
-#define WITH_ROWS
 #ifdef FOR_THIS_MACHINE
-#define CALLED __attribute__((visibility("hidden")))
+#define CALLED VECTORS __attribute__((visibility("hidden"))) void
 #else
-#define CALLED static __attribute__((noinline))
-#define WITH_CALLED
+#define CALLED VECTORS static __attribute__((noinline)) void
 #endif
-#include "lanes_processors.c"
+#include "lanes.h"
+#ifndef FOR_THIS_MACHINE
+#include "lanes_called.c"
+#endif
+#include "lanes_equations.c"
+#include "lanes_rows.c"
 
 #if defined(FMI2_OVERRIDE_FUNCTION_PREFIX) || defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
 #define ROWS railfmi_rows
@@ -57,7 +62,14 @@ enum { ANY = 1, AVX2 };
 #define LANES_PREFIXED(prefix, name) LANES_JOINED(prefix, name)
 
 /* -1, or the first row that cannot be set or advanced; an instance of its own tells why. */
-__attribute__((visibility("default"))) long long ROWS(Rows *asked) {
+#if FMI_VERSION == 2
+FMI2_Export
+#else
+FMI3_Export
+#endif
+long long ROWS(Rows *asked) {
+    if (!asked->processor) asked->processor = has_vectors() ? WITH_VECTORS : WITHOUT_VECTORS;
+    if (asked->processor == WITHOUT_VECTORS) return 0;
     if (asked->n_base != N_SET || asked->n_samples == 0) return 0;
     for (size_t k = 0; k < N_SET; k++)
         if (!within((unsigned)k, asked->base[k])) return 0;
@@ -70,15 +82,6 @@ __attribute__((visibility("default"))) long long ROWS(Rows *asked) {
     for (size_t i = 0; i < asked->n_rows; i++)
         for (size_t k = 0; k < asked->n_put; k++)
             if (!within(asked->put[k], asked->rows[i * asked->n_put + k])) return (long long)i;
-    long long (*four_rows)(const Rows *, size_t) = NULL;
-#ifdef FOR_ANY
-    four_rows = four_rows_any;
-#endif
-#if defined(__x86_64__)
-    if (!asked->processor) asked->processor = has_avx2() ? AVX2 : ANY;
-    if (asked->processor == AVX2) four_rows = four_rows_avx2;
-#endif
-    if (!four_rows) return 0;
     long long failed = -1;
     for (size_t row = 0; row < asked->n_rows && failed < 0; row += 4) failed = four_rows(asked, row);
     return failed;

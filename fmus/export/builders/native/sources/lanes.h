@@ -1,7 +1,4 @@
-/* Four doubles at once: operations of the equations that C has no sign for. Included once for each processor. */
-
-#ifndef LANES_KNOWN
-#define LANES_KNOWN
+/* Four doubles at once: operations of the equations that C has no sign for. */
 
 typedef double Lanes __attribute__((vector_size(32)));
 typedef long long Bits __attribute__((vector_size(32)));
@@ -17,13 +14,18 @@ static inline double sign_of(double x) { return x < 0 ? -1.0 : x > 0 ? 1.0 : x; 
 #define SIGN_BITS ALL(-0.0)
 #define EACH(i) for (int i = 0; i < 4; i++)
 #define ROUNDING 6755399441055744.0 /* 1.5 times 2 to the 52nd: what is added to it loses its fraction */
-#define ONLY static inline __attribute__((always_inline, unused)) void
+#if defined(__x86_64__)
+#define VECTORS __attribute__((target("avx2")))
+#else
+#define VECTORS
+#endif
+#define ONLY VECTORS static inline __attribute__((always_inline, unused)) void
 
 /* Numbers that a series does not cover are left to C's library, lane after lane. */
 #define LIBRARY_UNLESS(condition, function)                                                                       \
     {                                                                                                             \
         Bits covered = (Bits)(condition);                                                                         \
-        if (!USUALLY(LANES(everywhere)(&covered))) {                                                              \
+        if (!USUALLY(lanes_everywhere(&covered))) {                                                              \
             Lanes x = *a, r;                                                                                      \
             EACH(i) r[i] = function(x[i]);                                                                        \
             *y = r;                                                                                               \
@@ -31,9 +33,7 @@ static inline double sign_of(double x) { return x < 0 ? -1.0 : x > 0 ? 1.0 : x; 
         }                                                                                                         \
     }
 
-#endif
-
-ONLY LANES(lanes_sqrt)(const Lanes *a, Lanes *y) {
+ONLY lanes_sqrt(const Lanes *a, Lanes *y) {
 #if defined(__clang__)
     *y = __builtin_elementwise_sqrt(*a);
 #else
@@ -43,20 +43,20 @@ ONLY LANES(lanes_sqrt)(const Lanes *a, Lanes *y) {
 #endif
 }
 
-ONLY LANES(lanes_floor)(const Lanes *a, Lanes *y) {
+ONLY lanes_floor(const Lanes *a, Lanes *y) {
     Lanes x = *a, cut = (x + ROUNDING) - ROUNDING;
     cut = cut - TRUTH(cut > x);
     *y = CHOICE(MAGNITUDE(x) < 1e15, cut, x); /* larger numbers are whole, or not finite */
 }
 
 /* Whether all lanes of a condition hold. */
-static inline __attribute__((always_inline)) bool LANES(everywhere)(const Bits *condition) {
+VECTORS static inline __attribute__((always_inline)) bool lanes_everywhere(const Bits *condition) {
     const Bits c = *condition;
     return (c[0] & c[1] & c[2] & c[3]) != 0;
 }
 
 /* e to the x: 2 to a whole number times the Taylor series of what is left, up to 0.35. */
-ONLY LANES(lanes_exp)(const Lanes *a, Lanes *y) {
+ONLY lanes_exp(const Lanes *a, Lanes *y) {
     LIBRARY_UNLESS(MAGNITUDE(*a) < 700.0, exp)
     Lanes x = *a, shifted = x * 1.4426950408889634 + ROUNDING, n = shifted - ROUNDING;
     Lanes r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10; /* ln 2 in two parts */
@@ -78,7 +78,7 @@ ONLY LANES(lanes_exp)(const Lanes *a, Lanes *y) {
 }
 
 /* Sine and cosine by the polynomials of fdlibm (k_sin.c, k_cos.c) after removal of quarter turns. */
-ONLY LANES(lanes_wave)(const Lanes *a, int ahead, Lanes *y) {
+ONLY lanes_wave(const Lanes *a, int ahead, Lanes *y) {
     Lanes x = *a, shifted = x * 6.36619772367581382433e-01 + ROUNDING, n = shifted - ROUNDING;
     Lanes r = ((x - n * 1.57079632673412561417e+00) - n * 6.07710050630396597660e-11) - n * 2.02226624879595063154e-21;
     Lanes z = r * r;
@@ -99,18 +99,18 @@ ONLY LANES(lanes_wave)(const Lanes *a, int ahead, Lanes *y) {
     *y = CHOICE((turns & 2) != 0, -found, found);
 }
 
-ONLY LANES(lanes_sin)(const Lanes *a, Lanes *y) {
+ONLY lanes_sin(const Lanes *a, Lanes *y) {
     LIBRARY_UNLESS(MAGNITUDE(*a) < 1e5, sin)
-    LANES(lanes_wave)(a, 0, y);
+    lanes_wave(a, 0, y);
 }
 
-ONLY LANES(lanes_cos)(const Lanes *a, Lanes *y) {
+ONLY lanes_cos(const Lanes *a, Lanes *y) {
     LIBRARY_UNLESS(MAGNITUDE(*a) < 1e5, cos)
-    LANES(lanes_wave)(a, 1, y);
+    lanes_wave(a, 1, y);
 }
 
 /* Arc tangent by the rational function of Cephes (atan.c), up to 0.66; beyond it by a quarter or half of pi. */
-ONLY LANES(lanes_atan)(const Lanes *a, Lanes *y) {
+ONLY lanes_atan(const Lanes *a, Lanes *y) {
     Lanes x = *a, size = MAGNITUDE(x);
     Bits large = (Bits)(size > 2.41421356237309504880), middle = (Bits)(size > 0.66) & ~large;
     Lanes over = CHOICE(large, ALL(-1.0), CHOICE(middle, size - 1.0, size));
@@ -132,10 +132,10 @@ ONLY LANES(lanes_atan)(const Lanes *a, Lanes *y) {
 }
 
 /* Hyperbolic tangent by the rational function of Cephes (tanh.c), and by exp beyond 0.625. */
-ONLY LANES(lanes_tanh)(const Lanes *a, Lanes *y) {
+ONLY lanes_tanh(const Lanes *a, Lanes *y) {
     Lanes x = *a, size = MAGNITUDE(x), z = x * x, twice = size + size, power;
     twice = CHOICE(twice < 80.0, twice, ALL(80.0)); /* the tangent is 1 there; so it is where x is not a number */
-    LANES(lanes_exp)(&twice, &power);
+    lanes_exp(&twice, &power);
     Lanes p = z * -9.64399179425052238628e-1 - 9.92877231001918586564e1;
     p = p * z - 1.61468768441708447952e3;
     Lanes q = z + 1.12811678491632931402e2;
@@ -145,11 +145,11 @@ ONLY LANES(lanes_tanh)(const Lanes *a, Lanes *y) {
     *y = CHOICE((size < 0.625) | (x != x), near, far);
 }
 
-ONLY LANES(lanes_pow)(const Lanes *a, const Lanes *b, Lanes *y) {
+ONLY lanes_pow(const Lanes *a, const Lanes *b, Lanes *y) {
     Lanes base = *a, exponent = *b, r = base;
     Bits plain = (Bits)(exponent == 1.0), alike = (Bits)(base == ALL(base[0])) & (Bits)(exponent == ALL(exponent[0]));
-    if (!USUALLY(LANES(everywhere)(&plain))) {
-        if (LANES(everywhere)(&alike)) /* as for parameters that all rows share */
+    if (!USUALLY(lanes_everywhere(&plain))) {
+        if (lanes_everywhere(&alike)) /* as for parameters that all rows share */
             r = ALL(1.0) * quick_pow(base[0], exponent[0]);
         else
             EACH(i) r[i] = quick_pow(base[i], exponent[i]);
@@ -158,7 +158,7 @@ ONLY LANES(lanes_pow)(const Lanes *a, const Lanes *b, Lanes *y) {
 }
 
 /* n elements of a table one after the other, from a place on that differs from lane to lane. */
-ONLY LANES(lanes_rows)(const double *table, long long size, const Lanes *number, int n, Lanes *y) {
+ONLY lanes_rows(const double *table, long long size, const Lanes *number, int n, Lanes *y) {
     const double *row[4];
     Lanes at = *number;
     bool inside = true;
@@ -188,7 +188,7 @@ ONLY LANES(lanes_rows)(const double *table, long long size, const Lanes *number,
 }
 
 /* The case of each lane, as C's switch takes it, and the one of all lanes, or -1 where they differ. */
-static inline __attribute__((unused)) int LANES(same_case)(const Lanes *number, int last, int *chosen) {
+VECTORS static inline __attribute__((unused)) int lanes_same_case(const Lanes *number, int last, int *chosen) {
     bool same = true;
     EACH(i) {
         double one = (*number)[i];
@@ -199,6 +199,6 @@ static inline __attribute__((unused)) int LANES(same_case)(const Lanes *number, 
 }
 
 /* Results of one case for the lanes that chose it. */
-static inline __attribute__((unused)) void LANES(take_lanes)(const Lanes *part, Lanes *y, int n, const int *chosen, int k) {
+VECTORS static inline __attribute__((unused)) void lanes_taken(const Lanes *part, Lanes *y, int n, const int *chosen, int k) {
     for (int j = 0; j < n; j++) EACH(i) if (chosen[i] == k) y[j][i] = part[j][i];
 }

@@ -8,7 +8,6 @@
 #undef pow
 #undef floor
 
-#define FOR_THIS_MACHINE
-#define CALLED __attribute__((visibility("hidden")))
-#define WITH_CALLED
-#include "lanes_processors.c"
+#include "lanes.h"
+#define CALLED VECTORS __attribute__((visibility("hidden"))) void
+#include "lanes_called.c"

@@ -1,11 +1,11 @@
-/* Four rows through the samples. Included once for each processor. */
+/* Four rows through the samples. */
 
 typedef struct {
     Lanes values[N_SET], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
-} LANES(Four);
+} Four;
 
 /* The arguments of the equations one after the other: states, inputs and parameters are so already. */
-static bool LANES(advance_four)(LANES(Four) *m, double duration, int active) {
+VECTORS static bool advance_four(Four *m, double duration, int active) {
     Lanes given[N_SET + 1], next[N_STATES + 1];
     double done[4] = {0}, h_now[4];
     bool moving[4];
@@ -19,7 +19,7 @@ static bool LANES(advance_four)(LANES(Four) *m, double duration, int active) {
         EACH(i) if (moving[i]) h[i] = h_now[i] = least(least(h_now[i], LONGEST_STEP), duration - done[i]);
         memcpy(given, m->values, sizeof m->values);
         given[N_SET] = h;
-        LANES(step)(given, next);
+        lanes_step(given, next);
         EACH(i) {
             if (!moving[i]) continue;
             double error = next[N_STATES][i];
@@ -40,14 +40,14 @@ static bool LANES(advance_four)(LANES(Four) *m, double duration, int active) {
     return true;
 }
 
-static void LANES(read_four)(LANES(Four) *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
+VECTORS static void read_four(Four *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
     bool outputs = false, slopes = false;
     for (size_t k = 0; k < asked->n_get; k++) {
         outputs = outputs || (asked->get[k] >= N_SET && asked->get[k] < FIRST_LOCAL);
         slopes = slopes || asked->get[k] >= FIRST_LOCAL;
     }
-    if (outputs) LANES(h)(m->values, m->outputs);
-    if (slopes) LANES(f)(m->values, m->slopes);
+    if (outputs) lanes_h(m->values, m->outputs);
+    if (slopes) lanes_f(m->values, m->slopes);
     for (size_t k = 0; k < asked->n_get; k++) {
         unsigned from = asked->get[k];
         const Lanes *value = from < N_SET         ? &m->values[from]
@@ -58,7 +58,7 @@ static void LANES(read_four)(LANES(Four) *m, const Rows *asked, size_t row, size
     }
 }
 
-static bool LANES(set_inputs)(LANES(Four) *m, const Rows *asked, const double *samples, size_t k) {
+VECTORS static bool set_inputs(Four *m, const Rows *asked, const double *samples, size_t k) {
     for (size_t j = 0; j < asked->n_inputs; j++) {
         double x = samples[k * asked->n_inputs + j];
         if (!within(asked->inputs[j], x)) return false;
@@ -68,8 +68,8 @@ static bool LANES(set_inputs)(LANES(Four) *m, const Rows *asked, const double *s
 }
 
 /* -1, or the first of the four rows from this one on, if one of them cannot be advanced. */
-static long long LANES(four_rows)(const Rows *asked, size_t row) {
-    LANES(Four) m;
+VECTORS static long long four_rows(const Rows *asked, size_t row) {
+    Four m;
     int active = asked->n_rows - row < 4 ? (int)(asked->n_rows - row) : 4;
     size_t first = asked->first ? 1 : 0, n_found = asked->n_samples - 1 + first;
     for (int k = 0; k < N_SET; k++) m.values[k] = ALL(asked->base[k]);
@@ -78,12 +78,12 @@ static long long LANES(four_rows)(const Rows *asked, size_t row) {
             size_t from = row + (size_t)(i < active ? i : 0); /* lanes without a row do as the first one */
             m.values[asked->put[k]][i] = asked->rows[from * asked->n_put + k];
         }
-    if (first) LANES(read_four)(&m, asked, row, 0, n_found, active);
+    if (first) read_four(&m, asked, row, 0, n_found, active);
     for (size_t k = 0; k + 1 < asked->n_samples; k++) {
-        if (!LANES(set_inputs)(&m, asked, asked->during, k)) return (long long)row;
-        if (!LANES(advance_four)(&m, asked->t[k + 1] - asked->t[k], active)) return (long long)row;
-        if (asked->after && !LANES(set_inputs)(&m, asked, asked->after, k)) return (long long)row;
-        LANES(read_four)(&m, asked, row, k + first, n_found, active);
+        if (!set_inputs(&m, asked, asked->during, k)) return (long long)row;
+        if (!advance_four(&m, asked->t[k + 1] - asked->t[k], active)) return (long long)row;
+        if (asked->after && !set_inputs(&m, asked, asked->after, k)) return (long long)row;
+        read_four(&m, asked, row, k + first, n_found, active);
     }
     return -1;
 }
