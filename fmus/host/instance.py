@@ -167,13 +167,13 @@ class Instance(ABC):
         self._refuse_after_fatal()
         n_u, n_y = len(set_refs), len(get_refs)
         y = np.empty((len(t) - 1, n_y))
+        rows, last = ((u[1:] + u[:-1]) / 2, u[1:]) if n_u and len(u) == len(t) else (u, None)
         march = _march() if len(t) > LONG else None
         if march is not None:
-            self._compiled(march, t, u, set_refs, get_refs, y)
+            self._compiled(march, t, rows, last, set_refs, get_refs, y)
             return y
         (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
         times, steps = t.tolist(), np.diff(t).tolist()
-        rows, last = ((u[1:] + u[:-1]) / 2, u[1:]) if n_u and len(u) == len(t) else (u, None)
         into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
         for k, dt in enumerate(steps):
             into[:] = rows[k]
@@ -195,6 +195,7 @@ class Instance(ABC):
         march: Callable[..., tuple[int, int]],
         t: Array,
         u: Array,
+        ends: Array | None,
         set_refs: Sequence[int],
         get_refs: Sequence[int],
         y: Array,
@@ -207,6 +208,7 @@ class Instance(ABC):
             self.component,
             np.ascontiguousarray(t, dtype=float),
             np.ascontiguousarray(u, dtype=float),
+            np.ascontiguousarray(u[:0] if ends is None else ends, dtype=float),
             np.array(set_refs, dtype=np.uint32),
             np.array(get_refs, dtype=np.uint32),
             y,

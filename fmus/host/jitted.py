@@ -59,27 +59,25 @@ def _advance(fmi3, address, component, t, dt, told):  # type: ignore[no-untyped-
 transfer, advance = (numba.njit(cache=True)(function) for function in (_transfer, _advance))
 
 
-def _march(fmi3, calls, component, t, u, set_refs, get_refs, y, told):  # type: ignore[no-untyped-def]
+def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told):  # type: ignore[no-untyped-def]
     """Steps through t; (-1, 0), or the step that failed and its status or STOPPED."""
     push, step, pull = calls
     n, m = u.shape[1], y.shape[1]
-    mean, sampled = np.empty(n), n > 0 and u.shape[0] == t.shape[0]
     # addresses are taken once, for every `ctypes` counts a reference
     into, read = set_refs.ctypes.data, get_refs.ctypes.data
-    rows, found, middle, answers = u.ctypes.data, y.ctypes.data, mean.ctypes.data, told.ctypes.data
+    rows, last = u.ctypes.data, ends.ctypes.data
+    found, answers = y.ctypes.data, told.ctypes.data
+    settles = n > 0 and ends.shape[0] > 0
     for k in range(t.shape[0] - 1):
         status = np.int32(0)
-        for i in range(n if sampled else 0):
-            mean[i] = (u[k + 1, i] + u[k, i]) / 2
         if n > 0:
-            acting = middle if sampled else rows + 8 * n * k
-            status = transfer(fmi3, push, component, into, n, acting)
+            status = transfer(fmi3, push, component, into, n, rows + 8 * n * k)
         if status <= WARNING:
             status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], answers)
             if fmi3 and status <= WARNING and (told[1] | told[2]) != 0:
                 return k, np.int32(STOPPED)
-        if status <= WARNING and sampled:
-            status = transfer(fmi3, push, component, into, n, rows + 8 * n * (k + 1))
+        if status <= WARNING and settles:
+            status = transfer(fmi3, push, component, into, n, last + 8 * n * k)
         if status <= WARNING:
             status = transfer(fmi3, pull, component, read, m, found + 8 * m * k)
         if status > WARNING:
@@ -91,8 +89,9 @@ def _march(fmi3, calls, component, t, u, set_refs, get_refs, y, told):  # type: 
 def march() -> Callable[..., tuple[int, int]]:
     """The compiled loop with the arguments of _march; it lets other threads run.
 
-    calls: addresses of the functions that set, step and get; u: see Instance.run; told: (4,) int64, all
-    0, becomes what the last step of an FMI 3.0 FMU answered: event, ends, early, the time that it reached.
+    calls: addresses of the functions that set, step and get; u: (N-1, n_u) acts over a step; ends: (N-1, n_u)
+    is set after it, (0, n_u) for none; told: (4,) int64, all 0, becomes what the last step of an FMI 3.0 FMU
+    answered: event, ends, early, the time that it reached.
     """
     compiled: Callable[..., tuple[int, int]] = numba.njit(cache=True, nogil=True)(_march)
     return compiled
