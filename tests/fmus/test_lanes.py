@@ -116,6 +116,9 @@ def test_a_function_with_an_operation_without_lanes_has_none():
     x = cs.SX.sym("x")
     assert lanes_of([cs.Function("plain", [x], [cs.sin(x)])]) is not None
     assert lanes_of([cs.Function("erf", [x], [cs.erf(x)])]) is None
+    q = cs.MX.sym("q", 2, 2)
+    assert lanes_of([cs.Function("dense", [q], [q.T])]) is not None
+    assert lanes_of([cs.Function("sparse", [q], [cs.densify(cs.project(q, cs.Sparsity.lower(2)).T)])]) is None
 
 
 def test_a_choice_that_differs_from_row_to_row_is_made_for_each(tmp_path):

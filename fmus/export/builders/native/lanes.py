@@ -189,6 +189,8 @@ class _Printer:
         for k in range(function.n_instructions()):
             code, node = function.instruction_id(k), function.instruction_MX(k)
             to, of = function.instruction_output(k), function.instruction_input(k)
+            if code != cs.OP_OUTPUT and not node.is_dense():
+                raise NotImplementedError(f"{function.name()} computes with sparse matrices")
             if code == cs.OP_OUTPUT:
                 start = first_out[node.info()["ind"]] + node.info()["offset"]
                 lines += [f"y[{start + i}] = {name};" for i, name in enumerate(_elements(held[of[0]]))]
