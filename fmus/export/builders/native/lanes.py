@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import casadi as cs
 
+OF_A_TABLE = 2  # arguments of a look-up: the table, the place
 ARGUMENTS = "(const Lanes *x, Lanes *y)"
 UNARY = {
     cs.OP_ASSIGN: "{a}",
@@ -122,9 +123,9 @@ class _Printer:
 
     def body(self, function: cs.Function) -> list[str]:
         """The lines of a function of arrays x and y; NotImplementedError if an operation has no lanes."""
-        patterns = [function.sparsity_in(i) for i in range(function.n_in())]
-        patterns += [function.sparsity_out(i) for i in range(function.n_out())]
-        if not all(pattern.is_dense() for pattern in patterns):
+        given = (function.sparsity_in(i) for i in range(function.n_in()))
+        results = (function.sparsity_out(i) for i in range(function.n_out()))
+        if not all(pattern.is_dense() for pattern in (*given, *results)):
             raise NotImplementedError(f"{function.name()} has sparse arguments or results")
         kinds: dict[str, Callable[[cs.Function], list[str]]] = {
             "SXFunction": self._scalars,
@@ -145,14 +146,12 @@ class _Printer:
 
     def _scalars(self, function: cs.Function) -> list[str]:
         """An SX function: its instructions, one after the other."""
-        first_in = _offsets(function.nnz_in, function.n_in())
-        first_out = _offsets(function.nnz_out, function.n_out())
+        first_in, first_out = _first(function)
         lines = [f"Lanes w[{max(1, function.sz_w())}];"]
         instructions = function.instructions_sx()
         for k in range(function.n_instructions()):
-            code, to, of = (
-                function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-            )  # fmt: skip
+            code = function.instruction_id(k)
+            to, of = function.instruction_output(k), function.instruction_input(k)
             if code == cs.OP_INPUT:
                 lines.append(f"w[{to[0]}] = x[{first_in[of[0]] + of[1]}];")
             elif code == cs.OP_OUTPUT:
@@ -171,19 +170,15 @@ class _Printer:
         calls = [self._of(case) for case in _cases(function)]
         n = function.nnz_out()
         lines = [f"int chosen[4], one = lanes_same_case(x, {len(calls) - 1}, chosen);", f"Lanes part[{n}];"]
-        for i, call in enumerate(calls):
-            lines.append(f"if (one == {i}) {call}(x + 1, y);")
+        lines += [f"if (one == {i}) {call}(x + 1, y);" for i, call in enumerate(calls)]
         lines.append(f"if (one < 0) for (int k = 0; k < {len(calls)}; k++) {{")
         lines.append("if (k != chosen[0] && k != chosen[1] && k != chosen[2] && k != chosen[3]) continue;")
-        for i, call in enumerate(calls):
-            lines.append(f"if (k == {i}) {call}(x + 1, part);")
-        lines.append(f"lanes_taken(part, y, {n}, chosen, k);")
-        return [*lines, "}"]
+        lines += [f"if (k == {i}) {call}(x + 1, part);" for i, call in enumerate(calls)]
+        return [*lines, f"lanes_taken(part, y, {n}, chosen, k);", "}"]
 
     def _matrices(self, function: cs.Function) -> list[str]:
         """An MX function of dense matrices: each instruction gives an array of its own."""
-        first_in = _offsets(function.nnz_in, function.n_in())
-        first_out = _offsets(function.nnz_out, function.n_out())
+        first_in, first_out = _first(function)
         lines: list[str] = []
         held: dict[int, list[str] | cs.DM] = {}  # elements of each place as C expressions, or a constant
         for k in range(function.n_instructions()):
@@ -241,9 +236,6 @@ def _digest(lines: Sequence[str]) -> str:
     return sha256("\n".join(lines).encode()).hexdigest()[:12]
 
 
-OF_A_TABLE = 2  # arguments of a look-up: the table, the place
-
-
 def _elements(of: list[str] | cs.DM) -> list[str]:
     return of if isinstance(of, list) else [_constant(v) for v in of.nonzeros()]
 
@@ -259,6 +251,11 @@ def _cases(function: cs.Function) -> list[cs.Function]:
 def _offsets(sizes: Callable[[int], int], n: int) -> list[int]:
     """Where each of n arguments or results begins if they stand one after the other, and the end."""
     return [0, *accumulate(sizes(i) for i in range(n))]
+
+
+def _first(function: cs.Function) -> tuple[list[int], list[int]]:
+    """Where each argument of a function begins, and each result."""
+    return _offsets(function.nnz_in, function.n_in()), _offsets(function.nnz_out, function.n_out())
 
 
 def _shared(elements: list[str], at: Sequence[int], to: Sequence[int]) -> dict[int, list[str] | cs.DM]:
