@@ -94,8 +94,7 @@ def lanes_of(functions: Sequence[cs.Function]) -> Lanes | None:
 
 
 def _definition(kind: str, name: str, body: Sequence[str]) -> str:
-    lines = "\n".join(f"    {line}" for line in body)
-    return f"{kind} {name}{ARGUMENTS} {{\n    (void)x;\n{lines}\n}}\n"
+    return "\n    ".join([f"{kind} {name}{ARGUMENTS} {{", "(void)x;", *body]) + "\n}\n"
 
 
 def _file(parts: Sequence[str]) -> str:
@@ -226,9 +225,9 @@ class _Printer:
         if inner["start"] != 0 or inner["step"] != 1:
             raise NotImplementedError("elements of a table are read one after the other only")
         values = table.nonzeros()
-        written = ", ".join(map(_number, values))
+        written = f"{{{', '.join(map(_number, values))}}}"
         name = f"TABLE_{_digest([written])}"
-        self.tables[name] = f"static const double {name}[] = {{{written}}};"
+        self.tables[name] = f"static const double {name}[] = {written};"
         return f"lanes_rows({name}, {len(values)}, &{number}, {inner['stop']}, {to});"
 
 
@@ -269,8 +268,7 @@ def _moved(code: int, node: cs.MX, of: list[list[str] | cs.DM]) -> list[str] | N
         given = _elements(of[0])
         return [given[int(i)] for i in node.mapping().nonzeros()]
     if code == cs.OP_TRANSPOSE:
-        rows, columns = node.dep(0).shape
-        given = _elements(of[0])
+        (rows, columns), given = node.dep(0).shape, _elements(of[0])
         return [given[i + j * rows] for i in range(rows) for j in range(columns)]
     if code == cs.OP_HORZCAT or (code == cs.OP_VERTCAT and node.shape[1] == 1):
         return [name for part in of for name in _elements(part)]
