@@ -15,7 +15,6 @@ from estimator.closeloop.decision.law_form import (
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.fitting.fitter import Fitter
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.progress import Progress
@@ -23,7 +22,7 @@ from estimator.closeloop.search.screened import screened
 from estimator.closeloop.search.search import Search
 from estimator.closeloop.several.transfer import Traced
 from fmus.export.builders.hypotheses import ModelBuilder
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.carriage import (
     Force,
     coulomb,
@@ -135,7 +134,7 @@ def test_where_the_form_is_open_a_law_is_tested_too(builder, truth, told):
 def test_an_open_form_may_leave_a_curve_that_is_little_of_it(left, own, closed, opened):
     one = np.ones(1000)
     base, h = (
-        Hypothesis((), Fit((), one[:0], np.eye(0), one * np.sqrt(squares / 1000), np.eye(1000, 0)), ())
+        Hypothesis((), fit_with((), one[:0], np.eye(0), one * np.sqrt(squares / 1000), np.eye(1000, 0)), ())
         for squares in (3e4, 1000 + left)
     )
     asked = [SimpleNamespace(policy=DEFAULT, form_error=form) for form in (0.0, 0.02)]

@@ -12,7 +12,6 @@ from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import completes, judge
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.relations import becomes, limits
 from estimator.closeloop.policy import DEFAULT
@@ -20,7 +19,7 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.closing.result import effects_of
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.verdicts import DETECTED
 
 SAMPLES, SIGNAL, NOISE = 4000, 30.0, np.ones(2)  # SIGNAL: rms of each output over its noise
@@ -45,7 +44,7 @@ def alike(best: Hypothesis, found: list[Hypothesis], form: float = 0.0) -> list[
 def left(*rms: float) -> Hypothesis:
     """What leaves residuals of exactly these rms values."""
     one = np.where(np.arange(len(T)) % 2, 1.0, -1.0)
-    nothing = Fit((), np.zeros(0), np.zeros((0, 0)), one, np.zeros((len(T), 0)))
+    nothing = fit_with((), np.zeros(0), np.zeros((0, 0)), one, np.zeros((len(T), 0)))
     return Hypothesis((), nothing, (one[:, None] * np.array(rms),))
 
 
@@ -211,7 +210,7 @@ def law(kind: str, extra: int, gain: float) -> Hypothesis:
     """A law with one unknown and some more that leaves so much less log score than nothing would."""
     unknowns = tuple(Unknown(f"{kind}_wheel_{i}", 1.0, 0.0, 9.0, 1.0) for i in range(1 + extra))
     n, one = len(unknowns), np.where(np.arange(len(T)) % 2, 1.0, -1.0)
-    fit = Fit(unknowns, np.ones(n), np.eye(n), one, np.zeros((len(T), n)))
+    fit = fit_with(unknowns, np.ones(n), np.eye(n), one, np.zeros((len(T), n)))
     left = one * np.sqrt(0.01 - 2 * gain / SAMPLES)
     return Hypothesis((Candidate(kind, "wheel", unknowns),), fit, (np.column_stack([left, 0 * left]),))
 
@@ -284,7 +283,7 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
     values, std = 50.0 * np.array([np.sin(phase), np.cos(phase)]), 0.1 * np.array([1.0, ratio])
     covariance = np.outer(std, std) * np.array([[1.0, correlation], [correlation, 1.0]])
     wave = Candidate("periodic_force", "wheel", unknowns)
-    fit = Fit(unknowns, values, covariance, np.zeros(1), np.zeros((1, 2)))
+    fit = fit_with(unknowns, values, covariance, np.zeros(1), np.zeros((1, 2)))
     size, error = effects_of(Hypothesis((wave,), fit, ()))[0].parameters["amplitude"]
     drawn = np.random.default_rng(0).multivariate_normal(values, covariance, 20_000)
     assert size == pytest.approx(50.0)

@@ -44,7 +44,7 @@ from fmus.integrators.rk4 import runge_kutta
 from fmus.models import MODELS
 from scenarios.closing.report import write_report
 from scenarios.closing.result import result_of
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.verdicts import judged
 
 SEEDS = st.integers(0, 10_000)
@@ -65,7 +65,7 @@ def fitted(residual: Array, jacobian: Array | None = None) -> Fit:
     """A calibrated FMU with this weighted residual; jacobian: (m, n) of its calibrated parameters."""
     j = np.empty((len(residual), 0)) if jacobian is None else jacobian
     names = [Unknown(f"p{i}", 0.0, -np.inf, np.inf, 1.0) for i in range(j.shape[1])]
-    return Fit(tuple(names), np.zeros(len(names)), np.eye(len(names)), residual, j)
+    return fit_with(tuple(names), np.zeros(len(names)), np.eye(len(names)), residual, j)
 
 
 def smooth(rng: np.random.Generator, columns: int, samples: int = M, pole: float = 0.9) -> Array:

@@ -27,7 +27,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Run
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.problems import OneByOne
 
 # ---- derivatives along secants
@@ -230,7 +230,7 @@ def test_what_fades_is_not_simulated_to_the_end(before, now):
 def at_a_bound(value: float) -> Fit:
     unknowns = (Unknown("held", 0.0, 0.0, 1.0, 0.1), Unknown("free", 0.0, -np.inf, np.inf, 1.0))
     j = np.random.default_rng(0).standard_normal((300, 2))
-    return Fit(unknowns, np.array([value, 3.0]), np.eye(2), j @ np.array([2.0, 0.0]), j)
+    return fit_with(unknowns, np.array([value, 3.0]), np.eye(2), j @ np.array([2.0, 0.0]), j)
 
 
 def test_what_a_bound_holds_back_is_no_more_free():

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.fitting.fit import fit
-from estimator.closeloop.hypotheses.fitted import Fit, sandwich
+from estimator.closeloop.hypotheses.fitted import sandwich
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.levers import Course, shifts
 from estimator.closeloop.screening.missing_force import missing_forces
@@ -25,6 +25,7 @@ from fmus.export.around.outside import around
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.export.builders.pythonfmu import build_python
 from fmus.host.description import PortNames
+from tests.helpers.baselines import fit_with
 
 CARRIAGE = PortNames("carriage", "F_ext", "q_dot", "q")
 DT, SAMPLES = 0.01, 1500
@@ -211,7 +212,7 @@ def test_screening_projects_out_what_calibration_can_explain() -> None:
     rng = np.random.default_rng(5)
     shared, own = rng.standard_normal((2, 400))
     u = Unknown("p", 1.0, -np.inf, np.inf, 1.0)
-    base = Fit((u,), np.ones(1), np.eye(1), 3 * own + 0.01 * rng.standard_normal(400), shared[:, None])
+    base = fit_with((u,), np.ones(1), np.eye(1), 3 * own + 0.01 * rng.standard_normal(400), shared[:, None])
     alike, other = (
         Candidate("constant_force", place, (Unknown(place, 0.0, -np.inf, np.inf, 1.0),)) for place in "ab"
     )

@@ -35,7 +35,7 @@ from estimator.plant import between
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.native import native
 from tests.helpers.problems import OneByOne
 
@@ -43,7 +43,7 @@ FREE = (-np.inf, np.inf)
 
 
 def nothing_calibrated(residual):
-    return Fit((), np.zeros(0), np.zeros((0, 0)), residual, np.zeros((len(residual), 0)))
+    return fit_with((), np.zeros(0), np.zeros((0, 0)), residual, np.zeros((len(residual), 0)))
 
 
 def candidate(kind, location, shape=(), amplitude="F_0"):

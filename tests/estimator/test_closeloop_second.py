@@ -16,7 +16,6 @@ from estimator.closeloop.fitting import fitter
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
@@ -28,7 +27,7 @@ from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.record import Run
 from fmus.effects import EFFECTS
 from fmus.export.builders.hypotheses import ModelBuilder
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.carriage import (
     looked_at,
     problem,
@@ -81,7 +80,7 @@ def several(*kinds: tuple[str, str], squares: float = 100.0) -> Hypothesis:
     unknowns = tuple(u for c in candidates for u in c.unknowns)
     n = len(unknowns)
     residual = np.full(100, np.sqrt(squares / 100))
-    return Hypothesis(candidates, Fit(unknowns, np.ones(n), np.eye(n), residual, np.zeros((100, n))), ())
+    return Hypothesis(candidates, fit_with(unknowns, np.ones(n), np.eye(n), residual, np.zeros((100, n))), ())
 
 
 @pytest.mark.parametrize(
@@ -145,7 +144,7 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, leas
     best = one("viscous_damping", "wheel")
     g = {c.label: column[:, 0] / np.linalg.norm(column) for c, column in change}
     residual = rng.standard_normal(4000) - second * g["viscous_damping@roller"]
-    found = Fit(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
+    found = fit_with(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
     fitted = []
     asking = SimpleNamespace(
         baseline=baseline(SimpleNamespace(policy=DEFAULT)),

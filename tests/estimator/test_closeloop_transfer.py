@@ -12,7 +12,7 @@ from scipy.stats import chi2, kstest
 from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import Fit, sandwich
+from estimator.closeloop.hypotheses.fitted import sandwich
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.several.chart import chart
@@ -29,6 +29,7 @@ from estimator.plant import PLANTS
 from fmus.effects import EFFECTS
 from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.host.description import PortNames
+from tests.helpers.baselines import fit_with
 from tests.helpers.carriage import (
     NOISE,
     Force,
@@ -102,7 +103,7 @@ def test_what_is_said_of_an_amplitude_is_what_repeated_fits_scatter_by(seed: int
     unknowns = c.amplitudes
     for _ in range(300):
         x = true + inverse @ g.T @ rng.standard_normal(900)
-        fit = Fit(unknowns, x, inverse, rng.standard_normal(900), g)
+        fit = fit_with(unknowns, x, inverse, rng.standard_normal(900), g)
         found.append(estimates(chart([replace(c, shape=())]), fit))
     sizes = [e.values[0] for e in found]
     errors = [float(np.sqrt(e.white[0, 0])) for e in found]
@@ -150,7 +151,9 @@ def test_an_unknown_without_any_influence_is_not_told() -> None:
     residual = rng.standard_normal(600)
     scale = np.array([u.scale for u in c.unknowns])
     covariance = sandwich(residual, jacobian, scale, np.full(2, np.inf))
-    found = estimates(chart([c]), Fit(c.unknowns, np.array([20.0, 0.01]), covariance, residual, jacobian))
+    found = estimates(
+        chart([c]), fit_with(c.unknowns, np.array([20.0, 0.01]), covariance, residual, jacobian)
+    )
     assert found.told == (f"{prefix}F_c",)
     assert found.figures[f"{prefix}v_s"][1] == pytest.approx(LOOSE * 0.001)
 

@@ -16,12 +16,11 @@ from estimator.closeloop.evidence import (
     Verdict,
     verdict_of,
 )
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Record, Run
-from tests.helpers.baselines import baseline
+from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.paths import ROOT
 from tests.helpers.verdicts import FAILED, judged
 
@@ -104,7 +103,7 @@ def asked(outputs: int) -> Problem:
 
 def left(*rms: float) -> Hypothesis:
     sign = np.where(np.arange(4000) % 2, 1.0, -1.0)
-    nothing = Fit((), np.zeros(0), np.zeros((0, 0)), sign, np.zeros((4000, 0)))
+    nothing = fit_with((), np.zeros(0), np.zeros((0, 0)), sign, np.zeros((4000, 0)))
     return Hypothesis((), nothing, (sign[:, None] * np.array(rms),))
 
 

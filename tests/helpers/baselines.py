@@ -1,5 +1,6 @@
 """Baselines as tests need them: a question, its calibrated FMU, and noise of a size."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,10 +8,18 @@ import numpy as np
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.question.problem import Unknown
 from estimator.noise import Noise
 from estimator.record import Array
 
-NOTHING = Hypothesis((), Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(1), np.zeros((1, 0))), ())
+NOTHING = Hypothesis((), Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(1), ()), ())
+
+
+def fit_with(
+    unknowns: Sequence[Unknown], values: Array, covariance: Array, residual: Array, jacobian: Array
+) -> Fit:
+    """A fit whose derivatives are the columns of a Jacobian (m, n)."""
+    return Fit(tuple(unknowns), values, covariance, residual, tuple(jacobian.T))
 
 
 def baseline(

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Record, Run
@@ -33,6 +32,7 @@ from scenarios.closing.closing import augment
 from scenarios.exchange import import_ssp
 from scenarios.exchange.augmented import coupling_step
 from scenarios.simulating import run
+from tests.helpers.baselines import fit_with
 from tests.scenarios.test_ssp import installed, told
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
@@ -78,7 +78,7 @@ def found(effects, values, verdict="traced"):
     """An outcome with these estimates, the first one without a standard error."""
     unknowns = tuple(Unknown(n, v, -1e9, 1e9, 1.0) for n, v in values.items())
     covariance = np.diag([np.nan, *(0.01 for _ in unknowns[1:])])
-    fit = Fit(
+    fit = fit_with(
         unknowns, np.array(list(values.values())), covariance, np.zeros(1), np.zeros((1, len(unknowns)))
     )
     candidates = tuple(Candidate(kind, at, ()) for kind, at in effects)

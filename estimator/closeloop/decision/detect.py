@@ -94,12 +94,12 @@ def detect(
 def _sensitivities(baseline: Baseline) -> Array:
     """Derivatives of the whole residual, in units of the noise, with respect to the unknowns, (N, n_y, n)."""
     base, problem = baseline.hypothesis, baseline.problem
-    here, columns = np.concatenate(base.residuals), []
-    for u in base.fit.unknowns:
-        h = STEP * u.scale
-        moved = problem.residuals({**base.fit.theta, u.name: base.fit.theta[u.name] + h})
-        columns.append((np.concatenate(moved) - here) / baseline.noise.std / h)
-    return np.stack(columns, axis=2) if columns else np.zeros((*here.shape, 0))
+    here, theta, unknowns = np.concatenate(base.residuals), base.fit.theta, base.fit.unknowns
+    slopes = np.empty((*here.shape, len(unknowns)))
+    aside = [{**theta, u.name: theta[u.name] + STEP * u.scale} for u in unknowns]
+    for i, moved in enumerate(problem.several_residuals(aside)):
+        slopes[:, :, i] = (np.concatenate(moved) - here) / baseline.noise.std / (STEP * unknowns[i].scale)
+    return slopes
 
 
 def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:

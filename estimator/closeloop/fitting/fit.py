@@ -95,7 +95,7 @@ def fit(
 
     if not unknowns:
         alone = weighted(problem, theta(x0.tolist()), size)
-        return Fit((), x0, np.empty((0, 0)), alone, np.empty((len(alone), 0)))
+        return Fit((), x0, np.empty((0, 0)), alone, ())
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
     if fading and sum(run.fit.any() for run in problem.record.runs) > 1:
         fading = []  # a first share of each run is no first share of the residual
@@ -110,7 +110,10 @@ def fit(
     middle = _middle(x, jacobian, scale, low, high)
     if np.any(middle != x) and np.sum(slopes.residual(middle) ** 2) < r @ r + len(x):
         x, r = middle, slopes.residual(middle)
-    return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, jacobian, converged)
+    found = tuple(
+        column if known is None else known for column, known in zip(jacobian.T.copy(), given, strict=True)
+    )
+    return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, found, converged)
 
 
 def _residuals(problem: Problem, theta: Named, size: Array) -> Residuals:

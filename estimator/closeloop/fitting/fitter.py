@@ -113,7 +113,9 @@ class Fitter:
             delayed(hypothesis)(here, others, p, size, evaluations, known, guess, step)
             for here, p in zip(where, promises, strict=True)
         )
-        return best_by_label(h for h in Parallel(n_jobs=self.jobs)(tasks) if h is not None)
+        found = [h for h in Parallel(n_jobs=self.jobs)(tasks) if h is not None]
+        # processes return copies of the derivatives that were known
+        return best_by_label(replace(h, fit=h.fit.sharing(known)) if known else h for h in found)
 
 
 def hypothesis(

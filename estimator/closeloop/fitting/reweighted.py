@@ -24,30 +24,34 @@ def reweighted(
     baseline = fitter.baseline
     best = min((h for some in found for h in some), key=cost)
     before, noise = baseline.noise.scale, Noise.of(baseline.problem.record, best.residuals)
-    base = rescaled(baseline.hypothesis, before, noise.scale)
+    [base] = rescaled([baseline.hypothesis], before, noise.scale)
     anew = replace(fitter, baseline=replace(baseline, hypothesis=base, noise=noise))
     return base, noise, [_fitted_again(anew, some, before) for some in found]
 
 
-def rescaled(h: Hypothesis, before: Array, size: Array) -> Hypothesis:
-    """The hypothesis with the same values, its residual and errors in units of another size (n_y,)."""
-    fit, ratio = h.fit, np.tile(before / size, len(h.fit.residual) // len(size))
-    residual, jacobian = fit.residual * ratio, fit.jacobian * ratio[:, None]
-    return replace(
-        h, fit=replace(fit, residual=residual, jacobian=jacobian, covariance=_errors(fit, residual, jacobian))
-    )
+def rescaled(found: Sequence[Hypothesis], before: Array, size: Array) -> list[Hypothesis]:
+    """Hypotheses with the same values, residuals and errors in units of another size (n_y,)."""
+    ratio = np.tile(before / size, len(found[0].fit.residual) // len(size)) if found else np.empty(0)
+    shared = {id(column): column for h in found for column in h.fit.slopes}
+    turned = {key: column * ratio for key, column in shared.items()}
+    moved = []
+    for h in found:
+        slopes = tuple(turned[id(column)] for column in h.fit.slopes)
+        fit = replace(h.fit, residual=h.fit.residual * ratio, slopes=slopes)
+        moved.append(replace(h, fit=replace(fit, covariance=_errors(fit))))
+    return moved
 
 
 def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Array) -> list[Hypothesis]:
     """All hypotheses in the fitter's units, sorted by sum of squares; the leading ones are fitted again."""
-    moved = best_by_label(rescaled(h, before, fitter.baseline.noise.scale) for h in found)
+    moved = best_by_label(rescaled(found, before, fitter.baseline.noise.scale))
     leading = [h for h in moved if h.candidates][: fitter.baseline.policy.search.reweighted]
     if not leading:
         return moved
     return best_by_label([*moved, *fitter.finished(from_there(leading), leading[0].others)])
 
 
-def _errors(fit: Fit, residual: Array, jacobian: Array) -> Array:
+def _errors(fit: Fit) -> Array:
     scale = np.array([u.scale for u in fit.unknowns])
     width = np.array([u.high - u.low for u in fit.unknowns])
-    return sandwich(residual, jacobian, scale, width) if fit.unknowns else fit.covariance
+    return sandwich(fit.residual, fit.jacobian, scale, width) if fit.unknowns else fit.covariance

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,17 +24,23 @@ BLOCKS = 30  # blocks of the record between which residuals are taken as indepen
 class Fit:
     """Estimated values, their covariance, and the residual with its Jacobian at these values.
 
-    residual: (m,) weighted, on the part to identify; jacobian: (m, n) its derivatives with respect to the
-    unknowns; covariance: (n, n), which allows for residuals that are not white by their scatter over blocks;
-    converged: whether the fit ended by its tolerance and not by its number of evaluations.
+    residual: (m,) weighted, on the part to identify; slopes: its derivatives with respect to each unknown,
+    (m,) each, so that fits can share those that they have in common; covariance: (n, n), which allows for
+    residuals that are not white by their scatter over blocks; converged: whether the fit ended by its
+    tolerance and not by its number of evaluations.
     """
 
     unknowns: tuple[Unknown, ...]
     values: Array
     covariance: Array
     residual: Array
-    jacobian: Array
+    slopes: tuple[Array, ...]
     converged: bool = True
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivatives of the residual with respect to the unknowns, (m, n)."""
+        return np.column_stack(self.slopes) if self.slopes else np.empty((len(self.residual), 0))
 
     @property
     def theta(self) -> dict[str, float]:
@@ -44,7 +50,12 @@ class Fit:
     @property
     def columns(self) -> dict[str, Array]:
         """Derivatives (m,) of the residual with respect to each unknown, by name."""
-        return {u.name: column for u, column in zip(self.unknowns, self.jacobian.T, strict=True)}
+        return {u.name: column for u, column in zip(self.unknowns, self.slopes, strict=True)}
+
+    def sharing(self, columns: Mapping[str, Array]) -> Fit:
+        """The same fit with these derivatives (m,) in place of its own equal ones."""
+        named = zip(self.unknowns, self.slopes, strict=True)
+        return replace(self, slopes=tuple(columns.get(u.name, own) for u, own in named))
 
     @property
     def beyond_noise(self) -> float:
@@ -59,17 +70,17 @@ class Fit:
             np.concatenate([self.values, other.values[i]]),
             block_diag(self.covariance, other.covariance[np.ix_(i, i)]),
             self.residual,
-            np.hstack([self.jacobian, other.jacobian[:, i]]),
+            (*self.slopes, *(other.slopes[k] for k in i)),
             self.converged,
         )
 
     @property
     def inflation(self) -> Array:
         """Variance of each value over its variance for white residuals, (n,), at least 1."""
-        scale = np.array([u.scale for u in self.unknowns])
+        scale, jacobian = np.array([u.scale for u in self.unknowns]), self.jacobian
         width = np.array([u.high - u.low for u in self.unknowns])
         white, as_they_are = (
-            np.diag(sandwich(r, self.jacobian, scale, width))
+            np.diag(sandwich(r, jacobian, scale, width))
             for r in (np.zeros_like(self.residual), self.residual)
         )
         return np.asarray(np.maximum(as_they_are / np.maximum(white, 1e-300), 1.0))
@@ -90,7 +101,7 @@ def loose(fit: Fit) -> Fit:
         unknowns=tuple(fit.unknowns[i] for i in free),
         values=fit.values[free],
         covariance=fit.covariance[np.ix_(free, free)],
-        jacobian=fit.jacobian[:, free],
+        slopes=tuple(fit.slopes[i] for i in free),
     )
 
 

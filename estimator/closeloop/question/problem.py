@@ -98,6 +98,15 @@ class Problem:
         """Measured minus simulated outputs of each run, (N, n_y)."""
         return [run.y - self._run(run, theta, ()) for run in self.record.runs]
 
+    def several_residuals(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
+        """As `residuals` for each of several unknowns with the same names, some of them simulated at once."""
+        for first in range(0, len(thetas), self.at_once):
+            some = thetas[first : first + self.at_once]
+            by_run = [self._rows(run, some) for run in self.record.runs]
+            for i, theta in enumerate(some):
+                found = [rows[i] for rows in by_run if rows is not None]
+                yield found if len(found) == len(by_run) else self.residuals(theta)
+
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the part to identify, (m, n_y)."""
         return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in self._identified])
@@ -106,11 +115,11 @@ class Problem:
         """As `identify_residual` for several unknowns with the same names; None if not all at once."""
         found: list[list[Array]] = [[] for _ in thetas]
         for run in self._identified:
-            rows = self.plant.simulate_rows(run, [self.start(theta) for theta in thetas])
+            rows = self._rows(run, thetas)
             if rows is None:
                 return None
-            for parts, y, theta in zip(found, rows, thetas, strict=True):
-                parts.append((run.y - faulty(y, run.t, self.record.outputs, theta))[run.fit])
+            for parts, residual in zip(found, rows, strict=True):
+                parts.append(residual[run.fit])
         return [np.concatenate(parts) for parts in found]
 
     @cached_property
@@ -146,11 +155,23 @@ class Problem:
         return replace(self, record=replace(self.record, runs=tuple(_cut(self.record.runs, share))))
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
+        y = self.plant.simulate(run, self._start(run, theta), more)
+        return faulty(y, run.t, self.record.outputs, theta)
+
+    def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
+        """Measured minus simulated outputs of a run for each of several unknowns; None if not all at once."""
+        rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas])
+        if rows is None:
+            return None
+        outputs = self.record.outputs
+        return [run.y - faulty(y, run.t, outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
+
+    def _start(self, run: Run, theta: Mapping[str, float]) -> dict[str, float]:
+        """Start values of the FMU for a run; free states of a run that is not fitted are guessed from it."""
         start = self.start(theta)
         if self.free_states and not run.fit.any():
             start |= {n: value for n, (value, _) in self.start_states(run).items()}
-        y = self.plant.simulate(run, start, more)
-        return faulty(y, run.t, self.record.outputs, theta)
+        return start
 
     def start(self, theta: Mapping[str, float]) -> dict[str, float]:
         """Start values of the FMU: the declared ones, and those in theta that are variables of the FMU."""

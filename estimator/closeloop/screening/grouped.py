@@ -51,4 +51,5 @@ def grouped(columns: Array, n_y: int, n: int) -> Array:
 
 def grouped_fit(fit: Fit, n_y: int, n: int) -> Fit:
     """A fit with residual and Jacobian averaged over groups."""
-    return replace(fit, residual=grouped(fit.residual, n_y, n), jacobian=grouped(fit.jacobian, n_y, n))
+    slopes = tuple(grouped(column, n_y, n) for column in fit.slopes)
+    return replace(fit, residual=grouped(fit.residual, n_y, n), slopes=slopes)

@@ -85,7 +85,7 @@ class Part:
         theta = self.chart.native(values)
         fixed = [replace(c, fixed={**c.fixed, **_own(c, theta)}) for c in self.effects]
         at = np.array([theta[u.name] for u in self.others])
-        found = Fit(self.others, at, covariance, residual, slopes)
+        found = Fit(self.others, at, covariance, residual, tuple(slopes.T.copy()))
         return Hypothesis((*fixed, *self.beside), found, tuple(self.built.residuals(theta)))
 
 
