@@ -11,6 +11,7 @@ from pathlib import Path
 from benchmarks.challenge.ablation import table
 from benchmarks.challenge.draw import plans
 from benchmarks.challenge.match import Answer
+from benchmarks.challenge.measuring import WAYS, Measuring
 from benchmarks.challenge.run import Challenge, run
 from benchmarks.challenge.table import markdown, text
 from benchmarks.challenge.truth import SHARES, SYSTEMS
@@ -28,6 +29,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--cores", type=int, default=0, help="processes per record; 0: all cores")
     parser.add_argument("--limit", type=float, default=1800.0, help="time limit per record, s")
     parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="systems to include")
+    parser.add_argument(
+        "--measured", default=Measuring.name, choices=WAYS, help="how the records are measured"
+    )
     parser.add_argument("--only-make", action="store_true", help="write the records without closing them")
     parser.add_argument("--so-far", action="store_true", help="the scoreboard of the records closed so far")
     parser.add_argument("--ablate", action="store_true", help="also tell what each limit of the policy does")
@@ -36,7 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         signal.signal(stopping, signal.default_int_handler)
     seed = secrets.randbelow(10**6) if a.seed is None else a.seed
     chosen = [p for p in plans(seed, a.count) if p.system in a.systems]
-    challenge = Challenge(a.out / f"seed-{seed}-{a.count}", seed, a.limit, a.cores, a.ablate)
+    name = f"seed-{seed}-{a.count}" + (f"-{a.measured}" if a.measured != Measuring.name else "")
+    challenge = Challenge(a.out / name, seed, a.limit, a.cores, a.ablate, a.measured)
     print(f"seed {seed}: {len(chosen)} records in {challenge.folder}", flush=True)
     if a.only_make:
         for plan in chosen:

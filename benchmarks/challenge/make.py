@@ -15,6 +15,7 @@ from benchmarks.challenge.bench import (
     bench,
 )
 from benchmarks.challenge.draw import Plan
+from benchmarks.challenge.measuring import Measuring
 from benchmarks.challenge.menu import OUTPUTS
 from benchmarks.challenge.truth import Item, Truth
 from estimator.sensor_faults import FAULTS
@@ -34,7 +35,7 @@ IDENTIFY = 0.6  # share of the record that is the part to identify
 LATE = 0.1  # smallest ratio of the effect's size in the part to identify to that in the whole record
 
 
-def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
+def make(plan: Plan, seed: int, records: Path, truths: Path, way: type[Measuring] = Measuring) -> Truth:
     """Write the folder of a record, then the file with its truth; an existing record is kept.
 
     Sizes are drawn again if the system leaves the range of its model (a wheel locks, a flange touches), if a
@@ -48,7 +49,7 @@ def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
     draws = (here for here in (plan, *elsewhere(plan)) for _ in range(ATTEMPTS))
     for attempt, here in enumerate(draws):
         try:
-            truth, text, columns = tried(here, np.random.default_rng([seed, plan.index, attempt]))
+            truth, text, columns = tried(here, np.random.default_rng([seed, plan.index, attempt]), way)
         except ValueError as error:
             why = error
             continue
@@ -69,15 +70,20 @@ def elsewhere(plan: Plan) -> list[Plan]:
     return [replace(plan, entries=((fault, o),)) for o in (*outputs[own + 1 :], *outputs[:own])]
 
 
-def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
+def tried(
+    plan: Plan, rng: np.random.Generator, way: type[Measuring] = Measuring
+) -> tuple[Truth, str, Outputs]:
     """A record with one draw of conditions and sizes: its truth, experiment.toml and data columns."""
     raw = [(e, location, e.sizes(rng)) for e, location in plan.entries]
     here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
     items = tuple(Item(e.kind, p, settled(e.kind, p, sizes, here)) for e, p, sizes in raw)
-    truth, seen = measure(plan, items, here, rng)
+    truth, with_it = measure(plan, items, here)
     if plan.group == "sensor" and truth.largest_snr < FAINT:
         raise ValueError(f"the fault is {truth.largest_snr:.2f} times the noise")
-    return truth, here.toml(plan.name, effect_of(items, here)), {"time": here.t, **here.inputs, **seen}
+    measuring, text = way(rng), here.toml(plan.name, effect_of(items, here))
+    seen = measuring.outputs(here.t, with_it, here.noise)
+    columns = {"time": here.t, **measuring.inputs(here.t, here.inputs), **seen}
+    return truth, measuring.said(text), columns
 
 
 def _lowest_mu0(sizes: list[tuple[str, dict[str, Any]]]) -> float:
@@ -152,10 +158,8 @@ def ratios(here: Bench, with_it: Outputs, without: Outputs, part: float = 1.0) -
     }
 
 
-def measure(
-    plan: Plan, items: tuple[Item, ...], here: Bench, rng: np.random.Generator
-) -> tuple[Truth, Outputs]:
-    """The truth with its signal-to-noise ratios, and the outputs with noise."""
+def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Outputs]:
+    """The truth with its signal-to-noise ratios, and the outputs without noise."""
     more = effect_of(items, here)
     clean = here.simulate(more, more)
     with_it = shown(here, clean, items)
@@ -180,8 +184,7 @@ def measure(
         plan.note,
         tuple(each),
     )
-    seen = {o: y + rng.normal(0.0, here.noise[o], y.size) for o, y in with_it.items()}
-    return truth, seen
+    return truth, with_it
 
 
 def write(home: Path, text: str, columns: Outputs) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 
 from benchmarks.challenge.draw import Plan
 from benchmarks.challenge.make import make
+from benchmarks.challenge.measuring import WAYS, Measuring
 from benchmarks.challenge.truth import Truth
 
 Tell = Callable[[str], None]
@@ -36,10 +37,11 @@ class Challenge:
     limit: float = 1800.0
     cores: int = 0  # processes per record, 0: all cores
     ablate: bool = False  # judge the fits of each record again by the policies of the ablation
+    way: str = Measuring.name  # how the records are measured, one of WAYS
 
     def truth(self, plan: Plan) -> Truth:
         """The truth of a record; record and truth are made if they do not exist."""
-        return make(plan, self.seed, self.folder / "records", self.folder / "truth")
+        return make(plan, self.seed, self.folder / "records", self.folder / "truth", WAYS[self.way])
 
     def one(self, plan: Plan) -> tuple[Truth, Kept]:
         """Truth and answer of a record."""
