@@ -292,6 +292,19 @@ def test_a_fit_extended_by_another_has_the_unknowns_of_both():
     assert_allclose(found.jacobian[:, 2], whole.jacobian[:, 1])
     assert found.covariance.shape == (3, 3)
     assert found.std["free"] == whole.std["free"]
+    assert found.slopes[2] is whole.slopes[1]  # not a copy
+
+
+def test_a_fit_holds_the_derivatives_that_were_known_and_no_copies_of_them():
+    unknowns = Unknown("a", 1.0, -np.inf, np.inf, 1.0), Unknown("b", 2.0, 1.0, 3.0, 0.2)
+    known = {"b": np.linspace(0.0, -200.0, 400)}
+    found = fit(Summed(5.0, 2.0), unknowns, np.array([0.01]), known=known)
+    assert found.slopes[1] is known["b"]
+    assert found.columns["b"] is known["b"]
+    copied = replace(found, slopes=tuple(column.copy() for column in found.slopes))
+    again = copied.sharing(known)
+    assert again.slopes[1] is known["b"]
+    assert again.slopes[0] is copied.slopes[0]
 
 
 # ---- errors where the sum of squares is a bent valley

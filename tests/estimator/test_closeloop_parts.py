@@ -1,5 +1,6 @@
 """The parts of the chain against what statistics and mechanics say they must give."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from estimator.sensor_faults import FAULTS, faulty
 from fmus.drive.model import Drive
 from fmus.effects.spectrum import orders
 from fmus.export.around.outside import around
-from fmus.export.builders.hypotheses import ForeignBuilder
+from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
 from fmus.export.builders.pythonfmu import build_python
 from fmus.host.description import PortNames
 from tests.helpers.baselines import fit_with
@@ -62,6 +63,17 @@ def problem(drive: ForeignBuilder, missing: np.ndarray, rng: np.random.Generator
     record = Record((run,), ("F",), ("q", "q_dot"), NOISE)
     declared = {"M": 95.0, "F_v": 200.0, "q": 0.0, "q_dot": 0.0}
     return Problem(drive, record, declared, {"M": (80.0, 110.0)}, (), (CARRIAGE,))
+
+
+@pytest.mark.parametrize("several", [1, 3, 6])
+def test_several_simulations_are_each_as_one(drive: ForeignBuilder, tmp_path: Path, several: int) -> None:
+    rng = np.random.default_rng(3)
+    asked = problem(drive, np.zeros(SAMPLES), rng)
+    thetas = [{"M": 85.0 + 4 * i, "q_dot_bias": 0.01 * i} for i in range(several)]
+    for builder in (drive, ModelBuilder("drive", tmp_path)):
+        here = replace(asked, builder=builder)
+        for found, theta in zip(here.several_residuals(thetas), thetas, strict=True):
+            assert_allclose(found, here.residuals(theta), rtol=1e-12, atol=1e-15)
 
 
 def test_the_missing_force_is_recovered_within_its_own_error(drive: ForeignBuilder) -> None:
