@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
 from estimator.closeloop.policy import Policy
 from estimator.closeloop.question.problem import Problem
@@ -36,9 +37,18 @@ class Baseline:
         return h.scores(self.problem, self.noise.scale, part)
 
     def lead(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> tuple[float, float]:
-        """Log score of a minus that of b on a part of the record, and its standard error over blocks."""
-        difference = self.scores(a, part) - self.scores(b, part)
-        return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(len(difference)))
+        """Log score of a minus that of b on a part of the record, and its standard error if a is right.
+
+        The residuals of a are then noise e, those of b are e + d, and the difference is e'd + d'd / 2. White
+        noise of variance 1 gives its sum e'd the variance d'd; noise that is correlated or larger shows in
+        the sums over blocks. Where and when the hypotheses differ does not matter: an effect that acts for a
+        moment only can be as certain as one that always acts.
+        """
+        own, other = (h.of(self.problem, part) / self.noise.scale for h in (a, b))
+        apart = other - own
+        sums = [float(np.sum(block)) for block in np.array_split(own * apart, BLOCKS)]
+        error = float(np.sqrt(max(np.sum(apart**2), np.sum(np.square(sums)))))
+        return float(np.sum(other**2) - np.sum(own**2)) / 2, error
 
     def beats(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> bool:
         """Whether the log score of a exceeds that of b on a part by enough standard errors."""
