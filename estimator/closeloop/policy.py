@@ -259,9 +259,9 @@ class DecisionPolicy:
 
     telling: float = limit(
         2.0,
-        "standard errors over blocks",
+        "standard errors",
         "difference in log score from which on one hypothesis is better than another",
-        "F. X. Diebold, R. S. Mariano, J. Business and Economic Statistics 13 (1995), 253-263: 1 in 44",
+        "derivation: 1 in 44 by the normal distribution, on data that no fit has used",
     )
     significant: float = limit(
         4.0,

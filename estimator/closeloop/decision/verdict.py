@@ -26,9 +26,9 @@ def explains(baseline: Baseline, h: Hypothesis) -> bool:
 def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     """The checks of a hypothesis on the part to choose.
 
-    Every effect must differ clearly from zero, and the hypothesis must be better than the calibrated FMU over
-    the blocks of that part. Outputs with declared noise must come down to that noise, or nearly so; the
-    residual of the others must lose most of its variance.
+    Every effect must differ clearly from zero, and the hypothesis must be better than the calibrated FMU.
+    Outputs with declared noise must come down to that noise, or nearly so; the residual of the others must
+    lose most of its variance.
     """
     limits, base = baseline.policy.decision, baseline.hypothesis
     declared = baseline.noise.declared

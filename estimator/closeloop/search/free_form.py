@@ -66,8 +66,7 @@ def free_form(
     """The free-form force that is best on the part to choose, fitted jointly; None if none beats the base.
 
     near: the best effects of the library, best first, whose ports are tried too. A free-form force beats the
-    base if its log score over the blocks of that part is higher by more standard errors than the policy's
-    `telling`.
+    base if its log score on that part is higher by more standard errors than the policy's `telling`.
     """
     baseline, problem = fitter.baseline, fitter.baseline.problem
     base = baseline.hypothesis
