@@ -42,7 +42,6 @@ class Model(Site, ABC):
     # too, and the share of an output that is still open after fitting the first
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_alike: ClassVar[tuple[str, ...]] = ()
-    form_from_start: ClassVar[tuple[str, ...]] = ()  # as form_alike, unless the value changes during a run
     form_error: ClassVar[float] = 0.0
     build_options: ClassVar[tuple[BuildOption, ...]] = ()
 

@@ -69,12 +69,6 @@ class DetectionPolicy:
         "a residual with a smaller rms does not matter if the model form is open",
         CHALLENGE,
     )
-    open_form_likeness: float = limit(
-        0.2,
-        "share of the sum of squares beyond noise",
-        "if one effect could explain this share, the residual is not attributed to the open model form",
-        CHALLENGE,
-    )
 
 
 @dataclass(frozen=True)
@@ -299,7 +293,8 @@ class DecisionPolicy:
     open_single: float = limit(
         0.5,
         "share of the variance beyond noise",
-        "share that one effect must explain of all outputs together if the model form is open",
+        "share that one effect must explain of all outputs together if the model form is open; a residual of "
+        "which no effect could explain as much is left to the form",
         CHALLENGE,
     )
     open_alike: float = limit(

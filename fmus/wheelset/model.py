@@ -93,7 +93,6 @@ class Wheelset(Model):
     step_size = 1e-3
     form = MappingProxyType({"k_a": (0.5, 1.6), "k_b": (0.6, 2.6), "k_c": (0.0, 1.5), "k_spin": (0.2, 1.2)})
     form_alike = ("G", "nu")
-    form_from_start = ("A", "B", "k_A", "k_S", "friction_condition")
     form_error = 0.02
     method = "rk4_within_stability"
     build_options = OPTIONS

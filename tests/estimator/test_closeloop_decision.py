@@ -81,7 +81,8 @@ def in_parts(early: float, late: float) -> Hypothesis:
     [
         ((1.3, 1.0), 0.05, False),  # what another form of contact leaves
         ((5.0, 1.0), 0.05, False),
-        ((1.3, 1.0), 0.3, True),  # what one effect could explain
+        ((1.3, 1.0), 0.3, False),
+        ((1.3, 1.0), 0.6, True),  # what one effect could explain
         ((1.02, 1.0), 0.9, False),
         ((8.0, 1.0), 0.05, True),
     ],
@@ -94,7 +95,7 @@ def test_an_open_form_leaves_what_is_like_no_effect_alone(rms, likeness, matter)
 def test_less_matters_where_the_form_is_open(a, b, likeness):
     if matters(asked(FORM), left(a, b), likeness):
         assert matters(asked(), left(a, b))
-    assert likeness >= DEFAULT.detection.open_form_likeness or not matters(
+    assert likeness >= DEFAULT.decision.open_single or not matters(
         asked(FORM), left(min(a, 5.9), min(b, 5.9)), likeness
     )
 

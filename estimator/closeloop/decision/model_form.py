@@ -164,7 +164,7 @@ class Open(ModelForm):
         beyond, rms = self._beyond("unseen"), b.hypothesis.rms(b.problem, "unseen")
         form = np.maximum(self.share * signal_size(b.problem), TINY)
         large = float(np.max(np.minimum(beyond / form, rms / (limits.open_form_noises * b.noise.std))))
-        if sets_in or likeness >= limits.open_form_likeness:
+        if sets_in or not self.could_be(likeness):
             return max(large, self._material(beyond))
         return large
 
@@ -224,7 +224,7 @@ class Open(ModelForm):
 
     def could_be(self, likeness: float) -> bool:
         """See ModelForm."""
-        return likeness < self.baseline.policy.detection.open_form_likeness
+        return likeness < self.baseline.policy.decision.open_single
 
 
 def form_of(baseline: Baseline) -> ModelForm:

@@ -11,7 +11,6 @@ from types import MappingProxyType
 from typing import ClassVar
 
 from fmus.effects import EFFECTS, offers
-from fmus.effects.parameter_effect import ParameterEffect
 from fmus.errors import BadInput
 from fmus.export.around.effects_alone import EffectsAlone
 from fmus.export.around.outside import Outside
@@ -52,7 +51,8 @@ class ModelBuilder:
     @property
     def offers(self) -> Effects:
         """Every effect at every location where it makes sense, and where another form would be none."""
-        return tuple(e for e in offers(_bare(self.model)) if not _is_form(model_class(self.model), *e))
+        model = model_class(self.model)
+        return tuple(e for e in offers(_bare(self.model)) if e[1] not in {*model.form, *model.form_alike})
 
     @property
     def ports(self) -> tuple[PortNames, ...]:
@@ -149,13 +149,6 @@ class ForeignBuilder:
         BadInput where an effect changes a parameter while running.
         """
         return EffectsAlone(describe(self.fmu), self.ports, effects, starts, step)
-
-
-def _is_form(model: type[Model], kind: str, location: str) -> bool:
-    """Whether an effect would be another form of the model, which a record cannot tell from it."""
-    effect = EFFECTS[kind]
-    stays = issubclass(effect, ParameterEffect) and not (effect.begins or effect.drifts)
-    return location in {*model.form, *model.form_alike} or (stays and location in model.form_from_start)
 
 
 @cache
