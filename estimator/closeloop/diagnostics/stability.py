@@ -36,11 +36,14 @@ def stability(
     halves = _halves(rng, pairs)
     blocks = np.array_split(np.arange(len(base.residual)), BLOCKS)
     edges = [slice(int(b[0]), int(b[-1]) + 1) if len(b) else slice(0, 0) for b in blocks]
-    own = _pieces(base.jacobian, base.residual, edges)
+    jacobian = base.jacobian
+    own = _pieces(jacobian, base.residual, edges)
     inverse = np.linalg.pinv(np.einsum("hb,bnm->hnm", halves, own.gram), hermitian=True)
     gains: dict[str, Array] = {}
     for c, g in change:
-        found = _gains(c, g, base, own, inverse, edges, halves)
+        mine = _pieces(g, base.residual, edges)
+        across = np.einsum("hb,bnk->hnk", halves, np.array([jacobian[e].T @ g[e] for e in edges]))
+        found = _gains(c, mine, own, across, inverse, halves)
         gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
     if not gains:
         return {}
@@ -62,23 +65,20 @@ def _pieces(columns: Array, residual: Array, edges: list[slice]) -> _Pieces:
     return _Pieces(gram, np.array([columns[e].T @ residual[e] for e in edges]))
 
 
-def _gains(
-    c: Candidate, g: Array, base: Fit, own: _Pieces, inverse: Array, edges: list[slice], halves: Array
-) -> Array:
+def _gains(c: Candidate, mine: _Pieces, own: _Pieces, across: Array, inverse: Array, halves: Array) -> Array:
     """Reduction of the sum of squares of each half by a candidate, (h,); 0 if its sign is out of bounds.
 
-    inverse: (h, n, n) pseudoinverse of the products of the calibration's columns in each half.
+    mine, own: of the candidate's columns and of the calibration's; across: (h, n, k) products of the latter
+    with the former in each half; inverse: (h, n, n) pseudoinverse of those of the calibration's.
     """
-    mine = _pieces(g, base.residual, edges)
-    across = np.einsum("hb,bnk->hnk", halves, np.array([base.jacobian[e].T @ g[e] for e in edges]))
     gram, along = np.einsum("hb,bkl->hkl", halves, mine.gram), halves @ mine.along
-    if base.jacobian.shape[1]:
+    if across.shape[1]:
         taken = inverse @ across
         gram = gram - np.swapaxes(across, 1, 2) @ taken
         along = along - np.einsum("hnk,hn->hk", taken, halves @ own.along)
     left, whole = np.einsum("hkk->hk", gram), halves @ np.einsum("bkk->bk", mine.gram)
     size = np.where(left > NOTHING**2 * whole, np.sqrt(np.maximum(left, 0.0)), np.inf)
-    scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(g.shape[1])
+    scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(gram.shape[1])
     z = along / size
     beta = np.linalg.solve(scaled, z[..., None])[..., 0]
     found: Array = np.sum(z * beta, axis=1)

@@ -25,9 +25,8 @@ class Calibration:
     @classmethod
     def of(cls, base: Fit) -> "Calibration":
         """The basis of the range of a fit's Jacobian."""
-        if base.jacobian.shape[1]:
-            return cls(np.linalg.qr(base.jacobian)[0])
-        return cls(np.zeros((len(base.residual), 0)))
+        jacobian = base.jacobian
+        return cls(np.linalg.qr(jacobian)[0] if jacobian.shape[1] else jacobian)
 
     def without(self, x: Array) -> Array:
         """Columns x (m, k), or one column (m,), projected orthogonal to the basis."""

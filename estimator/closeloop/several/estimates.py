@@ -61,8 +61,9 @@ def estimates(made: Chart, fit: Fit) -> Estimates:
     """Estimates of the machine's unknowns from a fit with the effects of the chart."""
     scale = np.array([u.scale for u in fit.unknowns])
     width = widths(fit.unknowns, made.natives)
-    covariance = sandwich(fit.residual, fit.jacobian, scale, width)
-    white = sandwich(np.zeros_like(fit.residual), fit.jacobian, scale, width)
+    jacobian = fit.jacobian
+    covariance = sandwich(fit.residual, jacobian, scale, width)
+    white = sandwich(np.zeros_like(fit.residual), jacobian, scale, width)
     values = made.turned(fit.theta)
     native = [u.name for u in fit.unknowns]
     own = {n for w in made.waves for n in (w.sine, w.cosine)}
