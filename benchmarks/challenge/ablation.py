@@ -25,19 +25,22 @@ Answers = dict[str, dict[str, Told]]  # by limit and change
 
 STAGES = ("detection", "decision")  # limits of the search decide what is fitted: these need new fits
 NEEDS_DRAWS = ("detection.replicates", "detection.slow_blocks")  # the noise would have to be drawn again
+OF_SAMPLES = "share of the samples"  # unit of a limit that cannot exceed 1
 FACTORS = {"0": 0.0, "half": 0.5, "double": 2.0, "no end": 1e12}
 SEARCHED = "would be searched"  # of a residual that the default leaves alone, so that there are no fits
 
 
 def variants() -> Iterator[tuple[str, str, Policy]]:
     """Name of a limit, word for its change, and the policy with it."""
-    for name, value, _ in DEFAULT.limits():
+    for name, value, about in DEFAULT.limits():
         stage, _, short = name.partition(".")
         if stage not in STAGES or name in NEEDS_DRAWS:
             continue
         group = getattr(DEFAULT, stage)
         for how, factor in FACTORS.items():
             changed = round(value * factor) if isinstance(value, int) else value * factor
+            if about.metadata["unit"] == OF_SAMPLES:
+                changed = min(changed, 1.0)
             yield name, how, replace(DEFAULT, **{stage: replace(group, **{short: changed})})
 
 

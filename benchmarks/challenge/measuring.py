@@ -47,10 +47,10 @@ class Correlated(Measuring):
         kept = float(np.exp(-(t[1] - t[0]) / time))
         found = {}
         for o, y in clean.items():
-            drawn = self.rng.standard_normal((2, y.size))
-            start = drawn[1, :1] * kept  # stationary from the first sample
-            slow, _ = lfilter([np.sqrt(1 - kept**2)], [1.0, -kept], drawn[1], zi=start)
-            found[o] = y + noise[o] * (np.sqrt(1 - share) * drawn[0] + np.sqrt(share) * slow)
+            white, drawn = self.rng.standard_normal((2, y.size))
+            before = self.rng.standard_normal(1)  # so that the noise has its full size from the first sample
+            slow, _ = lfilter([np.sqrt(1 - kept**2)], [1.0, -kept], drawn, zi=kept * before)
+            found[o] = y + noise[o] * (np.sqrt(1 - share) * white + np.sqrt(share) * slow)
         return found
 
 

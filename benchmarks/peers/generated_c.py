@@ -1,18 +1,16 @@
 """CasADi's own C code of a model's step function, compiled like native FMUs, and C loops over FMUs."""
 
 import ctypes
-import subprocess
 from collections.abc import Mapping, Sequence
 from ctypes import c_double, c_int, c_size_t, c_uint, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 
-import casadi as cs
 import numpy as np
 
+from benchmarks.peers.compiled import address, compiled
 from benchmarks.timing import Run
 from estimator.record import Array
-from fmus.export.builders.native.compilers import command, host
 from fmus.host.fmu import Fmu
 from fmus.model import Model, equations
 from fmus.variables import Input, Parameter, State
@@ -53,30 +51,20 @@ class Loops:
 
     @classmethod
     def of(cls, model: Model, folder: Path) -> "Loops":
-        """Generate the code, and compile it by the compiler and flags of native FMUs."""
-        folder.mkdir(parents=True)
+        """Compile the loops with the code of the model's step."""
         step = equations(model).step
-        generator = cs.CodeGenerator("bare.c", {"casadi_int": "int"})
-        generator.add(step)
-        sizes = {n: max(getattr(step, f"sz_{n.lower()}")(), 1) for n in ("ARG", "RES", "IW", "W")}
-        defined = [f"#define WORK_{n} {size}" for n, size in sizes.items()]
-        defined.append(f"#define N_STATES {step.size1_in(0)}")
-        code = ["#define CASADI_SYMBOL_EXPORT static", generator.dump(), *defined, LOOPS.read_text()]
-        (folder / "bare.c").write_text("\n".join(code), encoding="utf-8")
-        call = command(None, [host()])[host().name]
-        subprocess.run([*call, "bare.c", "-o", "bare.so", "-lm"], cwd=folder, check=True)
-        return cls(ctypes.CDLL(str(folder / "bare.so")))
+        return cls(compiled(LOOPS, [step], {"N_STATES": step.size1_in(0)}, folder))
 
     def bare(self, x: Array, u: Array, p: Array, dt: float, steps: int) -> Array:
         """States (n,) after some internal steps of the generated function."""
         x, u, p = (np.array(a, dtype=float) for a in (x, u, p))
-        self.library.bare(*map(_address, (x, u, p)), c_double(dt), c_int(steps))
+        self.library.bare(*map(address, (x, u, p)), c_double(dt), c_int(steps))
         return x
 
     def rows(self, X: Array, u: Array, p: Array, dt: float, times: int) -> None:
         """One internal step from each row of X (k, n), repeated; the results are not kept."""
         X, u, p = (np.ascontiguousarray(a, dtype=float) for a in (X, u, p))
-        self.library.rows(*map(_address, (X, u, p)), c_double(dt), c_int(len(X)), c_int(times))
+        self.library.rows(*map(address, (X, u, p)), c_double(dt), c_int(len(X)), c_int(times))
 
     def steps(self, fmu: Fmu, start: Mapping[str, float], dt: float, steps: int) -> None:
         """Restart an FMU and make communication steps."""
@@ -97,10 +85,6 @@ class Loops:
                 )
 
         return run
-
-
-def _address(values: Array) -> c_void_p:
-    return c_void_p(values.ctypes.data)
 
 
 def _calls(fmu: Fmu) -> ctypes.Array[c_void_p]:

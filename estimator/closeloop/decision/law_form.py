@@ -72,7 +72,7 @@ def misnamed(h: Hypothesis, forces: Sequence[MissingForce], fastest: float = 1.0
         if law and issubclass(law, ForceLaw) and c.location in at:
             values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
             q, v = at[c.location].displacement, at[c.location].velocity
-            fast = np.abs(v) >= np.quantile(np.abs(v), max(1 - fastest, 0.0))
+            fast = np.abs(v) >= np.quantile(np.abs(v), 1 - fastest)
             if not law.true_to_name(values, q[fast], v[fast]):
                 found.append(c)
     return found

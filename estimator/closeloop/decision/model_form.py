@@ -102,7 +102,7 @@ class Closed(ModelForm):
     exact = True
 
     def _misfit(self, h: Hypothesis) -> float:
-        return -float(self.baseline.scores(h).sum())
+        return -self.baseline.score(h)
 
     def importance(self, likeness: float, sets_in: bool) -> float:
         """See ModelForm; the worst part counts."""
@@ -115,7 +115,7 @@ class Closed(ModelForm):
     def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
         b, limits = self.baseline, self.baseline.policy.decision
-        alike = limits.alike * -float(b.scores(best).sum())
+        alike = limits.alike * -b.score(best)
         worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
         better = b.lead(best, h)[0] >= max(price, alike) and b.beats(best, h)
         return (h.fit.converged and worse) or better
@@ -152,7 +152,7 @@ class Open(ModelForm):
 
     def _misfit(self, h: Hypothesis) -> float:
         # on one part alone, an effect that acts in the other part would lose to one that imitates the form
-        return 0.5 * cost(h) - float(self.baseline.scores(h).sum())
+        return 0.5 * cost(h) - self.baseline.score(h)
 
     def importance(self, likeness: float, sets_in: bool) -> float:
         """See ModelForm; computed on the parts to choose and to test.
@@ -203,7 +203,7 @@ class Open(ModelForm):
     def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; by both parts together, because the open form adds to what the best one leaves."""
         b, limits = self.baseline, self.baseline.policy.decision
-        alike = limits.alike * -float(b.scores(best).sum())
+        alike = limits.alike * -b.score(best)
         alike = max(alike, limits.open_alike * b.beyond_noise_of_all(best) / 2)
         return b.lead(best, h)[0] + (cost(h) - cost(best)) / 2 >= max(price, alike)
 

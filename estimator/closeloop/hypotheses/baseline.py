@@ -32,9 +32,9 @@ class Baseline:
         """The same fit and noise with another problem."""
         return replace(self, problem=problem)
 
-    def scores(self, h: Hypothesis, part: Part = "choose") -> Array:
-        """Log score of each block of a part of the record, up to a constant, (BLOCKS,)."""
-        return h.scores(self.problem, self.noise.scale, part)
+    def score(self, h: Hypothesis, part: Part = "choose") -> float:
+        """Log score of a part of the record, up to a constant."""
+        return -0.5 * float(np.sum(self._weighted(h, part) ** 2))
 
     def lead(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> tuple[float, float]:
         """Log score of a minus that of b on a part of the record, and its standard error if a is right.
@@ -44,11 +44,15 @@ class Baseline:
         the sums over blocks. Where and when the hypotheses differ does not matter: an effect that acts for a
         moment only can be as certain as one that always acts.
         """
-        own, other = (h.of(self.problem, part) / self.noise.scale for h in (a, b))
+        own, other = self._weighted(a, part), self._weighted(b, part)
         apart = other - own
         sums = [float(np.sum(block)) for block in np.array_split(own * apart, BLOCKS)]
         error = float(np.sqrt(max(np.sum(apart**2), np.sum(np.square(sums)))))
         return float(np.sum(other**2) - np.sum(own**2)) / 2, error
+
+    def _weighted(self, h: Hypothesis, part: Part) -> Array:
+        """Residual of h on a part of the record in units of the noise, (m, n_y)."""
+        return h.of(self.problem, part) / self.noise.scale
 
     def beats(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> bool:
         """Whether the log score of a exceeds that of b on a part by enough standard errors."""
@@ -62,7 +66,7 @@ class Baseline:
 
     def beyond_noise(self, h: Hypothesis) -> float:
         """Sum of squares on the part to choose minus its expectation for pure noise."""
-        return float(np.sum((h.of(self.problem, "choose") / self.noise.scale) ** 2 - 1))
+        return float(np.sum(self._weighted(h, "choose") ** 2 - 1))
 
     def beyond_noise_of_all(self, h: Hypothesis) -> float:
         """Sum of squares on the parts to identify and to choose minus its expectation for pure noise."""

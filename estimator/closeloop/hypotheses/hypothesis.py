@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
+from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import key, label
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
@@ -68,11 +68,6 @@ class Hypothesis:
         """Residual on a part of the record, (m, n_y)."""
         runs = zip(self.residuals, problem.record.runs, strict=True)
         return np.concatenate([r[getattr(run, part)] for r, run in runs])
-
-    def scores(self, problem: Problem, size: Array, part: Part = "choose") -> Array:
-        """Log score of each block of a part of the record, up to a constant, (BLOCKS,)."""
-        squares = np.sum((self.of(problem, part) / size) ** 2, axis=1)
-        return np.array([-0.5 * b.sum() for b in np.array_split(squares, BLOCKS)])
 
     def significance(self, base: "Hypothesis | None" = None) -> list[float]:
         """Amplitudes of each candidate over their standard error; infinite if they are fixed.

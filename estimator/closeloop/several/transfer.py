@@ -235,5 +235,5 @@ def _judged(
 def _outdone(t: _Task, own: Hypothesis, explanation: Hypothesis) -> bool:
     """Whether the explanation of the other record is better by more than a small error of form."""
     b = t.baseline
-    matters = b.lead(explanation, own)[0] >= b.policy.decision.alike * -float(b.scores(explanation).sum())
+    matters = b.lead(explanation, own)[0] >= b.policy.decision.alike * -b.score(explanation)
     return matters and b.beats(explanation, own)
