@@ -38,9 +38,11 @@ class Model(Site, ABC):
     tolerance: ClassVar[float] = 1e-6  # of a state's nominal, error of an internal step where it is known
     method: ClassVar[str] = "rk4"  # name of the integrator, see fmus/integrators
     # what the model's form is uncertain in: parameters that stand for it, with the bounds within which
-    # other methods of its kind lie, further ones of the same law, of which another value is another form
-    # too, and the share of an output that is still open after fitting the first
+    # other methods of its kind lie, choices of which each is as plausible, further parameters of the same
+    # law, of which another value is another form too, and the share of an output that is still open after
+    # fitting the first
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
     form_alike: ClassVar[tuple[str, ...]] = ()
     form_error: ClassVar[float] = 0.0
     build_options: ClassVar[tuple[BuildOption, ...]] = ()

@@ -19,7 +19,7 @@ from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
-from fmus.host.rows import offers_rows
+from fmus.host.rows import ALIKE, offers_rows
 
 
 class Refused(FmuError):
@@ -72,6 +72,11 @@ class Copies:
     def evaluate(self, values: Array, t: float) -> Array:
         """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step."""
         return self.advance(values, t, 0.0)
+
+    @property
+    def rounding(self) -> float:
+        """Share of a value by which it may differ from that of an instance alone: zero without rows."""
+        return ALIKE if isinstance(self._loop, RowsLoop) else 0.0
 
     def close(self) -> None:
         """Free all instances."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import ceil, log10
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ from estimator.filters.estimator import Diverged, Estimate
 from estimator.record import Array, BoolArray
 
 EVEN = 1e-6  # relative difference of time steps that is attributed to the rounding of printed times
+ROUNDING = 8.0  # units in the last place of a time, below which a difference of times is rounding
 TOLD = 200  # samples between two progress reports
 
 
@@ -34,10 +36,17 @@ class Samples:
     y: Array  # (N, m)
 
     @property
+    def step(self) -> float:
+        """Usual length of a time step, s, without the digits that come from the rounding of the times."""
+        usual = float(np.median(np.diff(self.t)))
+        resolution = np.spacing(np.abs(self.t).max())
+        rounded = round(usual, -ceil(log10(ROUNDING * resolution)))
+        return rounded or usual
+
+    @property
     def steps(self) -> Array:
         """Lengths of the time steps (N - 1,), s; nearly equal steps are made exactly equal."""
-        steps = np.diff(self.t)
-        usual = np.median(steps)
+        steps, usual = np.diff(self.t), self.step
         return np.where(np.abs(steps - usual) < EVEN * usual, usual, steps)
 
     def first(self, n: int) -> "Samples":

@@ -17,6 +17,7 @@ from fmus.host.instance import Array, Instance
 
 NAME = "railfmi_rows"
 AT_ONCE = 4  # rows, in the time of little more than one
+ALIKE = 1e-12  # of a value, by which a row may differ from an instance alone: vectors round otherwise
 References = NDArray[np.uint32]
 
 

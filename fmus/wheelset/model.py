@@ -92,6 +92,7 @@ class Wheelset(Model):
     name = "Wheelset"
     step_size = 1e-3
     form = MappingProxyType({"k_a": (0.5, 1.6), "k_b": (0.6, 2.6), "k_c": (0.0, 1.5), "k_spin": (0.2, 1.2)})
+    form_choices = MappingProxyType({"patch": (0.0, 1.0)})
     form_alike = ("G", "nu")
     form_error = 0.02
     method = "rk4_within_stability"

@@ -10,7 +10,7 @@ import numpy as np
 from estimator.filters.consistency import checks
 from estimator.record import Array
 from fmus.errors import BadInput
-from fmus.export.builders.pythonfmu import build_python
+from fmus.export.builders.hypotheses import build_quick
 from fmus.host.archive import Archive
 from fmus.models import model_class
 from scenarios.estimating.findings import (
@@ -83,7 +83,7 @@ def estimate(
 def fmu_of(e: Experiment, work: Path) -> Path:
     """The FMU of an experiment: the foreign FMU that it names, or a build of its model."""
     if e.model is not None:
-        return build_python(model_class(e.model)(), work)
+        return build_quick(model_class(e.model)(), work)
     if e.fmu_path is None:
         raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
     return e.fmu_path
@@ -93,6 +93,8 @@ def _standing_notes(found: Findings) -> Iterator[str]:
     """A note on each unknown that lies at a bound, or about which the record contains too little."""
     told = informed(found)
     for name, s in standings(found).items():
+        if name in found.setup.form:
+            continue
         if s.side:
             yield (
                 f"'{name}' was moved from its start {s.start:.4g} to its {s.side} bound {s.bound:.4g} by the "
@@ -119,6 +121,7 @@ def _notes(found: Findings) -> list[str]:
             f"'{a}' and '{b}' cannot be told apart (correlation {c:.3f}); only a combination of both is known"
             for a, b, c in found.after.alike
         ]
+    notes += _notes_on_form(found)
     undeclared = [
         o for o, known in zip(found.setup.outputs, found.setup.declared_noise, strict=True) if not known
     ]
@@ -129,6 +132,17 @@ def _notes(found: Findings) -> list[str]:
     if found.joint.others:
         notes.append(f"states that are simulated, not estimated: {', '.join(found.joint.others)}")
     return notes
+
+
+def _notes_on_form(found: Findings) -> Iterator[str]:
+    """What the estimate would be with each choice of the model's form."""
+    for form in found.forms:
+        choice = ", ".join(f"{name} = {value:g}" for name, value in form.choice.items())
+        values = ", ".join(f"{name} = {value:.4g}" for name, value in form.values.items())
+        counts = "" if form.consistent else "; this filter is not consistent with the record"
+        yield f"with {choice}: {values}, log likelihood {form.log_likelihood:.1f}{counts}"
+    if sum(form.consistent for form in found.forms) > 1:
+        yield "the scatter between the consistent choices of the model's form is part of the standard errors"
 
 
 def result_of(
@@ -143,7 +157,7 @@ def result_of(
     return EstimateResult(
         experiment=s.experiment.id,
         filter=s.options.filter,
-        estimated=estimated(joint, h, informed(found), bounds),
+        estimated=estimated(joint, h, informed(found), bounds, s.form),
         innovations=innovations(h, s.outputs, s.noise),
         nis=nis(h),
         checks=tests,

@@ -1,6 +1,6 @@
 """The work of estimate: noise that is not declared, what the data can tell, the filter's run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from estimator.filters.ukf import Spread
 from estimator.record import Array
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
+from scenarios.estimating.form import LEARNT, Form, begun_again, consistent, leading, widened
 from scenarios.estimating.setup import Setup, finely
 
 Tell = Callable[[str], None]
@@ -47,14 +48,57 @@ class Findings:
     before: Identifiability | None
     after: Identifiability | None
     share: float | None  # of the states' motion that is noise, where it was found from the data
+    forms: tuple[Form, ...] = ()  # what each choice of the model's form would have given
 
 
 def find(s: Setup, archive: Archive, tell: Tell) -> Findings:
-    """Run everything; the joint system of the findings is the caller's to close."""
+    """Run everything; the joint system of the findings is the caller's to close.
+
+    With several choices of the model's form, the findings are those of the likeliest one; the scatter between
+    the plausible ones is a part of the errors.
+    """
+    runs: list[Findings] = []
+    try:
+        for choice in s.choices:
+            named = ", ".join(f"{name} = {value:g}" for name, value in choice.items())
+            runs.append(_run(s.chosen(choice), archive, _with_form(tell, named)))
+    except BaseException:
+        for run in runs:
+            run.joint.close()
+        raise
+    best, among = leading([run.history for run in runs])
+    for i, run in enumerate(runs):
+        if i != best:
+            run.joint.close()
+    found, history = runs[best], widened([run.history for run in runs], best, among, s.asked)
+    value, std = found.joint.values(history.x, history.std)
+    forms = tuple(
+        Form(choice, run.history.log_likelihood, consistent(run.history), last_values(run, s.asked))
+        for choice, run in zip(s.choices, runs, strict=True)
+    )
+    return replace(found, history=history, value=value, std=std, forms=forms if len(forms) > 1 else ())
+
+
+def _with_form(tell: Tell, named: str) -> Tell:
+    """The same, with the choice of the form after each sentence."""
+    return (lambda said: tell(f"{said} ({named})")) if named else tell
+
+
+def last_values(found: Findings, names: Sequence[str]) -> dict[str, float]:
+    """The last values of the named unknowns, in the FMU's units."""
+    ends = found.value[-1].tolist() if len(found.value) else []
+    return {n: v for n, v in zip(found.history.names, ends, strict=False) if n in names}
+
+
+def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
+    """The run of a filter, with all that belongs to it."""
     share = None
     if set(s.options.process_std) < {state.name for state in s.states}:
         tell("finding how much of the states' motion is noise")
         share = _noise_share(s, archive)
+    if s.form:
+        tell("learning where the parameters of the model's form begin")
+        s = _begun_again(s, archive, share or 0.0)
     joint = s.joint(archive, share or 0.0)
     try:
         tell("weighing what the data can tell")
@@ -74,9 +118,22 @@ def find(s: Setup, archive: Archive, tell: Tell) -> Findings:
     return Findings(s, joint, history, value, std, known, learnt, share)
 
 
+def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
+    """With start values from a first run over the beginning of the record, if the filter gets through it."""
+    first = s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + LEARNT)))
+    with s.joint(archive, share) as joint:
+        try:
+            history = filtered(filter_of(s, joint, joint.start(float(first.t[0]))), first)
+        except Diverged:
+            return s
+        if history.broken:
+            return s
+        return replace(s, parameters=begun_again(s.parameters, s.form, joint, history))
+
+
 def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
     """The filter that the options ask for."""
-    o, dt = s.options, float(np.median(np.diff(s.samples.t)))
+    o, dt = s.options, s.samples.step
     gate = None if o.gate is None else Gate(o.gate)
     adapt = (
         Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None

@@ -108,12 +108,16 @@ def doubt(checks: tuple[Check, ...]) -> str:
 
 
 def estimated(
-    joint: Joint, h: History, informed: dict[str, bool], bounds: dict[str, str]
+    joint: Joint, h: History, informed: dict[str, bool], bounds: dict[str, str], form: tuple[str, ...] = ()
 ) -> dict[str, dict[str, Any]]:
-    """The last value of each quantity in the FMU's units; bounds: side of the bound that it lies at."""
+    """The last value of each quantity in the FMU's units; bounds: side of the bound that it lies at.
+
+    form: names of the parameters that stand for what the form of the model leaves open.
+    """
     if not len(h.t):
         return {}
-    kinds = ["state"] * len(joint.states) + ["parameter"] * len(joint.parameters)
+    kinds = ["state"] * len(joint.states)
+    kinds += ["form" if p.name in form else "parameter" for p in joint.parameters]
     kinds += ["input"] * (len(h.names) - len(kinds))
     value, std = joint.values(h.x[-1:], h.std[-1:])
     low, high = (joint.values(h.x[-1:] + s * BAND * h.std[-1:], h.std[-1:])[0][0] for s in (-1, 1))

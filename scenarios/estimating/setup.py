@@ -19,6 +19,7 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from fmus.model import declared
 from fmus.models import model_class
+from scenarios.estimating.form import choices, parameters_of_form
 from scenarios.estimating.unknowns import (
     check_options,
     inputs_of,
@@ -54,6 +55,17 @@ class Setup:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     free_run: Array  # (N, m) outputs simulated with the start values, nan where it fails
+    form: tuple[str, ...] = ()  # parameters that stand for what the model's form leaves open
+    choices: tuple[dict[str, float], ...] = ({},)  # of the form, each a set of constants
+
+    @property
+    def asked(self) -> list[str]:
+        """Names of the unknown parameters without those of the form."""
+        return [p.name for p in self.parameters if p.name not in self.form]
+
+    def chosen(self, choice: Mapping[str, float]) -> "Setup":
+        """The same with one choice of the form."""
+        return replace(self, constants={**self.constants, **choice})
 
     def joint(self, archive: Archive, part: float) -> Joint:
         """The system; a state without declared noise is driven by noise of `part` of its motion."""
@@ -65,7 +77,7 @@ class Setup:
         s = self.samples
         return Joint(
             archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,
-            dt=float(np.median(np.diff(s.t))), t0=float(s.t[0]),
+            dt=s.step, t0=float(s.t[0]),
         )  # fmt: skip
 
 
@@ -86,8 +98,9 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     noise = noise_of(record)
     constants = {**e.parameters, **e.initial}
     parameters = tuple(parameters_of(e, options, d))
+    form = tuple(parameters_of_form(e, options, d, [p.name for p in parameters]))
     unknown = tuple(inputs_of(e, options))
-    values = constants | {p.name: p.start for p in parameters}
+    values = constants | {p.name: p.start for p in (*parameters, *form)}
     names = tuple(e.estimate.states) if e.estimate else ()
     states = names or _needed(archive, values, s, record)
     _check_alarms(e, options, (*states, *(u.name for u in (*parameters, *unknown))))
@@ -96,9 +109,10 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
     return Setup(
         e, options, s, noise, tuple(np.isfinite(record.noise_std)), constants,
-        tuple(states_of(e, options, d, record, noise, states)), parameters, unknown,
+        tuple(states_of(e, options, d, record, noise, states)), (*parameters, *form), unknown,
         motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
-        record.inputs, record.outputs, run_of[:, : len(record.outputs)],
+        record.inputs, record.outputs, run_of[:, : len(record.outputs)], tuple(p.name for p in form),
+        tuple(choices(e, options)),
     )  # fmt: skip
 
 
@@ -160,8 +174,7 @@ def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: R
     get = [*states, *(n for n in record.outputs if n not in states)]
     with Copies(archive, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
         row = np.array([*first, *s.u[0].tolist()])
-        dt = float(np.median(np.diff(s.t)))
-        return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), dt))
+        return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), s.step))
 
 
 def _fine_enough(

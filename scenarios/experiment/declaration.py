@@ -179,7 +179,7 @@ class Options(Table):
     process_std: noise that drives a state, its unit/sqrt(s). walk: how far a parameter wanders in a second,
     its unit/sqrt(s). initial_std: what is known of a state's start. damping: of an unknown input's process.
     input_parts: in how many parts inputs act between two samples. alarms: in place of those that the model
-    declares.
+    declares. form: whether what the form of the model leaves open is estimated too.
     """
 
     filter: Filter = "ukf"
@@ -193,6 +193,7 @@ class Options(Table):
     gate: Positive | None = None
     adapt: tuple[Literal["measurement", "process"], ...] = ()
     input_parts: Annotated[int, Field(strict=True, ge=1)] | None = None
+    form: bool = True
     alpha: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0
     beta: Number = 2.0
     kappa: Number = 0.0

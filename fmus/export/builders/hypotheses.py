@@ -177,9 +177,20 @@ def _once(
     target = folder / name / "model.fmu"
     if not target.exists():
         part = target.with_name(f"{os.getpid()}.fmu")
-        try:
-            native(part)
-        except BadInput:
-            python(part)
+        _quickest(part, native, python)
         part.replace(target)  # workers may build the same at once
     return target
+
+
+def build_quick(model: Model, folder: Path) -> Path:
+    """An FMU of a model for many steps on this machine: native, or a PythonFMU if there is no compiler."""
+    out = folder / f"{model.name}.fmu"
+    _quickest(out, lambda path: build_working(model, path), lambda path: build_python(model, path))
+    return out
+
+
+def _quickest(out: Path, native: Callable[[Path], Path], python: Callable[[Path], Path]) -> None:
+    try:
+        native(out)
+    except BadInput:
+        python(out)

@@ -1,0 +1,105 @@
+"""What the form of a model leaves open in an estimate: parameters to estimate, and choices to compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from estimator.filters.bounds import bounded
+from estimator.filters.consistency import mean_band
+from estimator.filters.history import History
+from estimator.filters.system import Joint, UnknownParameter
+from fmus.host.description import FmuDescription
+from fmus.models import model_class
+from scenarios.experiment.declaration import Options
+from scenarios.experiment.experiment import Experiment
+
+LEARNT = 30.0  # s of the record from which a second run of the filter takes its start values
+WIDER = 10.0  # times the standard errors of the first run: start deviation of the second
+INSIDE = 0.02  # share of the width between the bounds that a start value keeps from them
+
+
+@dataclass(frozen=True)
+class Form:
+    """One choice of a model's form: constants by name; consistent: whether its filter passed the NIS test."""
+
+    choice: dict[str, float]
+    log_likelihood: float
+    consistent: bool
+    values: dict[str, float]  # last value of each unknown parameter, without those of the form
+
+
+def parameters_of_form(
+    e: Experiment, o: Options, d: FmuDescription, given: Sequence[str]
+) -> Iterator[UnknownParameter]:
+    """The parameters that stand for what the model's form leaves open, if parameters are estimated.
+
+    Those that the experiment declares or estimates are left out. given: names of the estimated parameters.
+    """
+    if e.model is None or not given or not o.form:
+        return
+    for name, (low, high) in model_class(e.model).form.items():
+        if name not in given and name not in e.parameters:
+            start = float(np.clip(d.variables[name].start or 0.0, *_inside(low, high)))
+            yield UnknownParameter(name, start, (high - low) / 4, bounded((low, high)))
+
+
+def choices(e: Experiment, o: Options) -> list[dict[str, float]]:
+    """Every combination of the choices that the model's form leaves open and the experiment does not make."""
+    if e.model is None or not e.estimate or not e.estimate.parameters or not o.form:
+        return [{}]
+    open_ones = {n: v for n, v in model_class(e.model).form_choices.items() if n not in e.parameters}
+    return [dict(zip(open_ones, values, strict=True)) for values in product(*open_ones.values())]
+
+
+def begun_again(
+    parameters: Sequence[UnknownParameter], form: Sequence[str], joint: Joint, first: History
+) -> tuple[UnknownParameter, ...]:
+    """The parameters, those of the form with start values from a first run of the filter.
+
+    An unscented filter that begins with wide uncertainties of several parameters becomes surer than its
+    linearisation allows. The second run begins near the right place; the start deviations are so much wider
+    than the errors of the first run that its data are hardly counted twice.
+    """
+    value, std = (x[-1] for x in joint.values(first.x[-1:], first.std[-1:]))
+    found = {n: (float(v), float(s)) for n, v, s in zip(first.names, value, std, strict=True)}
+    return tuple(_moved(p, *found[p.name]) if p.name in form else p for p in parameters)
+
+
+def _moved(p: UnknownParameter, value: float, std: float) -> UnknownParameter:
+    inside = _inside(p.transform.low, p.transform.high)
+    return replace(p, start=float(np.clip(value, *inside)), std=min(p.std, WIDER * std))
+
+
+def _inside(low: float, high: float) -> tuple[float, float]:
+    return low + INSIDE * (high - low), high - INSIDE * (high - low)
+
+
+def consistent(h: History) -> bool:
+    """Whether a filter ran to the end and passes the test of its mean NIS."""
+    used = h.freedom > 0
+    return not h.broken and mean_band(h.nis[used], h.freedom[used]).within
+
+
+def leading(histories: Sequence[History]) -> tuple[int, list[int]]:
+    """The likeliest form, and all forms that are as plausible as it.
+
+    These are the forms that pass the NIS test; if none does, none deserves more trust than another.
+    """
+    complete = [i for i, h in enumerate(histories) if not h.broken]
+    among = [i for i in complete if consistent(histories[i])] or complete or [0]
+    return max(among, key=lambda i: histories[i].log_likelihood), among
+
+
+def widened(histories: Sequence[History], best: int, among: Sequence[int], names: Sequence[str]) -> History:
+    """The history of the best form, with the scatter of the named unknowns between forms in their errors."""
+    h = histories[best]
+    if len(among) < 2:
+        return h
+    every = np.array([histories[i].x for i in among])
+    scatter = np.var(every, axis=0, ddof=1)
+    shared = np.isin(h.names, names).astype(float)
+    return replace(h, std=np.sqrt(h.std**2 + scatter * shared))
