@@ -1,11 +1,12 @@
 """Noise of the measured outputs, declared or estimated, and the weights of the residuals."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.record import Array, BoolArray, Record
+from estimator.weighting import Weighting, correlation_of
 
 # weights of the third difference; white noise of variance 1 leaves variance 20
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
@@ -15,23 +16,63 @@ DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
 class Noise:
     """Noise of the outputs of a record.
 
-    std: (n_y,) standard deviation, declared or estimated; scale: (n_y,) unit of the residuals in fits and
-    scores, which is the standard deviation if that is declared; declared: (n_y,) whether it is.
+    std: (n_y,) standard deviation, declared or estimated; weighting: the weights of residuals in fits and
+    scores, whose sizes are the standard deviations if these are declared; declared: (n_y,) whether they are.
     """
 
     std: Array
-    scale: Array
+    weighting: Weighting
     declared: BoolArray
 
     @classmethod
-    def of(cls, record: Record, residuals: Sequence[Array]) -> "Noise":
-        """Noise of a record, from the residual (N, n_y) of a fit in each run."""
-        return cls(noise_floor(record), weights(record, residuals), record.noise_declared)
+    def of(cls, record: Record, residuals: Sequence[Array], chance: float) -> "Noise":
+        """Noise of a record, from the residual (N, n_y) of a fit in each run.
+
+        A declared size says how large the noise is, not that it is white. If the residual is no larger than
+        that, it is taken as noise, and its correlation in time is estimated from it. chance: how far its mean
+        square may exceed the declared one, in standard deviations.
+        """
+        floor, fitted = noise_floor(record), _fitted(record, residuals)
+        correlation = []
+        for j, declared in enumerate(record.noise_declared):
+            parts = [r[:, j] / floor[j] for r in fitted]
+            correlation.append(_of_noise(parts, chance) if declared else np.ones(1))
+        weighting = Weighting(weights(record, residuals), tuple(correlation))
+        return cls(floor, weighting, record.noise_declared)
+
+    @property
+    def scale(self) -> Array:
+        """Unit of the residuals in fits and scores, (n_y,)."""
+        return self.weighting.size
+
+    @property
+    def redundancy(self) -> Array:
+        """Samples per independent one in a mean square, (n_y,)."""
+        return self.weighting.redundancy
+
+    @property
+    def floor(self) -> Weighting:
+        """Weights by the standard deviations, also where noise is not declared."""
+        return replace(self.weighting, size=self.std)
 
     @property
     def known(self) -> bool:
         """Whether it is declared for all outputs, so that a residual can be compared with it."""
         return bool(self.declared.all())
+
+
+def _fitted(record: Record, residuals: Sequence[Array]) -> list[Array]:
+    """The residual on the part to identify of each run that has one, (n, n_y) each."""
+    return [r[run.fit] for r, run in zip(residuals, record.runs, strict=True) if run.fit.any()]
+
+
+def _of_noise(parts: Sequence[Array], chance: float) -> Array:
+    """Autocorrelation of a residual in units of its noise, in stretches (n,); white if it is larger."""
+    found = correlation_of(parts)
+    redundancy = Weighting(np.ones(1), (found,)).redundancy[0]
+    squares = np.concatenate(parts) ** 2
+    alike = squares.mean() <= 1 + chance * np.sqrt(2 * redundancy / len(squares))
+    return found if alike else np.ones(1)
 
 
 def white_noise(pieces: Iterable[Array], quantised: bool = False) -> float:
@@ -80,7 +121,7 @@ def weights(record: Record, residuals: Sequence[Array]) -> Array:
     """
     size = record.noise_std.copy()
     for j in np.flatnonzero(~record.noise_declared):
-        parts = [r[run.fit, j] for r, run in zip(residuals, record.runs, strict=True) if run.fit.any()]
+        parts = [r[:, j] for r in _fitted(record, residuals)]
         tau = np.mean([correlation_time(p) for p in parts])
         size[j] = np.sqrt(np.mean(np.concatenate(parts) ** 2) * tau)
     return np.maximum(size, noise_floor(record))

@@ -110,7 +110,7 @@ class Case:
     def __init__(self, experiment: Path, work: Path) -> None:
         self.problem = problem = Posed.of(experiment_of(experiment), work).problem
         _, base, noise = calibrate(problem)
-        self.fit, self.scale = base.fit, noise.scale
+        self.fit, self.weighting = base.fit, noise.weighting
         self.forces = missing_forces(problem, base.fit.theta, noise.std)
         self.candidates = physical_candidates(
             problem.builder.offers, problem.builder.outside(), problem.record, self.forces
@@ -121,7 +121,7 @@ class Case:
         """Screen some of the candidates, taken evenly from all, from the linearisation on."""
         every = np.linspace(0, len(self.candidates) - 1, count).astype(int)
         some = [self.candidates[i] for i in every]
-        screening = Screening(self.problem, self.fit, self.scale, self.forces)
+        screening = Screening(self.problem, self.fit, self.weighting, self.forces)
         changes = screening.changes(some)
         screen(screening.fit, [((c,), g) for c, g in zip(some, changes, strict=True)])
 

@@ -24,6 +24,7 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.noise import Noise
+from estimator.weighting import Weighting
 from fmus import codec
 from fmus.host.description import PortNames
 
@@ -32,7 +33,7 @@ Result = TypeVar("Result")
 SUFFIX = ".checkpoint"
 KEPT = (
     Unknown, Candidate, Fit, Hypothesis, Promise, PortNames, MissingForce, Detection, BlackBox, Visible,
-    Diagnostics, Check, Judgement, Noise,
+    Diagnostics, Check, Judgement, Noise, Weighting,
 )  # fmt: skip
 # do not follow a link or wait for a pipe, even if it replaces the file just before it is opened
 SAFELY = (

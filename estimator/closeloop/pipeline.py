@@ -18,7 +18,7 @@ from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
-from estimator.closeloop.fitting.reweighted import reweighted
+from estimator.closeloop.fitting.reweighted import needed, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
@@ -100,7 +100,7 @@ class Chain:
     def _searched(self, found: Outcome, shown: Screened, before: Sequence[Check]) -> Outcome:
         """The outcome of the search for a detected discrepancy; before: the checks of the detection."""
         singles, pairs = self._search(shown).run()
-        if not shown.baseline.noise.known and (singles or pairs):
+        if needed(shown.baseline, [singles, pairs]):
             self.tell("weights", "weighting the residuals by the noise that the best fit leaves")
             shown, singles, pairs = self._weighted_anew(shown, singles, pairs)
         baseline = shown.baseline

@@ -49,7 +49,7 @@ SCREENED = """
     asked = problem(ModelBuilder("drive", Path("drive")), made)
     _, base, noise = calibrate(asked)
     faults = fault_candidates(made, NOISE)
-    screening = Screening(asked, base.fit, noise.scale)
+    screening = Screening(asked, base.fit, noise.weighting)
     best = screen(screening.fit, [((c,), g) for c, g in zip(faults, screening.changes(faults))])[0]
     print(*(c.label for c in faults), best.label, best.start["sensor_square_q_dot"])
 """

@@ -37,6 +37,7 @@ from estimator.closeloop.screening.regressors import Calibration, alike, lengths
 from estimator.closeloop.screening.screen import Screening
 from estimator.closeloop.search.free_form import curve_of, free_form, resolved
 from estimator.record import Array, Record, Run
+from estimator.weighting import Weighting
 from fmus.effects import EFFECTS, offers
 from fmus.effects.free_form import CONTROLS, FreeForm
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -467,7 +468,7 @@ def test_the_page_and_the_result_hold_what_stands_beside_the_finding(
         asked.builder.outside(), asked.record, outcome.forces,
     )  # fmt: skip
     chosen = [*faults, *forces]
-    screening = Screening(asked, outcome.base.fit, NOISE, outcome.forces)
+    screening = Screening(asked, outcome.base.fit, Weighting.white(NOISE), outcome.forces)
     change = list(zip(chosen, screening.changes(chosen), strict=True))
     rng = np.random.default_rng(1)
     beside = diagnose(outcome.baseline, screening.fit, change, LEVEL, rng)

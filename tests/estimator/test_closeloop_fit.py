@@ -27,6 +27,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Run
+from estimator.weighting import Weighting
 from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.problems import OneByOne
 
@@ -64,7 +65,7 @@ NAMES = (
 def test_a_fit_along_secants_ends_where_no_direction_gains(size, damping, speed, seed):
     noise = 0.1 * np.random.default_rng(seed).standard_normal(2000)
     asked = Curved(np.array([size, damping, speed]), noise)
-    found = fit(asked, NAMES, np.array([0.1]))
+    found = fit(asked, NAMES, Weighting.white(np.array([0.1])))
     assert found.converged
     score = found.jacobian.T @ found.residual
     assert np.all(np.abs(score) * np.sqrt(np.diag(found.covariance)) < 0.2)  # of a standard error
@@ -76,7 +77,7 @@ def test_a_fit_along_secants_ends_where_no_direction_gains(size, damping, speed,
 
 def test_secants_spare_simulations():
     asked = Curved(np.array([1.2, 0.12, 3.05]), 0.1 * np.random.default_rng(0).standard_normal(2000))
-    fit(asked, NAMES, np.array([0.1]), gain=1e-9)
+    fit(asked, NAMES, Weighting.white(np.array([0.1])), gain=1e-9)
     assert asked.count < 20  # with differences at every step of the same way 6 times 4
 
 
@@ -104,12 +105,13 @@ class Rugged(OneByOne):
 def test_finer_differences_see_the_slopes_of_a_rugged_valley(phase, t0):
     asked = Rugged(phase)
     x, moment = Unknown("x", 0.5, -9.0, 9.0, 1.0), Unknown("step_force_wheel_t0", t0, 0.0, 1.0, 1.0)
-    valley = fit(asked, (x,), np.ones(1), fixed={moment.name: 0.5})
-    found = fit(asked, (x,), np.ones(1), valley.theta, fixed={moment.name: 0.5}, step=FINE_STEP)
+    unit = Weighting.white(np.ones(1))
+    valley = fit(asked, (x,), unit, fixed={moment.name: 0.5})
+    found = fit(asked, (x,), unit, valley.theta, fixed={moment.name: 0.5}, step=FINE_STEP)
     assert found.residual @ found.residual <= valley.residual @ valley.residual < 0.45**2 * 100 + 101
     slope = -1e-3 / 0.004 * np.sin(found.values[0] / 0.004 + phase)
     assert_allclose(found.jacobian[100:200, 0], slope, atol=1e-3)
-    timed = fit(asked, (x, moment), np.ones(1), step=FINE_STEP)
+    timed = fit(asked, (x, moment), unit, step=FINE_STEP)
     assert np.any(timed.jacobian[:, 1])  # a moment is not moved less than a sample
 
 
@@ -261,7 +263,7 @@ class Summed(OneByOne):
 @given(st.floats(1.0, 3.0), st.floats(0.0, 8.0), st.floats(1.0, 3.0))
 def test_of_two_that_tell_their_sum_the_bounded_one_ends_in_the_middle(true_b, begin_a, begin_b):
     unknowns = Unknown("a", begin_a, -np.inf, np.inf, 1.0), Unknown("b", begin_b, 1.0, 3.0, 0.2)
-    found = fit(Summed(5.0, true_b), unknowns, np.array([0.01]))
+    found = fit(Summed(5.0, true_b), unknowns, Weighting.white(np.array([0.01])))
     assert found.theta["b"] == pytest.approx(2.0, abs=0.06)
     assert found.theta["a"] + 2 * found.theta["b"] == pytest.approx(5.0 + 2 * true_b, abs=0.01)
     assert found.std["b"] == pytest.approx(2 / np.sqrt(12), rel=0.02)
@@ -333,7 +335,7 @@ class Playing(OneByOne):
 def played(seed: int) -> tuple[Playing, Hypothesis]:
     asked = Playing(seed)
     k, gap = Unknown("k", 0.0, 0.0, np.inf, 1.0), Unknown("gap", 0.2, 0.0, np.inf, 0.02)
-    found = fit(asked, (k, gap), np.array([0.2]), {"k": 0.8, "gap": 0.25})
+    found = fit(asked, (k, gap), Weighting.white(np.array([0.2])), {"k": 0.8, "gap": 0.25})
     return asked, Hypothesis((Candidate("free_play", "spring", (k,), (gap,)),), found, ())
 
 
@@ -389,7 +391,7 @@ class Beginning(Playing):
 def begun(moment: float, start: float, seed: int) -> tuple[Beginning, Hypothesis]:
     asked = Beginning(moment, seed)
     d, t0 = Unknown("d", 0.0, -np.inf, np.inf, 1.0), Unknown("d_t0", start, 0.0, 8.0, 0.05)
-    found = fit(asked, (d, t0), np.array([0.1]), {"d": 0.9, "d_t0": start})
+    found = fit(asked, (d, t0), Weighting.white(np.array([0.1])), {"d": 0.9, "d_t0": start})
     return asked, Hypothesis((Candidate("damping_change", "spring", (d,), (t0,)),), found, ())
 
 
@@ -412,8 +414,8 @@ class Refitter(Fitter):
 
     def finished(self, promises, unknowns=None, guess=None, step=STEP):
         """See Fitter."""
-        problem, size = self.baseline.problem, self.baseline.noise.scale
-        fits = [fit(problem, p.candidates[0].unknowns, size, p.start) for p in promises]
+        problem, weighting = self.baseline.problem, self.baseline.noise.weighting
+        fits = [fit(problem, p.candidates[0].unknowns, weighting, p.start) for p in promises]
         return [Hypothesis(p.candidates, found, ()) for p, found in zip(promises, fits, strict=True)]
 
 

@@ -20,6 +20,7 @@ from estimator.closeloop.screening.screen import screen
 from estimator.noise import correlation_time, noise_floor
 from estimator.record import Record, Run
 from estimator.sensor_faults import FAULTS, faulty
+from estimator.weighting import Weighting
 from fmus.drive.model import Drive
 from fmus.effects.spectrum import orders
 from fmus.export.around.outside import around
@@ -103,7 +104,7 @@ def test_pushes_recover_the_missing_force_without_any_state(drive: ForeignBuilde
 
 def test_calibration_finds_the_mass_within_its_standard_error(drive: ForeignBuilder) -> None:
     asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(2))
-    found = fit(asked, [Unknown("M", 90.0, 80.0, 110.0, 3.0)], NOISE)
+    found = fit(asked, [Unknown("M", 90.0, 80.0, 110.0, 3.0)], Weighting.white(NOISE))
     assert abs(found.theta["M"] - 95.0) < 4 * found.std["M"]
     assert found.std["M"] < 0.1
     assert_allclose(np.mean(found.residual**2), 1.0, atol=0.1)
@@ -111,7 +112,7 @@ def test_calibration_finds_the_mass_within_its_standard_error(drive: ForeignBuil
 
 def test_a_fit_stays_within_bounds_and_says_so_by_its_value(drive: ForeignBuilder) -> None:
     asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(3))
-    found = fit(asked, [Unknown("M", 85.0, 80.0, 90.0, 1.0)], NOISE)
+    found = fit(asked, [Unknown("M", 85.0, 80.0, 90.0, 1.0)], Weighting.white(NOISE))
     assert 89.9 < found.theta["M"] <= 90.0
 
 

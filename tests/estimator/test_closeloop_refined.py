@@ -20,6 +20,7 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Run
+from estimator.weighting import Weighting
 from tests.helpers.baselines import baseline
 from tests.helpers.problems import OneByOne
 
@@ -63,7 +64,10 @@ class Refitter(Fitter):
         guess: Mapping[str, Array] | None = None, step: float = STEP,
     ) -> list[Hypothesis]:  # fmt: skip
         """See Fitter."""
-        return [at_rest(self.baseline.problem, p.candidates[0], SIZE, p.start, step) for p in promises]
+        return [
+            at_rest(self.baseline.problem, p.candidates[0], Weighting.white(SIZE), p.start, step)
+            for p in promises
+        ]
 
 
 def fitter(asked: Problem) -> Refitter:
@@ -71,17 +75,17 @@ def fitter(asked: Problem) -> Refitter:
 
 
 def at_rest(
-    problem: Problem, c: Candidate, size: Array, start: Mapping[str, float], step: float = STEP
+    problem: Problem, c: Candidate, weighting: Weighting, start: Mapping[str, float], step: float = STEP
 ) -> Hypothesis:
     """Where a fit from `start` ends."""
-    return Hypothesis((c,), fit(problem, c.unknowns, size, start, step=step), ())
+    return Hypothesis((c,), fit(problem, c.unknowns, weighting, start, step=step), ())
 
 
 def swung(seed: int, off: float) -> tuple[Swinging, Hypothesis]:
     """A record, and where a fit from a stiffness that is a little off ends."""
     asked = Swinging(10.0, seed)
     law = Candidate("stiffness_change", "spring", (AMPLITUDE,), (STIFFNESS,))
-    return asked, at_rest(asked, law, SIZE, {"q": 1.0, "k": 10.0 + off})
+    return asked, at_rest(asked, law, Weighting.white(SIZE), {"q": 1.0, "k": 10.0 + off})
 
 
 @settings(max_examples=20)

@@ -25,6 +25,7 @@ from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
 from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.record import Run
+from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
 from fmus.export.builders.hypotheses import ModelBuilder
 from tests.helpers.baselines import baseline, fit_with
@@ -124,7 +125,7 @@ def test_a_law_is_outgrown_where_more_gains_much_more_than_chance(before, enough
 class Seen:
     """A screening of white noise; see Screening."""
 
-    size, group = np.ones(1), 1
+    weighting, group = Weighting.white(np.ones(1)), 1
 
 
 @pytest.mark.parametrize(
@@ -165,7 +166,7 @@ def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_sugg
     o = looked_at("spring", asked, ("cubic_stiffness",)).found
     offers = [(kind, "carriage") for kind in ("cubic_stiffness", "harmonic_excitation")]
     candidates = physical_candidates(offers, asked.builder.outside(), asked.record, o.forces)
-    screening = Screening(asked, o.base.fit, o.baseline.noise.scale, o.forces)
+    screening = Screening(asked, o.base.fit, o.baseline.noise.weighting, o.forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     found, _ = try_pairs(Fitter(o.baseline), screening, o.singles, change)
     both = min(found, key=cost)
@@ -208,7 +209,7 @@ def test_a_moment_some_swings_off_is_found(moment, off):
     asked, size = Swinging(moment), np.array([0.1])
     own = Unknown("F_0", 0.0, -9.0, 9.0, 1.0), Unknown("step_t0", moment + off, -np.inf, np.inf, 0.1)
     late = Candidate("step_force", "wheel", own[:1], own[1:])
-    start = fit(asked, own, size, {"F_0": 1.0})
+    start = fit(asked, own, Weighting.white(size), {"F_0": 1.0})
     assume(abs(start.theta["step_t0"] - moment) < 0.7)  # as far as is looked
     h = Hypothesis((late,), start, tuple(asked.residuals(start.theta)))
     with pytest.MonkeyPatch.context() as patch:

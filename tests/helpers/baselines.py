@@ -11,6 +11,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Unknown
 from estimator.noise import Noise
 from estimator.record import Array
+from estimator.weighting import Weighting
 
 NOTHING = Hypothesis((), Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(1), ()), ())
 
@@ -27,4 +28,4 @@ def baseline(
 ) -> Baseline:
     """A baseline with noise of this size (n_y,), declared or not."""
     std = np.atleast_1d(np.asarray(noise, dtype=float))
-    return Baseline(problem, base, Noise(std, std, np.ones(len(std), bool)))
+    return Baseline(problem, base, Noise(std, Weighting.white(std), np.ones(len(std), bool)))

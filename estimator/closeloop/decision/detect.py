@@ -64,13 +64,17 @@ def detect(
     """
     limits, runs = baseline.policy.detection, baseline.problem.record.runs
     fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
-    left = np.concatenate(baseline.hypothesis.residuals)[unseen] / baseline.noise.std
+    white = baseline.noise.floor.of
+    left = white(np.concatenate(baseline.hypothesis.residuals)[unseen])
     slopes = _sensitivities(baseline)
     observed = _figures(left, limits.slow_blocks)
-    n = slopes.shape[2]
+    n = len(slopes)
+    early, late = (
+        np.reshape([white(slope[part]).ravel() for slope in slopes], (n, -1)).T for part in (fitted, unseen)
+    )
     # noise in the part to identify changes the calibrated values by root @ white noise
-    root = np.linalg.pinv(np.linalg.qr(slopes[fitted].reshape(-1, n), mode="r")) if n else np.zeros((0, 0))
-    late, copies = slopes[unseen].reshape(left.size, n), []
+    root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if n else np.zeros((0, 0))
+    copies = []
     for _ in range(limits.replicates):
         e = rng.standard_normal(left.shape)
         if n:
@@ -91,15 +95,13 @@ def detect(
     return Detection(limits.level, p_value, figures, size, likeness, sets_in)
 
 
-def _sensitivities(baseline: Baseline) -> Array:
-    """Derivatives of the whole residual, in units of the noise, with respect to the unknowns, (N, n_y, n)."""
+def _sensitivities(baseline: Baseline) -> list[Array]:
+    """Derivatives of the whole residual with respect to each unknown, (N, n_y) each."""
     base, problem = baseline.hypothesis, baseline.problem
     here, theta, unknowns = np.concatenate(base.residuals), base.fit.theta, base.fit.unknowns
-    slopes = np.empty((*here.shape, len(unknowns)))
     aside = [{**theta, u.name: theta[u.name] + STEP * u.scale} for u in unknowns]
-    for i, moved in enumerate(problem.several_residuals(aside)):
-        slopes[:, :, i] = (np.concatenate(moved) - here) / baseline.noise.std / (STEP * unknowns[i].scale)
-    return slopes
+    moved = problem.several_residuals(aside)
+    return [(np.concatenate(r) - here) / (STEP * u.scale) for u, r in zip(unknowns, moved, strict=True)]
 
 
 def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:

@@ -111,7 +111,7 @@ def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce])
         return 0.0
     problem = baseline.problem
     curves = physical_candidates(mine, problem.builder.outside(), problem.record, forces)
-    screening = Screening(built(problem, h.candidates), h.fit, baseline.noise.scale)
+    screening = Screening(built(problem, h.candidates), h.fit, baseline.noise.weighting)
     change = screening.changes(curves)
     found = screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)])
     return max((p.gain for p in found), default=0.0)

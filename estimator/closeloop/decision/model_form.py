@@ -77,7 +77,7 @@ class ModelForm(ABC):
         """Outputs (n_y,) whose residual comes down to the noise, or nearly so, with a hypothesis."""
         b, limits = self.baseline, self.baseline.policy.decision
         before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
-        scatter = limits.scatter / np.sqrt(2 * len(h.of(b.problem, "choose")))
+        scatter = limits.scatter * np.sqrt(b.noise.redundancy / (2 * len(h.of(b.problem, "choose"))))
         down: BoolArray = after < (limits.clean + scatter) * b.noise.std
         return down | (gap_closed(before, after, b.noise.std) >= limits.gap)
 
@@ -85,7 +85,7 @@ class ModelForm(ABC):
         """Rms (n_y,) of the calibrated FMU's residual on a part, beyond noise and its chance scatter."""
         b = self.baseline
         residual = b.hypothesis.of(b.problem, part)
-        chance = 1 + b.policy.detection.chance * np.sqrt(2 / max(len(residual), 1))
+        chance = 1 + b.policy.detection.chance * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
         squares = np.mean(residual**2, axis=0) - chance * b.noise.std**2
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 

@@ -169,7 +169,7 @@ def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis) -> bool:
 def _noise_alone(baseline: Baseline, part: Part) -> bool:
     """Whether the residual of the calibrated FMU on a part of the record is only noise."""
     residual = baseline.hypothesis.of(baseline.problem, part)
-    scatter = baseline.policy.decision.scatter / np.sqrt(2 * len(residual))
+    scatter = baseline.policy.decision.scatter * np.sqrt(baseline.noise.redundancy / (2 * len(residual)))
     return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * baseline.noise.std))
 
 

@@ -6,6 +6,7 @@ from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.noise import Noise, noise_floor, weights
+from estimator.weighting import Weighting
 
 ROUGH = 1e-3  # tolerance of the first fit, which is enough while the residual is large
 ROUGHLY_MATCHED = 2.0  # mean square of the weighted residual, below which the fit is continued accurately
@@ -20,20 +21,24 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
     record = problem.record
     states = _start_unknowns(problem)
     spread = np.std(np.vstack([run.y for run in record.runs]), axis=0) + noise_floor(record)
-    start = fit(problem, states, spread, gain=ROUGH)
+    start = fit(problem, states, Weighting.white(spread), gain=ROUGH)
     declared = Hypothesis((), start, tuple(problem.residuals(start.theta)))
     parameters = [
         Unknown(n, problem.declared[n], low, high, (high - low) / 10)
         for n, (low, high) in problem.calibrate.items()
     ]
     unknowns = [*parameters, *states]
-    base, noise = declared, Noise.of(record, declared.residuals)
+    chance = problem.policy.detection.chance
+    base, noise = declared, Noise.of(record, declared.residuals, chance)
     for _ in range(1 if noise.known else 2):
-        found = fit(problem, unknowns, noise.scale, base.fit.theta, gain=ROUGH)
+        found = fit(problem, unknowns, noise.weighting, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < ROUGHLY_MATCHED:
-            found = fit(problem, unknowns, noise.scale, found.theta)
+            found = fit(problem, unknowns, noise.weighting, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
-        noise = Noise.of(record, base.residuals)
+        noise = Noise.of(record, base.residuals, chance)
+    if not noise.weighting.is_white:
+        found = fit(problem, unknowns, noise.weighting, base.fit.theta)
+        base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
     return declared, base, noise
 
 

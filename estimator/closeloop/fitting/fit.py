@@ -17,6 +17,7 @@ from estimator.closeloop.hypotheses.fitted import (
 )
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
+from estimator.weighting import Weighting
 from fmus.host.fmu import FmuError
 
 GAIN = 1e-6  # relative reduction of the sum of squares, below which the fit ends
@@ -41,35 +42,37 @@ Function = Callable[[Array], Array]
 Named = Callable[[Sequence[float]], dict[str, float]]  # values by name for a vector of unknowns
 
 
-def weighted(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
-    """Residual on the part to identify divided by `size` (n_y,), sample after sample, (m,)."""
-    return several_weighted(problem, [theta], size)[0]
+def weighted(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Array:
+    """Weighted residual on the part to identify, sample after sample, (m,)."""
+    return several_weighted(problem, [theta], weighting)[0]
 
 
-def several_weighted(problem: Problem, thetas: Sequence[Mapping[str, float]], size: Array) -> list[Array]:
+def several_weighted(
+    problem: Problem, thetas: Sequence[Mapping[str, float]], weighting: Weighting
+) -> list[Array]:
     """As `weighted` for each of several unknowns with the same names."""
     found = problem.identify_residuals(thetas)
     if found is None:
-        return [_alone(problem, theta, size) for theta in thetas]
-    return [_limited(residual, size) for residual in found]
+        return [_alone(problem, theta, weighting) for theta in thetas]
+    return [_limited(residual, weighting) for residual in found]
 
 
-def _alone(problem: Problem, theta: Mapping[str, float], size: Array) -> Array:
+def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Array:
     try:
-        return _limited(problem.identify_residual(theta), size)
+        return _limited(problem.identify_residual(theta), weighting)
     except FmuError:
         samples = sum(int(run.fit.sum()) for run in problem.record.runs)
-        return np.full(samples * len(size), REFUSED)
+        return np.full(samples * len(weighting), REFUSED)
 
 
-def _limited(residual: Array, size: Array) -> Array:
-    return np.nan_to_num(np.clip((residual / size).ravel(), -REFUSED, REFUSED), nan=REFUSED)
+def _limited(residual: Array, weighting: Weighting) -> Array:
+    return np.nan_to_num(np.clip(weighting.of(residual).ravel(), -REFUSED, REFUSED), nan=REFUSED)
 
 
 def fit(
     problem: Problem,
     unknowns: Sequence[Unknown],
-    size: Array,
+    weighting: Weighting,
     start: Mapping[str, float] | None = None,
     fixed: Mapping[str, float] | None = None,
     evaluations: int = 30,
@@ -94,14 +97,14 @@ def fit(
         return {**(fixed or {}), **dict(zip(names, x, strict=True))}
 
     if not unknowns:
-        alone = weighted(problem, theta(x0.tolist()), size)
+        alone = weighted(problem, theta(x0.tolist()), weighting)
         return Fit((), x0, np.empty((0, 0)), alone, ())
     fading = [i for i, name in enumerate(names) if name in problem.free_states]
     if fading and sum(run.fit.any() for run in problem.record.runs) > 1:
         fading = []  # a first share of each run is no first share of the residual
     steps = np.array([STEP if u.is_onset else step for u in unknowns])
     given = [(known or {}).get(n) for n in names]
-    slopes = Slopes(_residuals(problem, theta, size), scale, high, given, fading, steps, problem.at_once)
+    slopes = Slopes(_residuals(problem, theta, weighting), scale, high, given, fading, steps, problem.at_once)
     x = np.clip(x0, low + 1e-9 * scale, high - 1e-9 * scale)
     slopes.by_differences(x, [(guess or {}).get(u.name) for u in unknowns])
     secants = not known and bool(problem.record.noise_declared.all())
@@ -116,10 +119,10 @@ def fit(
     return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, found, converged)
 
 
-def _residuals(problem: Problem, theta: Named, size: Array) -> Residuals:
+def _residuals(problem: Problem, theta: Named, weighting: Weighting) -> Residuals:
     """The weighted residuals on a first share of the part, as a function of several x."""
     part = lru_cache(lambda share: problem if share == 1.0 else problem.beginning(share))
-    return lambda xs, share: several_weighted(part(share), [theta(x.tolist()) for x in xs], size)
+    return lambda xs, share: several_weighted(part(share), [theta(x.tolist()) for x in xs], weighting)
 
 
 def _descended(

@@ -15,6 +15,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label,
 from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
+from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
@@ -106,11 +107,11 @@ class Fitter:
 
         unknowns: see `finished`; known, guess, step: see `fit`.
         """
-        problem, size = self.baseline.problem, self.baseline.noise.scale
+        problem, weighting = self.baseline.problem, self.baseline.noise.weighting
         others = self.baseline.hypothesis.fit.unknowns if unknowns is None else unknowns
         where = together(problem, promises)
         tasks = (
-            delayed(hypothesis)(here, others, p, size, evaluations, known, guess, step)
+            delayed(hypothesis)(here, others, p, weighting, evaluations, known, guess, step)
             for here, p in zip(where, promises, strict=True)
         )
         found = [h for h in Parallel(n_jobs=self.jobs)(tasks) if h is not None]
@@ -122,7 +123,7 @@ def hypothesis(
     problem: Problem,
     unknowns: Sequence[Unknown],
     promise: Promise,
-    size: Array,
+    weighting: Weighting,
     evaluations: int,
     known: Columns | None = None,
     guess: Columns | None = None,
@@ -135,12 +136,12 @@ def hypothesis(
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
-    found = fit(here, [*unknowns, *own], size, promise.start, None, evaluations, known, guess, step=step)
+    found = fit(here, [*unknowns, *own], weighting, promise.start, None, evaluations, known, guess, step=step)
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
         return None
-    if not all(np.all(np.abs(r) < REFUSED * size) for r in residuals):
+    if not all(np.all(np.abs(r) < REFUSED * weighting.size) for r in residuals):
         return None
     return Hypothesis(promise.candidates, found, tuple(residuals))
 

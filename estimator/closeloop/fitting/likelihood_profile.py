@@ -18,6 +18,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
+from estimator.weighting import Weighting
 
 WIDTH = 1.96  # standard errors: 95 %
 PROFILE_PLACES = 3  # points of the profile on each side
@@ -35,11 +36,11 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     their parameters keep their errors. Onset times are evaluated on a grid, because the sum of squares has
     many local minima over them.
     """
-    problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
+    problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     before: list[Hypothesis] = []
     for _ in range(DEEPER_ROUNDS):
         h = refined(fitter, h)
-        wider, deeper = _profiles(problem, h, size)
+        wider, deeper = _profiles(problem, h, weighting)
         if not deeper:
             break
         there = Promise(h.candidates, 0.0, {**h.theta, **deeper})
@@ -69,17 +70,19 @@ def bends(c: Candidate) -> bool:
     return any(u.name in free for u in c.amplitudes) and any(not u.is_onset for u in c.shape)
 
 
-def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, float], dict[str, float]]:
+def _profiles(
+    problem: Problem, h: Hypothesis, weighting: Weighting
+) -> tuple[dict[str, float], dict[str, float]]:
     """Standard errors by name, and values with a lower sum of squares, if some were found."""
     wider: dict[str, float] = {}
     for name in h.onset_names:
-        half, deeper = _when(problem, h, name, size)
+        half, deeper = _when(problem, h, name, weighting)
         wider[name] = half / WIDTH
         if deeper:
             return wider, deeper
     for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_onset):
         for side in (-1.0, 1.0):
-            half, deeper = _half(problem, h, u, size, side)
+            half, deeper = _half(problem, h, u, weighting, side)
             wider[u.name] = max(wider.get(u.name, 0.0), half / WIDTH)
             if deeper:
                 return wider, deeper
@@ -87,7 +90,7 @@ def _profiles(problem: Problem, h: Hypothesis, size: Array) -> tuple[dict[str, f
 
 
 def _half(
-    problem: Problem, h: Hypothesis, u: Unknown, size: Array, side: float
+    problem: Problem, h: Hypothesis, u: Unknown, weighting: Weighting, side: float
 ) -> tuple[float, dict[str, float]]:
     """Half width of the 95 % interval of u on one side, as far as the points of the profile reach.
 
@@ -103,7 +106,7 @@ def _half(
         value = float(np.clip(best + away, u.low, u.high))
         if value != best + away:
             return abs(value - best), {}
-        found = _at(problem, h, i, value, size)
+        found = _at(problem, h, i, value, weighting)
         rise = (float(found.residual @ found.residual) - cost(h)) / usual
         if rise < -DEEPER:
             return abs(away), {**found.theta, u.name: value}
@@ -114,7 +117,7 @@ def _half(
     return abs(away), {}
 
 
-def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[float, dict[str, float]]:
+def _when(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> tuple[float, dict[str, float]]:
     """Half width of the 95 % interval of an onset time, over the times of the grid.
 
     The second result holds the onset time with a lower sum of squares, if there is one. All other unknowns
@@ -128,7 +131,7 @@ def _when(problem: Problem, h: Hypothesis, name: str, size: Array) -> tuple[floa
     here = built(problem, h.candidates)
 
     def squares(t: float) -> float:
-        r = weighted(here, {**h.theta, name: t}, size)
+        r = weighted(here, {**h.theta, name: t}, weighting)
         return float(np.sum((r - others @ (others.T @ r)) ** 2))
 
     tried = np.array(onsets_near(now, length))
@@ -143,7 +146,7 @@ def _usual(h: Hypothesis, i: int) -> float:
     return float(h.fit.inflation[i])
 
 
-def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> Fit:
+def _at(problem: Problem, h: Hypothesis, i: int, value: float, weighting: Weighting) -> Fit:
     """The fit of all other unknowns with the i-th one held at a value."""
     held = h.fit.unknowns[i].name
     here = built(problem, h.candidates)
@@ -152,4 +155,4 @@ def _at(problem: Problem, h: Hypothesis, i: int, value: float, size: Array) -> F
     start = dict(zip((u.name for u in h.fit.unknowns), h.fit.values + along, strict=True))
     own = h.own
     known = {n: column for n, column in h.fit.columns.items() if n not in own}
-    return fit(here, rest, size, start, {held: value}, PROFILE_EVALUATIONS, known)
+    return fit(here, rest, weighting, start, {held: value}, PROFILE_EVALUATIONS, known)

@@ -1,4 +1,4 @@
-"""Weights for records without declared noise, from the residual of the best fit.
+"""Weights from the residual of the best fit, if noise is not declared or if it is correlated in time.
 
 The residual of the calibrated FMU contains the effect. Weights from that residual would make every log score
 too small and every standard error too large. Quasi-likelihood takes the scale from the best-fitting model of
@@ -10,41 +10,68 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter, from_there
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
+from estimator.closeloop.question.problem import Problem
 from estimator.noise import Noise
 from estimator.record import Array
+from estimator.weighting import Weighting
 
 
 def reweighted(
     fitter: Fitter, found: Sequence[Sequence[Hypothesis]]
 ) -> tuple[Hypothesis, Noise, list[list[Hypothesis]]]:
     """The calibrated FMU, the noise that the best hypothesis leaves, and all lists weighted by that noise."""
-    baseline = fitter.baseline
-    best = min((h for some in found for h in some), key=cost)
-    before, noise = baseline.noise.scale, Noise.of(baseline.problem.record, best.residuals)
-    [base] = rescaled([baseline.hypothesis], before, noise.scale)
+    baseline, noise = fitter.baseline, noise_left(fitter.baseline, found)
+    before = baseline.noise.weighting
+    [base] = rescaled([baseline.hypothesis], before, noise.weighting)
+    if not noise.weighting.is_white:
+        base = _calibrated_again(baseline.problem, base, noise.weighting)
     anew = replace(fitter, baseline=replace(baseline, hypothesis=base, noise=noise))
     return base, noise, [_fitted_again(anew, some, before) for some in found]
 
 
-def rescaled(found: Sequence[Hypothesis], before: Array, size: Array) -> list[Hypothesis]:
-    """Hypotheses with the same values, residuals and errors in units of another size (n_y,)."""
-    ratio = np.tile(before / size, len(found[0].fit.residual) // len(size)) if found else np.empty(0)
+def needed(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> bool:
+    """Whether the best of the hypotheses, if any, says more of the noise than the calibrated FMU."""
+    if not any(found):
+        return False
+    noises = baseline.noise, noise_left(baseline, found)
+    return not all(noise.known and noise.weighting.is_white for noise in noises)
+
+
+def noise_left(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise:
+    """The noise that the best of all hypotheses leaves."""
+    best = min((h for some in found for h in some), key=cost)
+    return Noise.of(baseline.problem.record, best.residuals, baseline.policy.detection.chance)
+
+
+def rescaled(found: Sequence[Hypothesis], before: Weighting, after: Weighting) -> list[Hypothesis]:
+    """Hypotheses with the same values, residuals and errors weighted otherwise."""
+
+    def turned(column: Array) -> Array:
+        return after.of(before.back(column.reshape(-1, len(before)))).ravel()
+
     shared = {id(column): column for h in found for column in h.fit.slopes}
-    turned = {key: column * ratio for key, column in shared.items()}
+    done = {key: turned(column) for key, column in shared.items()}
     moved = []
     for h in found:
-        slopes = tuple(turned[id(column)] for column in h.fit.slopes)
-        fit = replace(h.fit, residual=h.fit.residual * ratio, slopes=slopes)
+        slopes = tuple(done[id(column)] for column in h.fit.slopes)
+        fit = replace(h.fit, residual=turned(h.fit.residual), slopes=slopes)
         moved.append(replace(h, fit=replace(fit, covariance=_errors(fit))))
     return moved
 
 
-def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Array) -> list[Hypothesis]:
+def _calibrated_again(problem: Problem, base: Hypothesis, weighting: Weighting) -> Hypothesis:
+    found = fit(problem, base.fit.unknowns, weighting, base.fit.theta)
+    return Hypothesis((), found, tuple(problem.residuals(found.theta)))
+
+
+def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Weighting) -> list[Hypothesis]:
     """All hypotheses in the fitter's units, sorted by sum of squares; the leading ones are fitted again."""
-    moved = best_by_label(rescaled(found, before, fitter.baseline.noise.scale))
+    moved = best_by_label(rescaled(found, before, fitter.baseline.noise.weighting))
     leading = [h for h in moved if h.candidates][: fitter.baseline.policy.search.reweighted]
     if not leading:
         return moved

@@ -30,6 +30,7 @@ from estimator.closeloop.screening.linear import (
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array
 from estimator.sensor_faults import faulty
+from estimator.weighting import Weighting
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 
@@ -51,16 +52,19 @@ RUNAWAY = 1e9  # weighted residual above which the linearised response is taken 
 class Screening:
     """Computes the changes of the residual by candidates; the FMU is linearised when first needed.
 
-    size: (n_y,) unit of each output's residual. forces: missing force at each port with the smoothed motion;
+    weighting: that of the fit's residual. forces: missing force at each port with the smoothed motion;
     a law is evaluated along that motion, since the FMU without the law may move quite differently.
     fit: the fit with its samples averaged in groups (see `grouped.py`), to which the changes refer.
     """
 
-    def __init__(self, problem: Problem, base: Fit, size: Array, forces: Sequence[MissingForce] = ()) -> None:
-        self.problem, self.theta, self.size, self.forces = problem, base.theta, size, forces
+    def __init__(
+        self, problem: Problem, base: Fit, weighting: Weighting, forces: Sequence[MissingForce] = ()
+    ) -> None:
+        self.problem, self.theta, self.weighting, self.forces = problem, base.theta, weighting, forces
         self._shown = problem.simulate(self.theta)
-        self.group = group_size(problem, self._shown[0])
-        self.fit = grouped_fit(base, len(size), self.group)
+        # prediction errors change from sample to sample, so that they have no means over groups
+        self.group = group_size(problem, self._shown[0]) if weighting.is_white else 1
+        self.fit = grouped_fit(base, len(weighting), self.group)
         self._made: dict[str, Around] = {}
         self._local: tuple[Linearised, dict[str, Influence]] | None = None
 
@@ -128,14 +132,13 @@ class Screening:
         if self._states is None:
             return [self._simulated(change) for change in moved]
         local, levers = self._linearised(names_of(moved), self._states)
-        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group) / self.size
+        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group)
         found: list[Array] = []
         for i in range(0, len(moved), CHANGES_AT_ONCE):
             some = moved[i : i + CHANGES_AT_ONCE]
             with np.errstate(over="ignore", invalid="ignore"):
-                columns = (responses(local, levers, some, len(self._at))[:, fit] * scale).reshape(
-                    len(some), -1
-                )
+                shown = responses(local, levers, some, len(self._at))[:, fit]
+                columns = np.array([scale * self.weighting.of(y).ravel() for y in shown])
                 sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
             # the linearised response of a model with stick and slip may diverge, so that it is simulated
             found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
@@ -175,7 +178,7 @@ class Screening:
 
     def _weighted(self, change: Array) -> Array:
         """The change of the residual of `fit` by a change (m, n_y) of the outputs on the part to identify."""
-        return grouped(-(change / self.size).ravel(), len(self.size), self.group)
+        return grouped(-self.weighting.of(change).ravel(), len(self.weighting), self.group)
 
 
 def _along(free: Course, missing: MissingForce) -> Course:

@@ -15,7 +15,7 @@ from estimator.closeloop.hypotheses.candidate import onsets_near
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.question.problem import Problem
-from estimator.record import Array
+from estimator.weighting import Weighting
 
 
 def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -23,10 +23,10 @@ def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     onset.
     """
     limits = fitter.baseline.policy.search
-    problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
+    problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     worst = limits.dated_rival * cost(found[0]) if found else 0.0
     tried = [h for h in found[: limits.dated] if h.onset_names and cost(h) < worst]
-    onsets = Parallel(n_jobs=fitter.jobs)(delayed(_onset)(problem, h, size) for h in tried)
+    onsets = Parallel(n_jobs=fitter.jobs)(delayed(_onset)(problem, h, weighting) for h in tried)
     again = [
         Promise(h.candidates, 0.0, {**h.fit.theta, h.onset_names[0]: onset})
         for h, onset in zip(tried, onsets, strict=True)
@@ -35,11 +35,11 @@ def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     return best_by_label([*found, *fitter.finished(again)]) if again else list(found)
 
 
-def _onset(problem: Problem, h: Hypothesis, size: Array) -> float | None:
+def _onset(problem: Problem, h: Hypothesis, weighting: Weighting) -> float | None:
     """An onset time with a lower sum of squares on the identify part, all else unchanged; or None."""
     [name, *_] = h.onset_names
     here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
     inside = [t for t in onsets_near(now, length) if 0.0 < t < length and t != now]
-    squares = [float(np.sum(weighted(here, {**h.theta, name: t}, size) ** 2)) for t in inside]
+    squares = [float(np.sum(weighted(here, {**h.theta, name: t}, weighting) ** 2)) for t in inside]
     best = int(np.argmin(squares)) if squares else 0
     return inside[best] if squares and squares[best] < cost(h) else None

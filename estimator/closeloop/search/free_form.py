@@ -73,7 +73,7 @@ def free_form(
     candidates = [c for d in dependences(problem, forces) for c in _candidates(problem, d, forces)]
     if not candidates:
         return None
-    screening = Screening(problem, base.fit, baseline.noise.scale, forces)
+    screening = Screening(problem, base.fit, baseline.noise.weighting, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     calibration = Calibration.of(screening.fit)
     chosen = [resolved(calibration, c, g) for c, g in promising(screening.fit, change, near)]

@@ -19,7 +19,7 @@ from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost, mean_square
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.record import Array
+from estimator.weighting import Weighting
 
 Parts = tuple[tuple[float, int], ...]  # shares of the part to identify, and evaluations for each
 FIRST: Parts = ((0.125, 8), (0.25, 6))
@@ -34,7 +34,7 @@ def from_the_beginning(
     better.
     """
     limits, jobs = fitter.baseline.policy.search, fitter.jobs
-    problem, size = fitter.baseline.problem, fitter.baseline.noise.scale
+    problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     physical = [p for p in promises if not p.candidates[0].is_fault]
     fitted = [h.label for h in found if not h.candidates[0].is_fault]
     leading = dict.fromkeys(
@@ -51,11 +51,11 @@ def from_the_beginning(
         for p in _shapes([p for p in physical if p.label == label])
     ]
     tried = list(zip(together(started, starts), starts, strict=True))
-    begun = Parallel(n_jobs=jobs)(delayed(_begun)(here, others, p, size) for here, p in tried)
+    begun = Parallel(n_jobs=jobs)(delayed(_begun)(here, others, p, weighting) for here, p in tried)
     alive = [(h, here) for h, (here, _) in zip(begun, tried, strict=True) if h is not None]
     alive.sort(key=lambda pair: mean_square(pair[0]))
     tasks = (
-        delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), size, THEN)
+        delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), weighting, THEN)
         for h, here in alive[: limits.grown_survivors]
         if mean_square(h) < limits.grown_rival * mean_square(alive[0][0])
     )
@@ -79,16 +79,18 @@ def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:
     return [replace(best, start={**best.start, **off})]
 
 
-def _begun(problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array) -> Hypothesis | None:
+def _begun(
+    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, weighting: Weighting
+) -> Hypothesis | None:
     """A fit to the first parts of the record; with an onset, first without the effect up to the onset."""
     before, start = _before(problem, promise), promise.start
     if 0.0 < before < 1.0:
-        start = start | fit(problem.beginning(before), unknowns, size, start).theta
-    return _grown(problem, unknowns, replace(promise, start=start), size, FIRST)
+        start = start | fit(problem.beginning(before), unknowns, weighting, start).theta
+    return _grown(problem, unknowns, replace(promise, start=start), weighting, FIRST)
 
 
 def _grown(
-    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, size: Array, parts: Parts
+    problem: Problem, unknowns: Sequence[Unknown], promise: Promise, weighting: Weighting, parts: Parts
 ) -> Hypothesis | None:
     """The best fit to the last of several growing parts; None if the FMU cannot be simulated."""
     before, start = _before(problem, promise), promise.start
@@ -96,7 +98,7 @@ def _grown(
     for part, evaluations in parts:
         share = before + (1 - before) * part
         here = problem.beginning(share)
-        found = hypothesis(here, unknowns, replace(promise, start=start), size, evaluations)
+        found = hypothesis(here, unknowns, replace(promise, start=start), weighting, evaluations)
         if found is None:
             return best
         start = found.fit.theta

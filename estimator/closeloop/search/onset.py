@@ -18,6 +18,7 @@ from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.screen import Screening, screen
 from estimator.record import Array
+from estimator.weighting import Weighting
 
 EARLY = (0.5, 0.25, 0.1)  # shares of the part to identify that are tried as free of the effect
 ONSET_BLOCKS = 50  # blocks of the part to identify whose residuals are compared
@@ -35,23 +36,23 @@ def onset(baseline: Baseline, times: float) -> tuple[float, Fit] | None:
     times: factor by which the mean square of the residual must grow at the onset. None if there is no such
     onset, or if nothing is calibrated.
     """
-    problem, size = baseline.problem, baseline.noise.scale
+    problem, weighting = baseline.problem, baseline.noise.weighting
     unknowns, found, chance = baseline.hypothesis.fit.unknowns, [], baseline.policy.search.sets_in_chance
     for early in EARLY if unknowns else ():
-        before = fit(problem.beginning(early), unknowns, size)
-        squares = _blocks(problem, before, size)
+        before = fit(problem.beginning(early), unknowns, weighting)
+        squares = _blocks(problem, before, weighting)
         if (k := grown(squares, int(early * ONSET_BLOCKS), times, chance)) is not None:
             found.append((float(np.sqrt(squares[:k]).mean()), k / ONSET_BLOCKS, before))
     if not found:
         return None
     least = min(level for level, _, _ in found)
     _, share, before = next(f for f in found if f[0] <= AS_GOOD * least)
-    return share, fit(problem.beginning(share), unknowns, size, before.theta)
+    return share, fit(problem.beginning(share), unknowns, weighting, before.theta)
 
 
-def _blocks(problem: Problem, before: Fit, size: Array) -> Array:
+def _blocks(problem: Problem, before: Fit, weighting: Weighting) -> Array:
     """Mean square of the weighted residual in each block of the part to identify, (ONSET_BLOCKS,)."""
-    residual = weighted(problem, before.theta, size).reshape(-1, len(size))
+    residual = weighted(problem, before.theta, weighting).reshape(-1, len(weighting))
     return np.array([float(np.mean(b**2)) for b in np.array_split(residual, ONSET_BLOCKS)])
 
 
@@ -82,7 +83,7 @@ def since(fitter: Fitter, at: tuple[float, Fit], candidates: Sequence[Candidate]
     """
     limits, problem = fitter.baseline.policy.search, fitter.baseline.problem
     share, before = at
-    promises = _by_response(problem, at, candidates, fitter.baseline.noise.scale)
+    promises = _by_response(problem, at, candidates, fitter.baseline.noise.weighting)
     leading, rest = promises[: limits.sudden_fits], promises[limits.sudden_fits :]
     held = replace(problem, declared={**problem.declared, **before.theta})
     part = held.beginning(min(1.0, share + LONGER * AFTER))
@@ -99,15 +100,15 @@ def _scaled(promise: Promise, factor: float) -> dict[str, float]:
 
 
 def _by_response(
-    problem: Problem, at: tuple[float, Fit], candidates: Sequence[Candidate], size: Array
+    problem: Problem, at: tuple[float, Fit], candidates: Sequence[Candidate], weighting: Weighting
 ) -> list[Promise]:
     share, before = at
     run = problem.record.runs[0]
     here = problem.beginning(min(1.0, share + AFTER))
-    there = fit(here, before.unknowns, size, before.theta, evaluations=1)
+    there = fit(here, before.unknowns, weighting, before.theta, evaluations=1)
     labels = {c.label: c for c in reversed(candidates) if c.onset is not None}
     tried = [c.with_onset(run.fit_time(share + g / ONSET_BLOCKS)) for c in labels.values() for g in ABOUT]
-    screening = Screening(here, there, size)
+    screening = Screening(here, there, weighting)
     change = screening.changes(tried)
     found = screen(screening.fit, [((c,), g) for c, g in zip(tried, change, strict=True)])
     return distinct(found)

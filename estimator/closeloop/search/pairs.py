@@ -74,8 +74,8 @@ def beside(
     residual beyond noise that the second effect has to explain.
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
-    fit = grouped_fit(best.fit, len(screening.size), screening.group)
-    enough = limits.second_effect**2 * len(best.fit.residual) / len(screening.size)
+    fit = grouped_fit(best.fit, len(screening.weighting), screening.group)
+    enough = limits.second_effect**2 * len(best.fit.residual) / len(screening.weighting)
     promises = [
         p
         for p in _with(baseline.problem, best, fit, change)
@@ -115,10 +115,10 @@ def _partners(
         if i == 0:
             fit, seen = _beside(baseline, h, others)
         elif quick:
-            here = Screening(built(problem, h.candidates), h.fit, screening.size)
+            here = Screening(built(problem, h.candidates), h.fit, screening.weighting)
             fit, seen = here.fit, list(zip(others, here.changes(others), strict=True))
         else:
-            fit, seen = grouped_fit(h.fit, len(screening.size), screening.group), list(change)
+            fit, seen = grouped_fit(h.fit, len(screening.weighting), screening.group), list(change)
         found += [(cost(h) - p.gain, p) for p in _with(problem, h, fit, seen)]
     found.sort(key=lambda pair: pair[0])
     return distinct([p for _, p in found])[: problem.policy.search.pairs]
@@ -134,7 +134,7 @@ def _beside(baseline: Baseline, h: Hypothesis, others: Sequence[Candidate]) -> t
     forces = missing_forces(here, h.theta, baseline.noise.std)
     offered = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     partners = [c for c in offered if c.label in labels]
-    screening = Screening(here, h.fit, baseline.noise.scale, forces)
+    screening = Screening(here, h.fit, baseline.noise.weighting, forces)
     return screening.fit, list(zip(partners, screening.changes(partners), strict=True))
 
 

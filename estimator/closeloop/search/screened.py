@@ -78,7 +78,7 @@ def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress,
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
     candidates += fault_candidates(problem.record, baseline.noise.std)
     tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
-    screening = Screening(problem, baseline.hypothesis.fit, baseline.noise.scale, forces)
+    screening = Screening(problem, baseline.hypothesis.fit, baseline.noise.weighting, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     # with a form error, a calibrated parameter at its bound says nothing about effects
     fit = loose(screening.fit) if form_of(baseline).exact else screening.fit

@@ -71,7 +71,9 @@ class _Stack:
 
     def rows(self) -> list[slice]:
         """The rows of each record in the residual."""
-        lengths = [len(p.size) * sum(int(r.fit.sum()) for r in p.problem.record.runs) for p in self.parts]
+        lengths = [
+            len(p.weighting) * sum(int(r.fit.sum()) for r in p.problem.record.runs) for p in self.parts
+        ]
         return [slice(a, b) for a, b in pairwise(np.cumsum([0, *lengths]).tolist())]
 
     def order(self) -> Array:

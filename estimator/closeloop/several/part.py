@@ -17,6 +17,7 @@ from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.several.chart import Chart, chart
 from estimator.record import Array
+from estimator.weighting import Weighting
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class Part:
     """One record in a joint fit of several records.
 
     problem: without the effects; effects: those that all records share; beside: effects of this record only;
-    calibrated: its unknowns without effects; size: (n_y,) unit of each output's residual; start: start values
+    calibrated: its unknowns without effects; weighting: that of its residuals; start: start values
     by the names of the FMU.
     """
 
@@ -32,7 +33,7 @@ class Part:
     effects: tuple[Candidate, ...]
     beside: tuple[Candidate, ...]
     calibrated: tuple[Unknown, ...]
-    size: Array
+    weighting: Weighting
     start: Mapping[str, float]
 
     @classmethod
@@ -41,8 +42,8 @@ class Part:
         start: Mapping[str, float],
     ) -> Part:  # fmt: skip
         """The part of a baseline's record."""
-        calibrated, size = baseline.hypothesis.fit.unknowns, baseline.noise.scale
-        return cls(baseline.problem, tuple(effects), tuple(beside), calibrated, size, start)
+        calibrated, weighting = baseline.hypothesis.fit.unknowns, baseline.noise.weighting
+        return cls(baseline.problem, tuple(effects), tuple(beside), calibrated, weighting, start)
 
     @cached_property
     def built(self) -> Problem:
@@ -66,7 +67,7 @@ class Part:
 
     def residual(self, values: Mapping[str, float]) -> Array:
         """The weighted residual (m,) at values by the names of the chart."""
-        return weighted(self.built, self.chart.native(values), self.size)
+        return weighted(self.built, self.chart.native(values), self.weighting)
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Array:
         """Derivatives of the weighted residual with respect to names of the chart, (m, len(names))."""
@@ -75,7 +76,7 @@ class Part:
         moved = np.any(turn != 0, axis=1)
         free = [u for u, m in zip(unknowns, moved, strict=True) if m]
         rest = {n: v for n, v in theta.items() if n not in {u.name for u in free}}
-        here = fit(self.built, free, self.size, theta, rest, evaluations=1)
+        here = fit(self.built, free, self.weighting, theta, rest, evaluations=1)
         return np.asarray(here.jacobian @ turn[moved])
 
     def hypothesis(

@@ -1,0 +1,131 @@
+"""Weights of residuals whose noise is correlated in time: prediction errors in place of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cholesky, solve_toeplitz, solve_triangular, toeplitz
+from scipy.signal import freqz, lfilter, lfiltic
+
+from estimator.record import Array
+
+ORDERS = (1, 2, 3, 5, 8, 12, 18, 27, 40, 60)  # of the autoregressions that are tried
+ONE: Array = np.ones(1)
+FREQUENCIES = 4096  # at which the spectrum of an autoregression is evaluated
+
+
+@dataclass(frozen=True, eq=False)
+class Weighting:
+    """Turns residuals into numbers that are independent and of variance 1 if the residuals are noise.
+
+    size: (n_y,) standard deviation of each output's noise; correlation: for each output the autocorrelation
+    of its noise at the lags 0 to p samples, (p + 1,), of which the first is 1; p is 0 for white noise. The
+    noise is an autoregression of order p, whose prediction errors are independent (G. E. P. Box, G. M.
+    Jenkins, Time Series Analysis, 1970, chapter 7). The first p samples are predicted from fewer.
+    """
+
+    size: Array
+    correlation: tuple[Array, ...]
+
+    @classmethod
+    def white(cls, size: Array) -> Weighting:
+        """Weights for white noise of these standard deviations (n_y,)."""
+        return cls(size, (np.ones(1),) * len(size))
+
+    def __len__(self) -> int:
+        return len(self.size)
+
+    @property
+    def is_white(self) -> bool:
+        """Whether the noise of all outputs is white."""
+        return all(len(c) == 1 for c in self.correlation)
+
+    def of(self, residual: Array) -> Array:
+        """The weighted residual of a stretch without gaps, (N, n_y)."""
+        z = residual / self.size
+        if self.is_white:
+            return z
+        columns = (p.errors(column) for p, column in zip(self._predictors, z.T, strict=True))
+        return np.column_stack(list(columns))
+
+    def back(self, weighted: Array) -> Array:
+        """The residual (N, n_y) of a weighted one; the inverse of `of`."""
+        if self.is_white:
+            return weighted * self.size
+        columns = (p.signal(column) for p, column in zip(self._predictors, weighted.T, strict=True))
+        return np.column_stack(list(columns)) * self.size
+
+    @property
+    def redundancy(self) -> Array:
+        """Samples per independent square, (n_y,): 1 for white noise, more if it is correlated."""
+        return np.array([p.redundancy for p in self._predictors])
+
+    @cached_property
+    def _predictors(self) -> list[_Predictor]:
+        return [_Predictor(c) for c in self.correlation]
+
+
+class _Predictor:
+    """Predicts a sample of unit variance from those before it; correlation: (p + 1,), see Weighting."""
+
+    def __init__(self, correlation: Array) -> None:
+        self._order = len(correlation) - 1
+        ahead = solve_toeplitz(correlation[:-1], correlation[1:]) if self._order else np.zeros(0)
+        self._filter: Array = np.append(1.0, -ahead)
+        self._variance = float(1.0 - ahead @ correlation[1:])
+        self._root = cholesky(toeplitz(correlation[:-1]), lower=True) if self._order else np.zeros((0, 0))
+
+    def errors(self, z: Array) -> Array:
+        """Prediction errors over their standard deviations, (N,)."""
+        n = min(self._order, len(z))
+        found: Array = lfilter(self._filter, ONE, z) / np.sqrt(self._variance)
+        if n:
+            found[:n] = solve_triangular(self._root[:n, :n], z[:n], lower=True)
+        return found
+
+    def signal(self, errors: Array) -> Array:
+        """The samples (N,) of these prediction errors; the inverse of `errors`."""
+        n = min(self._order, len(errors))
+        first = self._root[:n, :n] @ errors[:n]
+        if not n:
+            return errors
+        before: Array = lfiltic(ONE, self._filter, first[::-1]).astype(np.float64)
+        rest, _ = lfilter(ONE, self._filter, errors[n:] * np.sqrt(self._variance), zi=before)
+        return np.append(first, rest)
+
+    @property
+    def redundancy(self) -> float:
+        """Sum of the squared autocorrelations over all lags, by Parseval's theorem."""
+        spectrum = 1.0 / np.abs(freqz(self._filter, worN=FREQUENCIES)[1]) ** 2
+        return float(np.mean(spectrum**2) / np.mean(spectrum) ** 2)
+
+
+def correlation_of(parts: Sequence[Array]) -> Array:
+    """Autocorrelation (p + 1,) of a residual, given in stretches (N,).
+
+    The order p is chosen by Schwarz's criterion. Order 0, white noise, is among the choices.
+    Source: G. Schwarz, Annals of Statistics 6 (1978), 461-464.
+    """
+    n = sum(len(x) for x in parts)
+    most = min(ORDERS[-1], min(len(x) for x in parts) // 4)
+    sums = np.zeros(most + 1)
+    for x in parts:
+        spectrum = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
+        sums += np.fft.irfft(spectrum)[: most + 1]
+    if sums[0] <= 0:
+        return np.ones(1)
+    c = sums / sums[0]
+    left = {p: _left(c[: p + 1]) for p in (0, *(p for p in ORDERS if p <= most))}
+    order = min(left, key=lambda p: n * np.log(left[p]) + p * np.log(n))
+    return np.asarray(c[: order + 1])
+
+
+def _left(correlation: Array) -> float:
+    """Variance of the prediction error over that of the signal."""
+    if len(correlation) == 1:
+        return 1.0
+    ahead = solve_toeplitz(correlation[:-1], correlation[1:])
+    return max(float(1.0 - ahead @ correlation[1:]), np.finfo(float).tiny)
