@@ -32,7 +32,7 @@ class Noise:
         that, it is taken as noise, and its correlation in time is estimated from it. chance: how far its mean
         square may exceed the declared one, in standard deviations.
         """
-        floor, fitted = noise_floor(record), _fitted(record, residuals)
+        floor, fitted = noise_floor(record), _stretches(record, residuals)
         correlation = []
         for j, declared in enumerate(record.noise_declared):
             parts = [r[:, j] / floor[j] for r in fitted]
@@ -64,6 +64,12 @@ class Noise:
 def _fitted(record: Record, residuals: Sequence[Array]) -> list[Array]:
     """The residual on the part to identify of each run that has one, (n, n_y) each."""
     return [r[run.fit] for r, run in zip(residuals, record.runs, strict=True) if run.fit.any()]
+
+
+def _stretches(record: Record, residuals: Sequence[Array]) -> list[Array]:
+    """The residual on each uninterrupted stretch of the part to identify, (n, n_y) each."""
+    ends = np.cumsum(record.stretches("fit"))[:-1]
+    return np.split(np.concatenate(_fitted(record, residuals)), ends)
 
 
 def _of_noise(parts: Sequence[Array], chance: float) -> Array:

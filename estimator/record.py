@@ -65,6 +65,14 @@ class Record:
     noise_std: Array  # (n_y,) in the FMU's units, nan if not declared
     notes: tuple[Note, ...] = ()
 
+    def stretches(self, part: str) -> list[int]:
+        """Lengths of the uninterrupted stretches of a part, named as a mask of Run, in their order."""
+        found: list[int] = []
+        for run in self.runs:
+            edges = np.flatnonzero(np.diff(getattr(run, part), prepend=False, append=False))
+            found += np.diff(edges)[::2].tolist()
+        return found
+
     @property
     def noise_declared(self) -> BoolArray:
         """Whether the noise of each output is declared, (n_y,)."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cholesky, solve_toeplitz, solve_triangular, toeplitz
@@ -43,20 +44,25 @@ class Weighting:
         """Whether the noise of all outputs is white."""
         return all(len(c) == 1 for c in self.correlation)
 
-    def of(self, residual: Array) -> Array:
-        """The weighted residual of a stretch without gaps, (N, n_y)."""
-        z = residual / self.size
-        if self.is_white:
-            return z
-        columns = (p.errors(column) for p, column in zip(self._predictors, z.T, strict=True))
-        return np.column_stack(list(columns))
+    def of(self, residual: Array, stretches: Sequence[int]) -> Array:
+        """The weighted residual (N, n_y).
 
-    def back(self, weighted: Array) -> Array:
+        stretches: lengths of the uninterrupted stretches of samples that follow one another in it.
+        """
+        z = residual / self.size
+        return z if self.is_white else self._each(_Predictor.errors, z, stretches)
+
+    def back(self, weighted: Array, stretches: Sequence[int]) -> Array:
         """The residual (N, n_y) of a weighted one; the inverse of `of`."""
-        if self.is_white:
-            return weighted * self.size
-        columns = (p.signal(column) for p, column in zip(self._predictors, weighted.T, strict=True))
-        return np.column_stack(list(columns)) * self.size
+        return (weighted if self.is_white else self._each(_Predictor.signal, weighted, stretches)) * self.size
+
+    def _each(self, work: Callable[[_Predictor, Array], Array], x: Array, stretches: Sequence[int]) -> Array:
+        """Each column and stretch of x (N, n_y) by its predictor."""
+        found, ends = np.empty_like(x), np.cumsum([0, *stretches]).tolist()
+        for a, b in pairwise(ends):
+            for j, predictor in enumerate(self._predictors):
+                found[a:b, j] = work(predictor, x[a:b, j])
+        return found
 
     @property
     def redundancy(self) -> Array:
@@ -110,11 +116,11 @@ def correlation_of(parts: Sequence[Array]) -> Array:
     Source: G. Schwarz, Annals of Statistics 6 (1978), 461-464.
     """
     n = sum(len(x) for x in parts)
-    most = min(ORDERS[-1], min(len(x) for x in parts) // 4)
+    most = min(ORDERS[-1], max(len(x) for x in parts) // 4)
     sums = np.zeros(most + 1)
     for x in parts:
-        spectrum = np.abs(np.fft.rfft(x, 2 * len(x))) ** 2
-        sums += np.fft.irfft(spectrum)[: most + 1]
+        spectrum = np.abs(np.fft.rfft(x, len(x) + max(len(x), most + 1))) ** 2
+        sums += np.fft.irfft(spectrum, len(x) + max(len(x), most + 1))[: most + 1]
     if sums[0] <= 0:
         return np.ones(1)
     c = sums / sums[0]

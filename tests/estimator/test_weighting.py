@@ -36,7 +36,7 @@ def test_the_sum_of_squares_is_that_of_the_inverse_covariance(first, second, n, 
     c = np.array([ahead[: 400 - k] @ ahead[k:] for k in range(max(n, 3))])
     c /= c[0]
     z = np.random.default_rng(seed).standard_normal((n, 1))
-    e = Weighting(np.array([2.0]), (c[:3],)).of(2.0 * z)
+    e = Weighting(np.array([2.0]), (c[:3],)).of(2.0 * z, [n])
     assert_allclose(e[:, 0] @ e[:, 0], z[:, 0] @ np.linalg.solve(toeplitz(c[:n]), z[:, 0]), rtol=1e-6)
 
 
@@ -46,15 +46,15 @@ def test_the_inverse_gives_the_residual_back(roots, n, seed):
     response = lfilter([1.0], np.poly(roots), np.eye(1, 500)[0])
     c = np.array([response[: 500 - k] @ response[k:] for k in range(len(roots) + 1)])
     weighting = Weighting(np.array([0.1, 3.0]), (c / c[0], np.ones(1)))
-    residual = rng.standard_normal((n, 2))
-    assert_allclose(weighting.back(weighting.of(residual)), residual, atol=1e-9)
+    residual, parts = rng.standard_normal((2 * n, 2)), [n, n]
+    assert_allclose(weighting.back(weighting.of(residual, parts), parts), residual, atol=1e-9)
 
 
 @given(SEEDS)
 def test_white_noise_is_only_divided_by_its_size(seed):
     residual = np.random.default_rng(seed).standard_normal((50, 2))
     size = np.array([0.3, 7.0])
-    assert_array_equal(Weighting.white(size).of(residual), residual / size)
+    assert_array_equal(Weighting.white(size).of(residual, [20, 30]), residual / size)
     assert_array_equal(Weighting.white(size).redundancy, [1.0, 1.0])
 
 
@@ -69,7 +69,8 @@ def test_prediction_errors_of_correlated_noise_are_white(share, memory):
     rng = np.random.default_rng(5)
     seen = logger_noise(rng, 6000, share, memory)
     weighting = Weighting(np.ones(1), (correlation_of([seen]),))
-    e = weighting.of(logger_noise(rng, 6000, share, memory)[:, None])[:, 0]
+    two = [logger_noise(rng, 3000, share, memory) for _ in range(2)]
+    e = weighting.of(np.concatenate(two)[:, None], [3000, 3000])[:, 0]
     assert_allclose(np.mean(e**2), 1.0, atol=0.15)
     blocks = e.reshape(40, -1).mean(axis=1) * np.sqrt(150)
     assert np.mean(blocks**2) < 2.0  # of correlated noise it would be some `memory` times as large
@@ -95,3 +96,11 @@ def test_a_residual_of_the_declared_size_is_noise_of_any_colour_and_a_larger_one
     assert large.weighting.is_white
     unsaid = Noise.of(record_of(both, [np.nan, 1.0]), [both], chance=3.0)
     assert unsaid.weighting.is_white
+
+
+def test_the_samples_after_a_gap_are_not_predicted_from_those_before_it():
+    rng, kept = np.random.default_rng(4), 0.98
+    weighting = Weighting(np.ones(1), (np.array([1.0, kept]),))
+    one, other = rng.standard_normal((2, 30, 1))
+    both = weighting.of(np.concatenate([one, other]), [30, 30])
+    assert_array_equal(both, np.concatenate([weighting.of(one, [30]), weighting.of(other, [30])]))

@@ -64,13 +64,17 @@ def detect(
     """
     limits, runs = baseline.policy.detection, baseline.problem.record.runs
     fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
-    white = baseline.noise.floor.of
-    left = white(np.concatenate(baseline.hypothesis.residuals)[unseen])
+    record, white = baseline.problem.record, baseline.noise.floor.of
+    seen, not_seen = record.stretches("fit"), record.stretches("unseen")
+    left = white(np.concatenate(baseline.hypothesis.residuals)[unseen], not_seen)
     slopes = _sensitivities(baseline)
     observed = _figures(left, limits.slow_blocks)
     n = len(slopes)
     early, late = (
-        np.reshape([white(slope[part]).ravel() for slope in slopes], (n, -1)).T for part in (fitted, unseen)
+        np.reshape(
+            [white(slope[part], lengths).ravel() for slope in slopes], (n, part.sum() * left.shape[1])
+        ).T
+        for part, lengths in ((fitted, seen), (unseen, not_seen))
     )
     # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if n else np.zeros((0, 0))

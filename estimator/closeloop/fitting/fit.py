@@ -54,19 +54,20 @@ def several_weighted(
     found = problem.identify_residuals(thetas)
     if found is None:
         return [_alone(problem, theta, weighting) for theta in thetas]
-    return [_limited(residual, weighting) for residual in found]
+    return [_limited(problem, residual, weighting) for residual in found]
 
 
 def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Array:
     try:
-        return _limited(problem.identify_residual(theta), weighting)
+        return _limited(problem, problem.identify_residual(theta), weighting)
     except FmuError:
         samples = sum(int(run.fit.sum()) for run in problem.record.runs)
         return np.full(samples * len(weighting), REFUSED)
 
 
-def _limited(residual: Array, weighting: Weighting) -> Array:
-    return np.nan_to_num(np.clip(weighting.of(residual).ravel(), -REFUSED, REFUSED), nan=REFUSED)
+def _limited(problem: Problem, residual: Array, weighting: Weighting) -> Array:
+    found = weighting.of(residual, problem.record.stretches("fit")).ravel()
+    return np.nan_to_num(np.clip(found, -REFUSED, REFUSED), nan=REFUSED)
 
 
 def fit(

@@ -27,7 +27,8 @@ def reweighted(
     """The calibrated FMU, the noise that the best hypothesis leaves, and all lists weighted by that noise."""
     baseline, noise = fitter.baseline, noise_left(fitter.baseline, found)
     before = baseline.noise.weighting
-    [base] = rescaled([baseline.hypothesis], before, noise.weighting)
+    stretches = baseline.problem.record.stretches("fit")
+    [base] = rescaled([baseline.hypothesis], before, noise.weighting, stretches)
     if not noise.weighting.is_white:
         base = _calibrated_again(baseline.problem, base, noise.weighting)
     anew = replace(fitter, baseline=replace(baseline, hypothesis=base, noise=noise))
@@ -48,11 +49,14 @@ def noise_left(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noi
     return Noise.of(baseline.problem.record, best.residuals, baseline.policy.detection.chance)
 
 
-def rescaled(found: Sequence[Hypothesis], before: Weighting, after: Weighting) -> list[Hypothesis]:
-    """Hypotheses with the same values, residuals and errors weighted otherwise."""
+def rescaled(
+    found: Sequence[Hypothesis], before: Weighting, after: Weighting, stretches: Sequence[int]
+) -> list[Hypothesis]:
+    """Hypotheses with the same values, residuals and errors weighted otherwise; stretches: see Weighting."""
 
     def turned(column: Array) -> Array:
-        return after.of(before.back(column.reshape(-1, len(before)))).ravel()
+        residual = before.back(column.reshape(-1, len(before)), stretches)
+        return after.of(residual, stretches).ravel()
 
     shared = {id(column): column for h in found for column in h.fit.slopes}
     done = {key: turned(column) for key, column in shared.items()}
@@ -71,7 +75,9 @@ def _calibrated_again(problem: Problem, base: Hypothesis, weighting: Weighting) 
 
 def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Weighting) -> list[Hypothesis]:
     """All hypotheses in the fitter's units, sorted by sum of squares; the leading ones are fitted again."""
-    moved = best_by_label(rescaled(found, before, fitter.baseline.noise.weighting))
+    baseline = fitter.baseline
+    stretches = baseline.problem.record.stretches("fit")
+    moved = best_by_label(rescaled(found, before, baseline.noise.weighting, stretches))
     leading = [h for h in moved if h.candidates][: fitter.baseline.policy.search.reweighted]
     if not leading:
         return moved

@@ -52,7 +52,7 @@ class Baseline:
 
     def _weighted(self, h: Hypothesis, part: Part) -> Array:
         """Residual of h on a part of the record in units of the noise, (m, n_y)."""
-        return self.noise.weighting.of(h.of(self.problem, part))
+        return self.noise.weighting.of(h.of(self.problem, part), self.problem.record.stretches(part))
 
     def beats(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> bool:
         """Whether the log score of a exceeds that of b on a part by enough standard errors."""

@@ -11,7 +11,6 @@ from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import key, label
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
-from estimator.weighting import Weighting
 
 Part = Literal["fit", "choose", "test", "unseen"]  # parts of a record, named as the masks of a Run
 

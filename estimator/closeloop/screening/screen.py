@@ -94,6 +94,10 @@ class Screening:
         """Index of the middle sample of each group, up to the end of the part to identify."""
         return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
 
+    @property
+    def _stretches(self) -> list[int]:
+        return self.problem.record.stretches("fit")
+
     @cached_property
     def _free(self) -> Course:
         """The simulation of the first run of the record."""
@@ -138,7 +142,7 @@ class Screening:
             some = moved[i : i + CHANGES_AT_ONCE]
             with np.errstate(over="ignore", invalid="ignore"):
                 shown = responses(local, levers, some, len(self._at))[:, fit]
-                columns = np.array([scale * self.weighting.of(y).ravel() for y in shown])
+                columns = np.array([scale * self.weighting.of(y, self._stretches).ravel() for y in shown])
                 sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
             # the linearised response of a model with stick and slip may diverge, so that it is simulated
             found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
@@ -178,7 +182,8 @@ class Screening:
 
     def _weighted(self, change: Array) -> Array:
         """The change of the residual of `fit` by a change (m, n_y) of the outputs on the part to identify."""
-        return grouped(-self.weighting.of(change).ravel(), len(self.weighting), self.group)
+        weighted = self.weighting.of(change, self._stretches).ravel()
+        return grouped(-weighted, len(self.weighting), self.group)
 
 
 def _along(free: Course, missing: MissingForce) -> Course:
