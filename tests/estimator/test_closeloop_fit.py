@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ from estimator.closeloop.question.problem import Unknown
 from estimator.record import Run
 from estimator.weighting import Weighting
 from tests.helpers.baselines import baseline, fit_with
-from tests.helpers.problems import OneByOne
+from tests.helpers.problems import OneByOne, record_with
 
 # ---- derivatives along secants
 
@@ -46,7 +45,7 @@ class Curved(OneByOne):
     def simulate(self, x: np.ndarray) -> np.ndarray:
         return x[0] * np.exp(-x[1] * self.t) * np.sin(x[2] * self.t)
 
-    record, free_states = SimpleNamespace(noise_declared=np.array([True])), ()
+    record, free_states = record_with(noise_declared=np.array([True])), ()
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         self.count += 1
@@ -91,7 +90,7 @@ class Rugged(OneByOne):
     policy = DEFAULT
 
     phase: float
-    record, free_states = SimpleNamespace(noise_declared=np.array([False])), ()  # no secants
+    record, free_states = record_with(noise_declared=np.array([False])), ()  # no secants
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         x, t0 = theta["x"], theta["step_force_wheel_t0"]
@@ -251,7 +250,7 @@ class Summed(OneByOne):
 
     a: float
     b: float
-    record, free_states = SimpleNamespace(noise_declared=np.array([True])), ()
+    record, free_states = record_with(noise_declared=np.array([True])), ()
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         t = np.linspace(0.0, 1.0, 400)
@@ -325,7 +324,7 @@ class Playing(OneByOne):
         y = np.clip(self.q, -0.2, 0.2) + 0.2 * np.random.default_rng(seed).standard_normal(len(t))
         every = np.ones(len(t), bool)
         run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
-        self.record = SimpleNamespace(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
+        self.record = record_with(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
 
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         [run] = self.record.runs
@@ -375,7 +374,7 @@ class Beginning(Playing):
         t = np.arange(800) * 0.01
         self.q = np.where((t > 3.0) & (t < 3.3), 0.0, np.sin(2 * np.pi * 3.0 * t))
         every = np.ones(len(t), bool)
-        self.record = SimpleNamespace(
+        self.record = record_with(
             runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),), noise_declared=np.array([True])
         )
         y = 0.1 * np.random.default_rng(seed).standard_normal((len(t), 1))

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Run
 from estimator.weighting import Weighting
 from tests.helpers.baselines import baseline
-from tests.helpers.problems import OneByOne
+from tests.helpers.problems import OneByOne, record_with
 
 SIZE = np.array([0.1])
 AMPLITUDE, STIFFNESS = Unknown("q", 1.0, 0.0, np.inf, 1.0), Unknown("k", 10.0, 0.0, np.inf, 10.0)
@@ -42,7 +41,7 @@ class Swinging(OneByOne):
         every = np.ones(len(t), bool)
         self.true = {"q": 1.0, "k": k}
         y = noise * np.random.default_rng(seed).standard_normal((len(t), 1)) + swing(t, self.true)
-        self.record = SimpleNamespace(
+        self.record = record_with(
             runs=(Run(t, y, y, every, ~every, ~every),), noise_declared=np.array([True]), outputs=("y",)
         )
 

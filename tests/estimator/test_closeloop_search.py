@@ -37,7 +37,7 @@ from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
 from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.native import native
-from tests.helpers.problems import OneByOne
+from tests.helpers.problems import OneByOne, record_with
 
 FREE = (-np.inf, np.inf)
 
@@ -362,7 +362,7 @@ class Line(OneByOne):
     t: np.ndarray
     y: np.ndarray
     builder: None = None
-    record, free_states, policy = SimpleNamespace(noise_declared=np.array([True])), (), DEFAULT
+    record, free_states, policy = record_with(noise_declared=np.array([True])), (), DEFAULT
 
     def identify_residual(self, theta):
         return (self.y - theta["a"] * self.t)[:, None]

@@ -35,7 +35,7 @@ from tests.helpers.carriage import (
     record,
     to_and_fro,
 )
-from tests.helpers.problems import OneByOne
+from tests.helpers.problems import OneByOne, record_with
 
 LIMITS = DEFAULT.search
 
@@ -189,7 +189,7 @@ class Swinging(OneByOne):
         t = np.linspace(0.0, 20.0, 4000)
         fit = t < 15.0
         self.run = Run(t, t[:, None], self.simulate(t, 1.0, moment), fit, ~fit, ~fit)
-        self.record = SimpleNamespace(runs=(self.run,), noise_declared=np.array([True]), outputs=("y",))
+        self.record = record_with(runs=(self.run,), noise_declared=np.array([True]), outputs=("y",))
         self.free_states = ()
 
     def simulate(self, t: np.ndarray, size: float, moment: float) -> np.ndarray:

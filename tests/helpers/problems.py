@@ -1,5 +1,17 @@
 """Problems of tests, which are not simulated by an FMU."""
 
+from types import SimpleNamespace
+from typing import Any
+
+
+def record_with(**given: Any) -> Any:
+    """A record with these attributes; its stretches are not asked for as long as noise is white."""
+    return SimpleNamespace(stretches=_none, **given)
+
+
+def _none(part: str) -> list[int]:
+    return []
+
 
 class OneByOne:
     """What the fits ask of a problem whose simulations are made one after the other."""
