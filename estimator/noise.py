@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.record import Array, BoolArray, Record
-from estimator.weighting import Weighting, correlation_of
+from estimator.weighting import Weighting, correlation_of, shortened
 
 # weights of the third difference; white noise of variance 1 leaves variance 20
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
@@ -25,20 +25,28 @@ class Noise:
     declared: BoolArray
 
     @classmethod
-    def of(cls, record: Record, residuals: Sequence[Array], chance: float) -> "Noise":
+    def of(
+        cls, record: Record, residuals: Sequence[Array], chance: float, caused: Array | None = None
+    ) -> "Noise":
         """Noise of a record, from the residual (N, n_y) of a fit in each run.
 
         A declared size says how large the noise is, not that it is white. If the residual is no larger than
         that, it is taken as noise, and its correlation in time is estimated from it. chance: how far its mean
-        square may exceed the declared one, in standard deviations.
+        square may exceed the declared one, in standard deviations; caused: autocovariance (lags, n_y) of
+        further noise, which is added to that of the sensors.
         """
-        floor, fitted = noise_floor(record), _stretches(record, residuals)
+        white, fitted = noise_floor(record), _stretches(record, residuals)
+        floor = white if caused is None else np.sqrt(white**2 + caused[0])
         correlation = []
         for j, declared in enumerate(record.noise_declared):
-            parts = [r[:, j] / floor[j] for r in fitted]
-            correlation.append(_of_noise(parts, chance) if declared else np.ones(1))
-        weighting = Weighting(weights(record, residuals), tuple(correlation))
-        return cls(floor, weighting, record.noise_declared)
+            found = _of_noise([r[:, j] / floor[j] for r in fitted], chance) if declared else np.ones(1)
+            if found is None and caused is not None:
+                found = shortened(
+                    caused[:, j] + np.append(white[j] ** 2, np.zeros(len(caused) - 1)), sum(map(len, fitted))
+                )
+            correlation.append(np.ones(1) if found is None else found)
+        size = np.where(record.noise_declared, floor, weights(record, residuals))
+        return cls(floor, Weighting(size, tuple(correlation)), record.noise_declared)
 
     @property
     def scale(self) -> Array:
@@ -72,13 +80,20 @@ def _stretches(record: Record, residuals: Sequence[Array]) -> list[Array]:
     return np.split(np.concatenate(_fitted(record, residuals)), ends)
 
 
-def _of_noise(parts: Sequence[Array], chance: float) -> Array:
-    """Autocorrelation of a residual in units of its noise, in stretches (n,); white if it is larger."""
+def larger(record: Record, residuals: Sequence[Array], chance: float) -> bool:
+    """Whether the residual of an output is larger than its declared noise; chance: see Noise.of."""
+    fitted, std = _stretches(record, residuals), record.noise_std
+    declared = np.flatnonzero(record.noise_declared)
+    return any(_of_noise([r[:, j] / std[j] for r in fitted], chance) is None for j in declared)
+
+
+def _of_noise(parts: Sequence[Array], chance: float) -> Array | None:
+    """Autocorrelation of a residual in units of its noise, in stretches (n,); None if it is larger."""
     found = correlation_of(parts)
     redundancy = Weighting(np.ones(1), (found,)).redundancy[0]
     squares = np.concatenate(parts) ** 2
     alike = squares.mean() <= 1 + chance * np.sqrt(2 * redundancy / len(squares))
-    return found if alike else np.ones(1)
+    return found if alike else None
 
 
 def white_noise(pieces: Iterable[Array], quantised: bool = False) -> float:

@@ -115,17 +115,26 @@ def correlation_of(parts: Sequence[Array]) -> Array:
     The order p is chosen by Schwarz's criterion. Order 0, white noise, is among the choices.
     Source: G. Schwarz, Annals of Statistics 6 (1978), 461-464.
     """
-    n = sum(len(x) for x in parts)
     most = min(ORDERS[-1], max(len(x) for x in parts) // 4)
-    sums = np.zeros(most + 1)
+    return shortened(autocovariance(parts, most + 1), sum(len(x) for x in parts))
+
+
+def autocovariance(parts: Sequence[Array], lags: int) -> Array:
+    """Autocovariance (lags,) of a signal of mean zero, given in stretches (N,), from lag 0 on."""
+    sums = np.zeros(lags)
     for x in parts:
-        spectrum = np.abs(np.fft.rfft(x, len(x) + max(len(x), most + 1))) ** 2
-        sums += np.fft.irfft(spectrum, len(x) + max(len(x), most + 1))[: most + 1]
-    if sums[0] <= 0:
+        length = len(x) + max(len(x), lags)
+        sums += np.fft.irfft(np.abs(np.fft.rfft(x, length)) ** 2, length)[:lags]
+    return sums / sum(len(x) for x in parts)
+
+
+def shortened(covariance: Array, samples: int) -> Array:
+    """Autocorrelation (p + 1,) from an autocovariance, for the order p by Schwarz's criterion."""
+    if covariance[0] <= 0:
         return np.ones(1)
-    c = sums / sums[0]
-    left = {p: _left(c[: p + 1]) for p in (0, *(p for p in ORDERS if p <= most))}
-    order = min(left, key=lambda p: n * np.log(left[p]) + p * np.log(n))
+    c = covariance / covariance[0]
+    left = {p: _left(c[: p + 1]) for p in (0, *(p for p in ORDERS if p < len(c)))}
+    order = min(left, key=lambda p: samples * np.log(left[p]) + p * np.log(samples))
     return np.asarray(c[: order + 1])
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.noise import Noise, noise_floor, weights
@@ -28,14 +29,13 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
         for n, (low, high) in problem.calibrate.items()
     ]
     unknowns = [*parameters, *states]
-    chance = problem.policy.detection.chance
-    base, noise = declared, Noise.of(record, declared.residuals, chance)
+    base, noise = declared, noise_left(problem, start.theta, declared.residuals)
     for _ in range(1 if noise.known else 2):
         found = fit(problem, unknowns, noise.weighting, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < ROUGHLY_MATCHED:
             found = fit(problem, unknowns, noise.weighting, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
-        noise = Noise.of(record, base.residuals, chance)
+        noise = noise_left(problem, found.theta, base.residuals)
     if not noise.weighting.is_white:
         found = fit(problem, unknowns, noise.weighting, base.fit.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))

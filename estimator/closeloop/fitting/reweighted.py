@@ -12,9 +12,11 @@ import numpy as np
 
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter, from_there
+from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
+from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
 from estimator.noise import Noise
 from estimator.record import Array
@@ -25,7 +27,7 @@ def reweighted(
     fitter: Fitter, found: Sequence[Sequence[Hypothesis]]
 ) -> tuple[Hypothesis, Noise, list[list[Hypothesis]]]:
     """The calibrated FMU, the noise that the best hypothesis leaves, and all lists weighted by that noise."""
-    baseline, noise = fitter.baseline, noise_left(fitter.baseline, found)
+    baseline, noise = fitter.baseline, _noise(fitter.baseline, found)
     before = baseline.noise.weighting
     stretches = baseline.problem.record.stretches("fit")
     [base] = rescaled([baseline.hypothesis], before, noise.weighting, stretches)
@@ -39,14 +41,14 @@ def needed(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> bool:
     """Whether the best of the hypotheses, if any, says more of the noise than the calibrated FMU."""
     if not any(found):
         return False
-    noises = baseline.noise, noise_left(baseline, found)
+    noises = baseline.noise, _noise(baseline, found)
     return not all(noise.known and noise.weighting.is_white for noise in noises)
 
 
-def noise_left(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise:
+def _noise(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise:
     """The noise that the best of all hypotheses leaves."""
     best = min((h for some in found for h in some), key=cost)
-    return Noise.of(baseline.problem.record, best.residuals, baseline.policy.detection.chance)
+    return noise_left(built(baseline.problem, best.candidates), best.theta, best.residuals)
 
 
 def rescaled(
