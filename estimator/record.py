@@ -1,5 +1,6 @@
 """A measured record as arrays in the units of the FMU, with notes on peculiarities of the data."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -64,6 +65,11 @@ class Record:
     outputs: tuple[str, ...]  # the columns of y
     noise_std: Array  # (n_y,) in the FMU's units, nan if not declared
     notes: tuple[Note, ...] = ()
+
+    def of(self, values: Sequence[Array], part: str) -> Array:
+        """Values of each run (N, k) on a part, named as a mask of Run, one run after the other, (m, k)."""
+        runs = zip(values, self.runs, strict=True)
+        return np.concatenate([some[getattr(run, part)] for some, run in runs])
 
     def stretches(self, part: str) -> list[int]:
         """Lengths of the uninterrupted stretches of a part, named as a mask of Run, in their order."""

@@ -299,7 +299,7 @@ def test_a_fit_extended_by_another_has_the_unknowns_of_both():
 def test_a_fit_holds_the_derivatives_that_were_known_and_no_copies_of_them():
     unknowns = Unknown("a", 1.0, -np.inf, np.inf, 1.0), Unknown("b", 2.0, 1.0, 3.0, 0.2)
     known = {"b": np.linspace(0.0, -200.0, 400)}
-    found = fit(Summed(5.0, 2.0), unknowns, np.array([0.01]), known=known)
+    found = fit(Summed(5.0, 2.0), unknowns, Weighting.white(np.array([0.01])), known=known)
     assert found.slopes[1] is known["b"]
     assert found.columns["b"] is known["b"]
     copied = replace(found, slopes=tuple(column.copy() for column in found.slopes))

@@ -62,20 +62,13 @@ def detect(
     Whether the residual matters is decided by its size beyond noise, with an allowance for chance, compared
     with the signal and with the noise.
     """
-    limits, runs = baseline.policy.detection, baseline.problem.record.runs
-    fitted, unseen = (np.concatenate([getattr(r, m) for r in runs]) for m in ("fit", "unseen"))
-    record, white = baseline.problem.record, baseline.noise.floor.of
-    seen, not_seen = record.stretches("fit"), record.stretches("unseen")
-    left = white(np.concatenate(baseline.hypothesis.residuals)[unseen], not_seen)
-    slopes = _sensitivities(baseline)
+    limits = baseline.policy.detection
+    left = baseline.in_noise(baseline.hypothesis.residuals, "unseen")
     observed = _figures(left, limits.slow_blocks)
+    slopes = _sensitivities(baseline)
     n = len(slopes)
-    early, late = (
-        np.reshape(
-            [white(slope[part], lengths).ravel() for slope in slopes], (n, part.sum() * left.shape[1])
-        ).T
-        for part, lengths in ((fitted, seen), (unseen, not_seen))
-    )
+    early = np.array([baseline.in_noise(slope, "fit").ravel() for slope in slopes]).T
+    late = np.array([baseline.in_noise(slope, "unseen").ravel() for slope in slopes]).T
     # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if n else np.zeros((0, 0))
     copies = []
@@ -99,13 +92,12 @@ def detect(
     return Detection(limits.level, p_value, figures, size, likeness, sets_in)
 
 
-def _sensitivities(baseline: Baseline) -> list[Array]:
-    """Derivatives of the whole residual with respect to each unknown, (N, n_y) each."""
-    base, problem = baseline.hypothesis, baseline.problem
-    here, theta, unknowns = np.concatenate(base.residuals), base.fit.theta, base.fit.unknowns
-    aside = [{**theta, u.name: theta[u.name] + STEP * u.scale} for u in unknowns]
-    moved = problem.several_residuals(aside)
-    return [(np.concatenate(r) - here) / (STEP * u.scale) for u, r in zip(unknowns, moved, strict=True)]
+def _sensitivities(baseline: Baseline) -> list[list[Array]]:
+    """Derivatives of the residuals of each run (N, n_y) with respect to each unknown."""
+    here, fit = baseline.hypothesis.residuals, baseline.hypothesis.fit
+    aside = [{**fit.theta, u.name: fit.theta[u.name] + STEP * u.scale} for u in fit.unknowns]
+    moved = zip(fit.unknowns, baseline.problem.several_residuals(aside), strict=True)
+    return [[(r - at) / (STEP * u.scale) for r, at in zip(there, here, strict=True)] for u, there in moved]
 
 
 def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:

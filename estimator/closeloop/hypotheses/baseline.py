@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,6 +54,11 @@ class Baseline:
     def _weighted(self, h: Hypothesis, part: Part) -> Array:
         """Residual of h on a part of the record in units of the noise, (m, n_y)."""
         return self.noise.weighting.of(h.of(self.problem, part), self.problem.record.stretches(part))
+
+    def in_noise(self, residuals: Sequence[Array], part: Part) -> Array:
+        """Residuals of all runs (N, n_y) on a part in standard deviations of the noise, (m, n_y)."""
+        record = self.problem.record
+        return self.noise.floor.of(record.of(residuals, part), record.stretches(part))
 
     def beats(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> bool:
         """Whether the log score of a exceeds that of b on a part by enough standard errors."""

@@ -66,8 +66,7 @@ class Hypothesis:
 
     def of(self, problem: Problem, part: Part) -> Array:
         """Residual on a part of the record, (m, n_y)."""
-        runs = zip(self.residuals, problem.record.runs, strict=True)
-        return np.concatenate([r[getattr(run, part)] for r, run in runs])
+        return problem.record.of(self.residuals, part)
 
     def significance(self, base: "Hypothesis | None" = None) -> list[float]:
         """Amplitudes of each candidate over their standard error; infinite if they are fixed.

@@ -16,7 +16,7 @@ SEGMENT = 256  # samples of a periodogram
 FEWEST = 8  # segments without which no spectrum is judged
 FLAT = 3.0  # standard deviations by which the two halves of the upper octave may differ
 LARGEST = 0.25  # share of an input's variance; above it, what is white is the excitation itself
-DRAWS = 4  # simulations with noise on the inputs
+SIMULATIONS = 4  # with noise on the inputs
 
 
 def white_part(u: Array) -> float:
@@ -54,12 +54,12 @@ def caused(problem: Problem, theta: Mapping[str, float]) -> Array | None:
     if not sizes.any():
         return None
     found = np.zeros((ORDERS[-1] + 1, len(record.outputs)))
-    for _ in range(DRAWS):
+    for _ in range(SIMULATIONS):
         noisy = tuple(replace(run, u=run.u + sizes * rng.standard_normal(run.u.shape)) for run in record.runs)
         moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
         for a, b, run in zip(moved, problem.simulate(theta), record.runs, strict=True):
             if run.fit.any():
-                found += np.column_stack([autocovariance([y], len(found)) for y in (a - b).T]) / DRAWS
+                found += np.column_stack([autocovariance([y], len(found)) for y in (a - b).T]) / SIMULATIONS
     return found / sum(run.fit.any() for run in record.runs)
 
 
