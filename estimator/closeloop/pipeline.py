@@ -145,14 +145,14 @@ class Chain:
         """
         form, fitter = form_of(shown.baseline), self.fitter(shown.baseline, self.jobs)
         asked: set[tuple[str, ...]] = set()
-        denied: Hypothesis | None = None
+        tried = False
         for turn in count():
             self.tell("verdict", "testing whether the force follows the curve of the law")
             leading, judgement = self._judged(shown, forces, singles, pairs, f"verdict {turn}")
-            alone = leading.members and not judgement.members and len(leading.members[0].candidates) == 1
-            if alone and denied is None:
-                denied = leading.members[0]
-                singles = self._search(shown).instead(denied, singles)
+            alone = [h for h in leading.members[:1] if len(h.candidates) == 1]
+            if alone and not tried and not (judgement.members and shown.baseline.leaves_noise(alone[0])):
+                tried = True
+                singles = self._search(shown).instead(alone[0], singles)
                 continue
             members = [h for h in judgement.members if h.key not in asked]
             if not members:

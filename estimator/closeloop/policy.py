@@ -190,10 +190,17 @@ class SearchPolicy:
         CHALLENGE,
     )
     dated: int = limit(
-        3, "hypotheses", "leading hypotheses whose onset time is searched on a grid", CHALLENGE
+        3,
+        "hypotheses",
+        "leading hypotheses whose onset time is searched on a grid, and that are refined if the best one "
+        "leaves more than noise",
+        CHALLENGE,
     )
     dated_rival: float = limit(
-        2.0, "times the best sum of squares", "above this no onset time is searched", CHALLENGE
+        2.0,
+        "times the best sum of squares",
+        "above this no onset time is searched and no rival refined",
+        CHALLENGE,
     )
     grown: int = limit(
         4,

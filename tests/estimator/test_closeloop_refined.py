@@ -137,3 +137,20 @@ def test_errors_reach_a_place_that_the_sum_of_squares_allows():
     far = replace(near, fit=replace(near.fit, residual=1.1 * h.fit.residual))
     assert likelihood.reached(h, near) == pytest.approx([0.0, 0.05 / likelihood.WIDTH])
     assert likelihood.reached(h, far) == pytest.approx([0.0, 0.0])
+
+
+def test_rivals_are_refined_as_the_best_one_is_and_what_is_far_off_is_left():
+    asked, best = swung(3, BESIDE)
+    rival = replace(best, candidates=(replace(best.candidates[0], location="elsewhere"),))
+    far = replace(best, fit=replace(best.fit, residual=2 * best.fit.residual))
+    found = refined.evenly(fitter(asked), [best, rival, far])
+    assert [cost(h) for h in found[:2]] == pytest.approx([cost(found[0])] * 2)
+    assert cost(found[0]) < 0.5 * cost(best)
+    assert found[1].candidates == rival.candidates
+    assert found[2] is far
+
+
+def test_rivals_of_what_leaves_noise_alone_stay():
+    asked, best = swung(1, 0.0)
+    rival = replace(best, candidates=(replace(best.candidates[0], location="elsewhere"),))
+    assert refined.evenly(fitter(asked), [best, rival]) == [best, rival]

@@ -7,6 +7,8 @@ not resolve them, and the fit stops beside the lowest one; smaller differences l
 from collections.abc import Sequence
 from dataclasses import replace
 
+from joblib import Parallel, delayed
+
 from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost, mean_square
@@ -19,6 +21,18 @@ def refined(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     if fitter.baseline.leaves_noise(h) or mean_square(h) < RUGGED:
         return h
     return lower(h, fitter.alone.finished(from_there([h]), h.others, step=FINE_STEP))
+
+
+def evenly(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The hypotheses, best first, the best one and its nearest rivals refined.
+
+    What names an effect is also refined with its errors. A rival that is not would lose by being fitted less
+    carefully.
+    """
+    limits = fitter.baseline.policy.search
+    leading = [h for h in found[: limits.dated] if cost(h) < limits.dated_rival * cost(found[0])]
+    tasks = (delayed(refined)(fitter.alone, h) for h in leading)
+    return [*Parallel(fitter.jobs)(tasks), *found[len(leading) :]]
 
 
 def lower(h: Hypothesis, again: Sequence[Hypothesis]) -> Hypothesis:

@@ -6,6 +6,7 @@ from functools import cached_property
 
 from estimator.closeloop.decision.model_form import ModelForm, form_of
 from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.refined import evenly
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import twins, with_twins
@@ -44,15 +45,21 @@ class Search:
         return self._form.ranked(with_twins(ones, self._alike)), twos
 
     def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The single hypotheses, with other laws over the motion of h fitted from its values."""
+        """The single hypotheses, h and its nearest rivals fitted once more.
+
+        h is the best one, but leaves more than noise, or its force does not follow its law. Other laws over
+        its motion are fitted from its values. Then the best one and its nearest rivals are refined.
+        """
+        s = self.screened
+        self.tell("renamed", "fitting other laws over the same motion, and the nearest rivals once more")
+        return self._form.ranked(s.stages.done("renamed", lambda: self._rivals(h, singles)))
+
+    def _rivals(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
         s = self.screened
         promises = over_the_same(s.screening, Calibration.of(s.fit), h, s.change)
-        if not promises:
-            return list(singles)
-        self.tell("renamed", "fitting other laws over the same motion")
-        found = s.stages.done("renamed", lambda: self.fitter.finished(promises))
+        found = self.fitter.finished(promises) if promises else []
         better = with_twins([f for f in found if cost(f) < cost(h)], self._alike)
-        return self._form.ranked(best_by_label([*better, *singles])) if better else list(singles)
+        return evenly(self.fitter, self._form.ranked(best_by_label([*better, *singles])))
 
     @property
     def _form(self) -> ModelForm:
