@@ -34,7 +34,7 @@ def other_contact(folder, seed, duration, more=""):
 
 
 def test_friction_with_another_contact_is_near_the_truth_and_its_doubt_is_said(tmp_path):
-    result = estimate(other_contact(tmp_path, 3, 40.0))
+    result = estimate(other_contact(tmp_path, 3, 20.0))
     mu0 = result.estimated["mu0"]
     assert abs(mu0["value"] - 0.5) < 0.05
     assert abs(mu0["value"] - 0.5) < 2.6 * mu0["std_error"] or not result.consistent
