@@ -82,7 +82,7 @@ def test_a_wave_has_an_amplitude_of_the_machine_and_a_phase_of_the_run(
     t = np.linspace(0, 3, 50)
     force = native[f"{p}F_sin"] * np.sin(t) + native[f"{p}F_cos"] * np.cos(t)
     assert_allclose(force, size * np.sin(t + phase), atol=1e-12 * size)
-    assert_allclose([made.turned(native)[n] for n in values], list(values.values()), rtol=1e-9)
+    assert_allclose([made.turned(native)[n] for n in values], list(values.values()), rtol=1e-9, atol=1e-15)
     names, natives = list(values), [f"{p}F_sin", f"{p}F_cos", f"{p}f", "M"]
     slopes = made.slopes(values, natives, names)
     for j, n in enumerate(names):
