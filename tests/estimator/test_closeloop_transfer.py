@@ -70,7 +70,11 @@ def wave(sine: float = 1.0, cosine: float = 1.0) -> Candidate:
     return Candidate("harmonic_excitation", "carriage", ends, (Unknown(f"{prefix}f", 1.0, 0.0, 9.0, 0.1),))
 
 
-@given(st.floats(0.01, 50.0), st.floats(-3.1, 3.1), st.floats(0.1, 5.0))
+# the product of an amplitude and a phase of 5e-324 rad is no number any more
+PHASES = st.floats(-3.1, 3.1).filter(lambda phase: phase == 0 or abs(phase) > 1e-300)
+
+
+@given(st.floats(0.01, 50.0), PHASES, st.floats(0.1, 5.0))
 def test_a_wave_has_an_amplitude_of_the_machine_and_a_phase_of_the_run(
     size: float, phase: float, frequency: float
 ) -> None:
@@ -82,7 +86,7 @@ def test_a_wave_has_an_amplitude_of_the_machine_and_a_phase_of_the_run(
     t = np.linspace(0, 3, 50)
     force = native[f"{p}F_sin"] * np.sin(t) + native[f"{p}F_cos"] * np.cos(t)
     assert_allclose(force, size * np.sin(t + phase), atol=1e-12 * size)
-    assert_allclose([made.turned(native)[n] for n in values], list(values.values()), rtol=1e-9, atol=1e-15)
+    assert_allclose([made.turned(native)[n] for n in values], list(values.values()), rtol=1e-9)
     names, natives = list(values), [f"{p}F_sin", f"{p}F_cos", f"{p}f", "M"]
     slopes = made.slopes(values, natives, names)
     for j, n in enumerate(names):

@@ -67,7 +67,7 @@ def same(a: Any, b: Any) -> bool:
     if type(a) is not type(b):
         return False
     if isinstance(a, np.str_):  # an empty one has no bytes, but tobytes gives four
-        return str(a) == str(b)
+        return a.dtype == b.dtype and str(a) == str(b)
     if isinstance(a, np.ndarray | np.generic):
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
     if isinstance(a, float):

@@ -53,11 +53,11 @@ def caused(problem: Problem, theta: Mapping[str, float]) -> Array | None:
     sizes = np.array([max(white_part(column) for column in each) for each in _columns(record.runs)])
     if not sizes.any():
         return None
-    found = np.zeros((ORDERS[-1] + 1, len(record.outputs)))
+    found, still = np.zeros((ORDERS[-1] + 1, len(record.outputs))), problem.simulate(theta)
     for _ in range(SIMULATIONS):
         noisy = tuple(replace(run, u=run.u + sizes * rng.standard_normal(run.u.shape)) for run in record.runs)
         moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
-        for a, b, run in zip(moved, problem.simulate(theta), record.runs, strict=True):
+        for a, b, run in zip(moved, still, record.runs, strict=True):
             if run.fit.any():
                 found += np.column_stack([autocovariance([y], len(found)) for y in (a - b).T]) / SIMULATIONS
     return found / sum(run.fit.any() for run in record.runs)
