@@ -18,7 +18,7 @@ from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
-from estimator.closeloop.fitting.reweighted import needed, reweighted
+from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
@@ -28,6 +28,7 @@ from estimator.closeloop.screening.missing_force import MissingForce, missing_fo
 from estimator.closeloop.search.free_form import free_form
 from estimator.closeloop.search.screened import Screened, screened
 from estimator.closeloop.search.search import Search
+from estimator.noise import Noise
 
 
 def trace(
@@ -100,9 +101,10 @@ class Chain:
     def _searched(self, found: Outcome, shown: Screened, before: Sequence[Check]) -> Outcome:
         """The outcome of the search for a detected discrepancy; before: the checks of the detection."""
         singles, pairs = self._search(shown).run()
-        if needed(shown.baseline, [singles, pairs]):
+        noise = self.stages.done("noise", lambda: noise_of_best(shown.baseline, [singles, pairs]))
+        if noise:
             self.tell("weights", "weighting the residuals by the noise that the best fit leaves")
-            shown, singles, pairs = self._weighted_anew(shown, singles, pairs)
+            shown, singles, pairs = self._weighted_anew(shown, singles, pairs, noise)
         baseline = shown.baseline
         singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
         self.tell("test", "checking the answer on the test part")
@@ -123,11 +125,11 @@ class Chain:
         return Search(shown, self.fitter(shown.baseline, self.jobs), self.tell)
 
     def _weighted_anew(
-        self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]
+        self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], noise: Noise
     ) -> tuple[Screened, list[Hypothesis], list[Hypothesis]]:
-        """Screening, single hypotheses and pairs (best first), weighted by the noise left by the best fit."""
-        base, noise, (ones, twos) = self.stages.done(
-            "weights", lambda: reweighted(self.fitter(shown.baseline, self.jobs), [singles, pairs])
+        """Screening, single hypotheses and pairs (best first), weighted by the noise."""
+        base, (ones, twos) = self.stages.done(
+            "weights", lambda: reweighted(self.fitter(shown.baseline, self.jobs), [singles, pairs], noise)
         )
         baseline = replace(shown.baseline, hypothesis=base, noise=noise)
         form = form_of(baseline)

@@ -69,6 +69,30 @@ class DetectionPolicy:
         "a residual with a smaller rms does not matter if the model form is open",
         CHALLENGE,
     )
+    input_segment: int = limit(
+        256,
+        "samples",
+        "length of the segments of an input whose spectra show its white noise",
+        "derivation: 64 frequencies in the upper octave, of which two halves can be compared",
+    )
+    input_segments: int = limit(
+        8,
+        "segments",
+        "fewest segments of an input from which its white noise is taken",
+        "derivation: the median of 8 scatters by half of its mean at one frequency, by 8 % over the octave",
+    )
+    input_flat: float = limit(
+        3.0,
+        "standard deviations",
+        "difference between the two halves of an input's upper octave, above which it is not noise",
+        "derivation: 1 in 700, as `chance`",
+    )
+    input_noise: float = limit(
+        0.25,
+        "share of an input's variance",
+        "white part of an input, above which it is taken for the excitation itself",
+        "agreed assumption: a sensor whose noise is half of the signal's rms would not be used as an input",
+    )
 
 
 @dataclass(frozen=True)
@@ -288,7 +312,8 @@ class DecisionPolicy:
     gap: float = limit(
         0.95,
         "share of the gap to the noise",
-        "share of the gap that an answer must close if it does not come down to the noise",
+        "share of the gap that an answer must close if it leaves more than noise, which must be less than "
+        "`signal_share`",
         CHALLENGE,
     )
     explained: float = limit(

@@ -24,31 +24,26 @@ from estimator.weighting import Weighting
 
 
 def reweighted(
-    fitter: Fitter, found: Sequence[Sequence[Hypothesis]]
-) -> tuple[Hypothesis, Noise, list[list[Hypothesis]]]:
-    """The calibrated FMU, the noise that the best hypothesis leaves, and all lists weighted by that noise."""
-    baseline, noise = fitter.baseline, _noise(fitter.baseline, found)
-    before = baseline.noise.weighting
+    fitter: Fitter, found: Sequence[Sequence[Hypothesis]], noise: Noise
+) -> tuple[Hypothesis, list[list[Hypothesis]]]:
+    """The calibrated FMU and all lists of hypotheses, weighted by another noise."""
+    baseline, before = fitter.baseline, fitter.baseline.noise.weighting
     stretches = baseline.problem.record.stretches("fit")
     [base] = rescaled([baseline.hypothesis], before, noise.weighting, stretches)
     if not noise.weighting.is_white:
         base = _calibrated_again(baseline.problem, base, noise.weighting)
     anew = replace(fitter, baseline=replace(baseline, hypothesis=base, noise=noise))
-    return base, noise, [_fitted_again(anew, some, before) for some in found]
+    return base, [_fitted_again(anew, some, before) for some in found]
 
 
-def needed(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> bool:
-    """Whether the best of the hypotheses, if any, says more of the noise than the calibrated FMU."""
+def noise_of_best(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise | None:
+    """The noise that the best of the hypotheses leaves; None if it says no more than that of the baseline."""
     if not any(found):
-        return False
-    noises = baseline.noise, _noise(baseline, found)
-    return not all(noise.known and noise.weighting.is_white for noise in noises)
-
-
-def _noise(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise:
-    """The noise that the best of all hypotheses leaves."""
+        return None
     best = min((h for some in found for h in some), key=cost)
-    return noise_left(built(baseline.problem, best.candidates), best.theta, best.residuals)
+    noise = noise_left(built(baseline.problem, best.candidates), best.theta, best.residuals)
+    same = all(n.known and n.weighting.is_white for n in (baseline.noise, noise))
+    return None if same else noise
 
 
 def rescaled(
