@@ -151,10 +151,10 @@ class Chain:
         for turn in count():
             self.tell("verdict", "testing whether the force follows the curve of the law")
             leading, judgement = self._judged(shown, forces, singles, pairs, f"verdict {turn}")
-            alone = [h for h in leading.members[:1] if len(h.candidates) == 1]
+            alone = [h for h in (leading.members or singles)[:1] if len(h.candidates) == 1]
             if alone and not tried and not (judgement.members and shown.baseline.leaves_noise(alone[0])):
                 tried = True
-                singles = self._search(shown).instead(alone[0], singles)
+                singles = self._search(shown).instead(singles)
                 continue
             members = [h for h in judgement.members if h.key not in asked]
             if not members:

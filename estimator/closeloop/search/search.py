@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from estimator.closeloop.decision.model_form import ModelForm, form_of
-from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.fitter import BRIEF, Fitter
 from estimator.closeloop.fitting.refined import evenly
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import twins, with_twins
+from estimator.closeloop.policy import SearchPolicy
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
@@ -44,22 +45,25 @@ class Search:
         twos = s.stages.done("simpler pairs", lambda: self._replaced(pairs))
         return self._form.ranked(with_twins(ones, self._alike)), twos
 
-    def instead(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        """The single hypotheses, h and its nearest rivals fitted once more.
+    def instead(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The single hypotheses, best first, fitted once more from the values of the best one.
 
-        h is the best one, but leaves more than noise, or its force does not follow its law. Other laws over
-        its motion are fitted from its values. Then the best one and its nearest rivals are refined.
+        The best one leaves more than noise, or its force does not follow its law. It may then be a fit that
+        has not arrived, and another effect the right one, whose fit has not arrived either.
         """
         s = self.screened
-        self.tell("renamed", "fitting other laws over the same motion, and the nearest rivals once more")
-        return self._form.ranked(s.stages.done("renamed", lambda: self._rivals(h, singles)))
+        self.tell("rivals", "fitting the rivals of the best effect from its values")
+        return s.stages.done("rivals", lambda: self._rivals(singles))
 
-    def _rivals(self, h: Hypothesis, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
-        s = self.screened
-        promises = over_the_same(s.screening, Calibration.of(s.fit), h, s.change)
-        found = self.fitter.finished(promises) if promises else []
-        better = with_twins([f for f in found if cost(f) < cost(h)], self._alike)
-        return evenly(self.fitter, self._form.ranked(best_by_label([*better, *singles])))
+    def _rivals(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """See `instead`; the best one and its nearest rivals are refined, before and after."""
+        s, fitter = self.screened, self.fitter
+        found = evenly(fitter, self._form.ranked(singles))
+        again = fitter.fitted(from_its_values(found, s.problem.policy.search), BRIEF)
+        similar = over_the_same(s.screening, Calibration.of(s.fit), found[0], s.change)
+        again = [*fitter.to_the_end(again), *fitter.finished(similar)]
+        more = with_twins(again, self._alike)
+        return evenly(fitter, self._form.ranked(best_by_label([*more, *found])))
 
     @property
     def _form(self) -> ModelForm:
@@ -190,6 +194,14 @@ class Search:
         promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)
         more = self.fitter.finished(distinct(promises))
         return self._form.ranked(best_by_label([*found, *more]))
+
+
+def from_its_values(found: Sequence[Hypothesis], limits: SearchPolicy) -> list[Promise]:
+    """Promises of the rivals of the best hypothesis, best first, whose other unknowns start at its values."""
+    best, *rivals = found
+    shared = {u.name: best.theta[u.name] for u in best.others}
+    near = [h for h in rivals if h.candidates and cost(h) < limits.hopeless * cost(best)][: limits.nominees]
+    return [Promise(h.candidates, 0.0, {**h.theta, **shared}) for h in near]
 
 
 def sets_in(h: Hypothesis) -> bool:
