@@ -76,10 +76,8 @@ class ModelForm(ABC):
     def _at_noise(self, h: Hypothesis) -> BoolArray:
         """Outputs (n_y,) whose residual comes down to the noise, or nearly so, with a hypothesis."""
         b, limits = self.baseline, self.baseline.policy.decision
-        before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
         scatter = limits.scatter * np.sqrt(b.noise.redundancy / (2 * len(h.of(b.problem, "choose"))))
-        down: BoolArray = after < (limits.clean + scatter) * b.noise.std
-        return down | (gap_closed(before, after, b.noise.std) >= limits.gap)
+        return np.asarray(h.rms(b.problem, "choose") < (limits.clean + scatter) * b.noise.std)
 
     def _beyond(self, part: Part) -> Array:
         """Rms (n_y,) of the calibrated FMU's residual on a part, beyond noise and its chance scatter."""
@@ -109,8 +107,15 @@ class Closed(ModelForm):
         return self._material(np.maximum(self._beyond("unseen"), self._beyond("fit")))
 
     def reached(self, h: Hypothesis) -> BoolArray:
-        """See ModelForm."""
-        return self._at_noise(h)
+        """See ModelForm; no form is right to any accuracy, so that little may be left where noise is less.
+
+        Little is a small share of the signal and, at the same time, of what was there before.
+        """
+        b, noise = self.baseline, self.baseline.noise.std
+        before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
+        beyond = np.sqrt(np.maximum(after**2 - noise**2, 0.0))
+        little = beyond <= b.policy.detection.signal_share * signal_size(b.problem)
+        return self._at_noise(h) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
 
     def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
@@ -171,34 +176,28 @@ class Open(ModelForm):
     def reached(self, h: Hypothesis) -> BoolArray:
         """Whether each output (n_y,) comes down to its noise or to the open share.
 
-        All outputs together: one effect must explain at least half of the variance beyond noise, several
-        effects half of what one may leave, because they can imitate an error of form. This must hold over
-        both parts, and on the part to choose as well unless little is left over both: an effect may act in
-        one part only.
-        Each output: a large residual must come below the open share, a small one must not grow. A sensor
-        fault may leave the other outputs unchanged if it explains as much of its own output as several
-        effects must.
+        An output whose residual was small before must not grow. One effect must explain at least half of the
+        variance beyond noise of all outputs together, over both parts, and on the part to choose as well
+        unless little is left over both: an effect may act in one part only. Several effects can imitate an
+        error of form, so that they must leave noise alone. A sensor fault that leaves noise alone on its own
+        output need not explain the others.
         """
         b, limits = self.baseline, self.baseline.policy
         noise, down = b.noise.std, self._at_noise(h)
+        if len(h.candidates) > 1:
+            return down
         before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
         left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
-        one, several = limits.decision.open_single, limits.decision.open_single**2
-        gone = left <= several * np.maximum(was, TINY)
-        if np.any(_faulty(b.problem, h) & gone & (was >= limits.detection.noise_share**2)):
-            return np.asarray(down | gone | (after <= limits.decision.clean * before))
         share = (self.share * signal_size(b.problem) / noise) ** 2
-        large = (was >= share) & (before >= limits.detection.open_form_noises * noise)
-        most = one if len(h.candidates) == 1 else several
+        no_worse = after <= limits.decision.clean * before
+        if np.any(_faulty(b.problem, h) & down & (was >= limits.detection.noise_share**2)):
+            return np.asarray(down | no_worse)
+        half = limits.decision.open_single
         of_all = b.beyond_noise_of_all(h) / max(b.beyond_noise_of_all(b.hypothesis), TINY)
-        held_out = np.sum(left) <= most * np.sum(was)
-        if of_all > most or not (held_out or of_all <= most * one):
+        if of_all > half or (of_all > half**2 and np.sum(left) > half * np.sum(was)):
             return down
-        if not large.any():
-            return np.ones(len(noise), dtype=bool)
-        return np.asarray(
-            down | gone | np.where(large, left < share, after <= limits.decision.clean * before)
-        )
+        small = (was < share) | (before < limits.detection.open_form_noises * noise)
+        return np.asarray(down | np.where(small, no_worse, left < share))
 
     def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; by both parts together, because the open form adds to what the best one leaves."""
