@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.record import Array, BoolArray, Record
-from estimator.weighting import Weighting, correlation_of, shortened
+from estimator.weighting import Weighting, correlation_of, joint_of
 
 # weights of the third difference; white noise of variance 1 leaves variance 20
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
@@ -26,27 +26,36 @@ class Noise:
 
     @classmethod
     def of(
-        cls, record: Record, residuals: Sequence[Array], chance: float, caused: Array | None = None
+        cls, record: Record, residuals: Sequence[Array], chance: float, caused: Sequence[Array] = ()
     ) -> "Noise":
         """Noise of a record, from the residual (N, n_y) of a fit in each run.
 
         A declared size says how large the noise is, not that it is white. If the residual is no larger than
         that, it is taken as noise, and its correlation in time is estimated from it. chance: how far its mean
-        square may exceed the declared one, in standard deviations; caused: autocovariance (lags, n_y) of
-        further noise, which is added to that of the sensors.
+        square may exceed the declared one, in standard deviations; caused: draws (n, n_y) of further noise,
+        which is added to that of the sensors and which the outputs may share.
         """
-        white, fitted = noise_floor(record), _stretches(record, residuals)
-        floor = white if caused is None else np.sqrt(white**2 + caused[0])
+        white = noise_floor(record)
+        if caused:
+            return cls._shared(record, residuals, white, caused)
         correlation = []
         for j, declared in enumerate(record.noise_declared):
-            found = _of_noise([r[:, j] / floor[j] for r in fitted], chance) if declared else np.ones(1)
-            if found is None and caused is not None:
-                found = shortened(
-                    caused[:, j] + np.append(white[j] ** 2, np.zeros(len(caused) - 1)), sum(map(len, fitted))
-                )
+            parts = [r[:, j] / white[j] for r in _stretches(record, residuals)]
+            found = _of_noise(parts, chance) if declared else None
             correlation.append(np.ones(1) if found is None else found)
-        size = np.where(record.noise_declared, floor, weights(record, residuals))
-        return cls(floor, Weighting(size, tuple(correlation)), record.noise_declared)
+        size = np.where(record.noise_declared, white, weights(record, residuals))
+        return cls(white, Weighting(size, tuple(correlation)), record.noise_declared)
+
+    @classmethod
+    def _shared(
+        cls, record: Record, residuals: Sequence[Array], white: Array, caused: Sequence[Array]
+    ) -> "Noise":
+        """Noise of the sensors (n_y,) and the noise that is caused; see `of`."""
+        std = np.sqrt(white**2 + np.mean(np.concatenate(caused) ** 2, axis=0))
+        joint = joint_of([d / std for d in caused], white / std)
+        correlation = tuple(joint[:, j, j] / joint[0, j, j] for j in range(len(std)))
+        size = np.where(record.noise_declared, std, weights(record, residuals))
+        return cls(std, Weighting(size, correlation, joint), record.noise_declared)
 
     @property
     def scale(self) -> Array:

@@ -26,10 +26,15 @@ class Weighting:
     of its noise at the lags 0 to p samples, (p + 1,), of which the first is 1; p is 0 for white noise. The
     noise is an autoregression of order p, whose prediction errors are independent (G. E. P. Box, G. M.
     Jenkins, Time Series Analysis, 1970, chapter 7). The first p samples are predicted from fewer.
+
+    joint: (p + 1, n_y, n_y) correlation of the outputs with each other, element [k, i, j] of output i with
+    output j k samples before; None if they are independent. The noise is then a vector autoregression (H.
+    Luetkepohl, New Introduction to Multiple Time Series Analysis, 2005, chapter 2).
     """
 
     size: Array
     correlation: tuple[Array, ...]
+    joint: Array | None = None
 
     @classmethod
     def white(cls, size: Array) -> Weighting:
@@ -41,8 +46,8 @@ class Weighting:
 
     @property
     def is_white(self) -> bool:
-        """Whether the noise of all outputs is white."""
-        return all(len(c) == 1 for c in self.correlation)
+        """Whether the noise of all outputs is white and independent."""
+        return self.joint is None and all(len(c) == 1 for c in self.correlation)
 
     def of(self, residual: Array, stretches: Sequence[int]) -> Array:
         """The weighted residual (N, n_y).
@@ -50,24 +55,39 @@ class Weighting:
         stretches: lengths of the uninterrupted stretches of samples that follow one another in it.
         """
         z = residual / self.size
-        return z if self.is_white else self._each(_Predictor.errors, z, stretches)
+        return z if self.is_white else self._each(_Predictor.errors, _JointPredictor.errors, z, stretches)
 
     def back(self, weighted: Array, stretches: Sequence[int]) -> Array:
         """The residual (N, n_y) of a weighted one; the inverse of `of`."""
-        return (weighted if self.is_white else self._each(_Predictor.signal, weighted, stretches)) * self.size
+        if self.is_white:
+            return weighted * self.size
+        return self._each(_Predictor.signal, _JointPredictor.signal, weighted, stretches) * self.size
 
-    def _each(self, work: Callable[[_Predictor, Array], Array], x: Array, stretches: Sequence[int]) -> Array:
-        """Each column and stretch of x (N, n_y) by its predictor."""
+    def _each(
+        self,
+        alone: Callable[[_Predictor, Array], Array],
+        together: Callable[[_JointPredictor, Array], Array],
+        x: Array,
+        stretches: Sequence[int],
+    ) -> Array:
+        """Each stretch of x (N, n_y), and each column if they are independent, by its predictor."""
         found, ends = np.empty_like(x), np.cumsum([0, *stretches]).tolist()
         for a, b in pairwise(ends):
+            if self._together:
+                found[a:b] = together(self._together, x[a:b])
+                continue
             for j, predictor in enumerate(self._predictors):
-                found[a:b, j] = work(predictor, x[a:b, j])
+                found[a:b, j] = alone(predictor, x[a:b, j])
         return found
 
     @property
     def redundancy(self) -> Array:
         """Samples per independent square, (n_y,): 1 for white noise, more if it is correlated."""
         return np.array([p.redundancy for p in self._predictors])
+
+    @cached_property
+    def _together(self) -> _JointPredictor | None:
+        return None if self.joint is None else _JointPredictor(self.joint)
 
     @cached_property
     def _predictors(self) -> list[_Predictor]:
@@ -107,6 +127,80 @@ class _Predictor:
         """Sum of the squared autocorrelations over all lags, by Parseval's theorem."""
         spectrum = 1.0 / np.abs(freqz(self._filter, worN=FREQUENCIES)[1]) ** 2
         return float(np.mean(spectrum**2) / np.mean(spectrum) ** 2)
+
+
+class _JointPredictor:
+    """Predicts the samples of several outputs from those before them; joint: (p + 1, n, n), see Weighting."""
+
+    def __init__(self, joint: Array) -> None:
+        order, n = len(joint) - 1, joint.shape[1]
+        self._order, self._n = order, n
+        turned = joint.transpose(0, 2, 1)  # of samples with those after them
+        newest_first = _blocks(turned, order)
+        ahead = np.linalg.solve(newest_first, turned[1:].reshape(-1, n)).T if order else np.zeros((n, 0))
+        self._ahead = ahead.reshape(n, order, n).transpose(1, 0, 2).copy()  # of the lags 1 to p
+        left = joint[0] - sum(
+            (a @ g.T for a, g in zip(self._ahead, joint[1:], strict=True)), np.zeros((n, n))
+        )
+        self._scale = np.linalg.cholesky((left + left.T) / 2)
+        self._root = np.linalg.cholesky(_blocks(joint, order))
+
+    def errors(self, z: Array) -> Array:
+        """Prediction errors (N, n) that are independent and of variance 1."""
+        m = min(self._order, len(z))
+        found = z.copy()
+        for k, a in enumerate(self._ahead[:m], 1):
+            found[k:] -= z[:-k] @ a.T
+        found = solve_triangular(self._scale, found.T, lower=True).T
+        if m:
+            some = m * self._n
+            first = solve_triangular(self._root[:some, :some], z[:m].ravel(), lower=True)
+            found[:m] = first.reshape(m, self._n)
+        return np.asarray(found, order="C")
+
+    def signal(self, errors: Array) -> Array:
+        """The samples (N, n) of these prediction errors; the inverse of `errors`."""
+        m = min(self._order, len(errors))
+        some = m * self._n
+        found: Array = errors @ self._scale.T
+        found[:m] = (self._root[:some, :some] @ errors[:m].ravel()).reshape(m, self._n)
+        newest_first = np.concatenate(list(self._ahead), axis=1) if self._order else np.zeros((self._n, 0))
+        for t in range(m, len(found)):
+            found[t] += newest_first @ found[t - m : t][::-1].ravel()
+        return found
+
+
+def _blocks(joint: Array, order: int) -> Array:
+    """Covariance (order n, order n) of the samples of n outputs, one time after the other."""
+    if not order:
+        return np.zeros((0, 0))
+    lags = [[joint[a - b] if a >= b else joint[b - a].T for b in range(order)] for a in range(order)]
+    blocks: Array = np.block(lags)
+    return blocks
+
+
+def joint_of(draws: Sequence[Array], white: Array) -> Array:
+    """Covariance (p + 1, n, n) of noise that is drawn (N, n) and white noise (n,) of its own in each output.
+
+    The order p is chosen by Schwarz's criterion, for as many samples as one draw has.
+    """
+    samples = max(len(d) for d in draws)
+    most = min(ORDERS[-1], samples // 4)
+    c = np.mean([_covariance(d, most + 1) for d in draws], axis=0)
+    c[0] += np.diag(white**2)
+    n = c.shape[1]
+    price = n * n * np.log(samples) / samples
+    orders = [0, *(p for p in ORDERS if p <= most)]
+    left = {p: np.linalg.slogdet(_JointPredictor(c[: p + 1])._scale)[1] * 2 + price * p for p in orders}
+    return c[: min(left, key=lambda p: left[p]) + 1]
+
+
+def _covariance(x: Array, lags: int) -> Array:
+    """Covariance (lags, n, n) of a signal (N, n) of mean zero: of its samples with those k before."""
+    length = len(x) + max(len(x), lags)
+    spectrum = np.fft.rfft(x, length, axis=0)
+    crossed = spectrum[:, :, None] * spectrum[:, None, :].conj()
+    return np.asarray(np.fft.irfft(crossed, length, axis=0)[:lags] / len(x))
 
 
 def correlation_of(parts: Sequence[Array]) -> Array:

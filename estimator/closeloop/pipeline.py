@@ -15,7 +15,7 @@ from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
-from estimator.closeloop.fitting.calibrate import calibrate
+from estimator.closeloop.fitting.calibrate import calibrate, nearer, smoothed
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
@@ -64,10 +64,10 @@ class Chain:
         """Calibrate, detect, search, decide, and check the answer on the test part."""
         tell, done = self.tell, self.stages.done
         tell("calibrate", "calibrating the declared parameters")
-        declared, base, noise = done("calibrated", lambda: calibrate(self.problem))
-        baseline = Baseline(self.problem, base, noise)
+        problem, declared, base, noise = self._calibrated()
+        baseline = Baseline(problem, base, noise)
         tell("missing force", "estimating the missing force at each port")
-        forces = done("forces", lambda: missing_forces(self.problem, base.fit.theta, noise.std))
+        forces = done("forces", lambda: missing_forces(problem, base.fit.theta, noise.std))
         shown = screened(baseline, forces, tell, self.stages)
         detection = self._detected(shown)
         diagnostics = self._diagnosed(shown, detection)
@@ -77,6 +77,20 @@ class Chain:
             early or Judgement(tuple(before), (), ""), diagnostics,
         )  # fmt: skip
         return found if early else self._searched(found, shown, before)
+
+    def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
+        """The problem and what `calibrate` finds, with smoothed inputs if the FMU is nearer with these.
+
+        What looks like noise of an input may be the excitation itself, with which the FMU is nearer.
+        """
+        done = self.stages.done
+        found = done("calibrated", lambda: calibrate(self.problem))
+        other = smoothed(self.problem, found[1].theta)
+        if other is None:
+            return self.problem, *found
+        self.tell("inputs", "calibrating with smoothed inputs")
+        again = done("smoothed", lambda: calibrate(other))
+        return (other, *again) if nearer(other, again[1], found[1]) else (self.problem, *found)
 
     def _detected(self, shown: Screened) -> Detection:
         self.tell("detect", "testing whether the residual is more than noise")

@@ -72,26 +72,21 @@ class DetectionPolicy:
     input_segment: int = limit(
         256,
         "samples",
-        "length of the segments of an input whose spectra show its white noise",
+        "shortest segments of an input whose spectra show its white noise",
         "derivation: 64 frequencies in the upper octave, of which two halves can be compared",
     )
     input_segments: int = limit(
         8,
         "segments",
-        "fewest segments of an input from which its white noise is taken",
-        "derivation: the median of 8 scatters by half of its mean at one frequency, by 8 % over the octave",
+        "segments into which an input is cut, beside those that overlap two of them",
+        "derivation: the median of all scatters by half of its mean at one frequency, by 8 % over the octave",
     )
     input_flat: float = limit(
         3.0,
         "standard deviations",
-        "difference between the two halves of an input's upper octave, above which it is not noise",
+        "difference between the two halves of an input's upper octave, above which it is not noise; and "
+        "allowance for chance at each frequency of its spectrum",
         "derivation: 1 in 700, as `chance`",
-    )
-    input_noise: float = limit(
-        0.25,
-        "share of an input's variance",
-        "white part of an input, above which it is taken for the excitation itself",
-        "agreed assumption: a sensor whose noise is half of the signal's rms would not be used as an input",
     )
 
 

@@ -121,11 +121,12 @@ def closed(
 
     begun: time.monotonic() at the start of the run. The other arguments are those of close_loop.
     """
-    e, problem = posed.declared, posed.problem
+    e = posed.declared
     try:
-        found = trace(problem, tell, jobs or cpu_count(), seed, stages)
+        found = trace(posed.problem, tell, jobs or cpu_count(), seed, stages)
     finally:
         PLANTS.close()
+    problem = found.baseline.problem
     if folder is None:
         return found, result_of(e.id, problem, found, time.monotonic() - begun, ())
     tell("building the augmented FMU and writing the report")

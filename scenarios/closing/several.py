@@ -128,7 +128,7 @@ class _Campaign:
             here = None if folder is None else writable(folder / e.id)
             kept.append(stages_of(e, here, seed, resume))
             outcome, result = closed(p, here, _prefixed(tell, e.id), self.jobs, seed, begun, kept[-1])
-            groups.setdefault(fmu_of(e), []).append(Traced(e.id, p.problem, outcome))
+            groups.setdefault(fmu_of(e), []).append(Traced(e.id, outcome.baseline.problem, outcome))
             self.finished.append(result)
             words = glossary(p.problem, ())
             self.units[e.id] = {o: words.unit(o) for o in p.problem.record.outputs}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import toeplitz
@@ -48,6 +48,30 @@ def test_the_inverse_gives_the_residual_back(roots, n, seed):
     weighting = Weighting(np.array([0.1, 3.0]), (c / c[0], np.ones(1)))
     residual, parts = rng.standard_normal((2 * n, 2)), [n, n]
     assert_allclose(weighting.back(weighting.of(residual, parts), parts), residual, atol=1e-9)
+
+
+def joint_noise(rng, outputs, order):
+    """Covariance (400, outputs, outputs) of a vector autoregression of this order."""
+    lags = [0.5 / order * rng.uniform(-1, 1, (outputs, outputs)) for _ in range(order)]
+    response = [np.linalg.cholesky(np.cov(rng.standard_normal((outputs, 20))))]
+    for k in range(1, 400):
+        response.append(sum(a @ response[k - j] for j, a in enumerate(lags[:k], 1)))
+    return np.array([sum(r @ s.T for r, s in zip(response[k:], response, strict=False)) for k in range(400)])
+
+
+@given(st.integers(2, 3), st.integers(1, 3), st.integers(1, 30), SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_joint_weights_are_those_of_the_inverse_covariance(outputs, order, n, seed):
+    rng = np.random.default_rng(seed)
+    c = joint_noise(rng, outputs, order)
+    size = np.sqrt(np.diag(c[0]))
+    c = c / size[:, None] / size
+    whole = np.block([[c[a - b] if a >= b else c[b - a].T for b in range(n)] for a in range(n)])
+    weighting = Weighting(size, (np.ones(1),) * outputs, c[: order + 1])
+    z = rng.standard_normal((n, outputs))
+    e = weighting.of(z * size, [n])
+    assert_allclose(np.sum(e**2), z.ravel() @ np.linalg.solve(whole, z.ravel()), rtol=1e-6)
+    assert_allclose(weighting.back(e, [n]), z * size, atol=1e-9)
 
 
 @given(SEEDS)

@@ -1,17 +1,42 @@
 """Calibration of the declared parameters within their bounds, by least squares of the simulation error."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.question.input_noise import InputNoise
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.noise import Noise, noise_floor, weights
 from estimator.weighting import Weighting
 
 ROUGH = 1e-3  # tolerance of the first fit, which is enough while the residual is large
 ROUGHLY_MATCHED = 2.0  # mean square of the weighted residual, below which the fit is continued accurately
-SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is not fitted
+SEEN = 1.0  # change of the sum of squares by an error of a start state or an input, below which it is ignored
+
+
+def smoothed(problem: Problem, theta: Mapping[str, float]) -> Problem | None:
+    """The problem with its recorded inputs smoothed; None if they have no noise that the outputs show.
+
+    theta: values with which the outputs are compared. The rounding of a file, for instance, does not show.
+    """
+    noise = InputNoise.of(problem.record, problem.policy.detection)
+    if noise is None:
+        return None
+    found = replace(problem, record=noise.smoothed(problem.record), input_noise=noise)
+    pairs = zip(problem.simulate(theta), found.simulate(theta), strict=True)
+    moved = problem.record.of([a - b for a, b in pairs], "fit") / noise_floor(problem.record)
+    return found if np.sum(moved**2) > SEEN else None
+
+
+def nearer(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether the first of two hypotheses leaves less on the part to identify, in units of the noise."""
+    record, white = problem.record, noise_floor(problem.record)
+    a, b = (float(np.sum((record.of(h.residuals, "fit") / white) ** 2)) for h in (one, other))
+    return a < b
 
 
 def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:

@@ -1,11 +1,15 @@
 """The noise of a record, from the residual that a fit leaves."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from estimator.closeloop.question.input_noise import caused
+import numpy as np
+
 from estimator.closeloop.question.problem import Problem
 from estimator.noise import Noise, larger
 from estimator.record import Array
+
+SIMULATIONS = 4  # with noise on the inputs
 
 
 def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> Noise:
@@ -14,5 +18,22 @@ def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence
     theta: values of the fit that leaves the residuals.
     """
     record, chance = problem.record, problem.policy.detection.chance
-    more = caused(problem, theta) if larger(record, residuals, chance) else None
+    more = caused(problem, theta) if larger(record, residuals, chance) else []
     return Noise.of(record, residuals, chance, more)
+
+
+def caused(problem: Problem, theta: Mapping[str, float]) -> list[Array]:
+    """Draws (n, n_y) of the outputs' noise that comes from the noise left in the inputs, if there is any.
+
+    They are the responses of the FMU to that much more noise, on each run that has a part to identify.
+    """
+    record, noise, rng = problem.record, problem.input_noise, np.random.default_rng(0)
+    if noise is None:
+        return []
+    found, still = [], problem.simulate(theta)
+    for _ in range(SIMULATIONS):
+        noisy = tuple(replace(run, u=run.u + noise.left(run.u, rng)) for run in record.runs)
+        moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
+        fitted = zip(moved, still, record.runs, strict=True)
+        found += [a - b for a, b, run in fitted if run.fit.any()]
+    return found

@@ -1,66 +1,86 @@
-"""White noise of the recorded inputs, and the noise of the outputs that it causes through the FMU."""
+"""White noise of the recorded inputs: found in their spectra and smoothed away.
+
+A model that is driven by noisy inputs answers to their noise. A lag of such an input then fits better than
+the right effect, because it filters that noise. The inputs are therefore smoothed by their wavelets: those
+that noise alone would not cause are kept, so that steps and corners stay as sharp as they can be seen (R. R.
+Coifman, D. L. Donoho, Translation-Invariant De-Noising, Lecture Notes in Statistics 103 (1995), 125-150).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import get_window
+import pywt
+from scipy.signal import welch
 
 from estimator.closeloop.policy import DetectionPolicy
-from estimator.closeloop.question.problem import Problem
-from estimator.record import Array, Run
-from estimator.weighting import ORDERS, autocovariance
+from estimator.record import Array, Note, Record
 
-SIMULATIONS = 4  # with noise on the inputs
+WAVELET = "db2"  # it does not see straight lines, and is the shortest that does not
+LEVELS = 10  # scales; what lasts longer than 1024 samples is left as it is
 
 
-def white_part(u: Array, limits: DetectionPolicy) -> float:
-    """Standard deviation of the white noise on an input (N,), zero if its spectrum is not flat at the end.
+@dataclass(frozen=True, eq=False)
+class InputNoise:
+    """White noise of the inputs of a record; std: (n_u,) standard deviation, zero for one without noise."""
+
+    std: Array
+
+    @classmethod
+    def of(cls, record: Record, limits: DetectionPolicy) -> InputNoise | None:
+        """The noise of a record's inputs; None if none of them has any."""
+        found = [
+            max(white_noise(run.u[:, j], limits) for run in record.runs) for j in range(len(record.inputs))
+        ]
+        return cls(np.array(found)) if any(found) else None
+
+    def smoothed(self, record: Record) -> Record:
+        """The record with smoothed inputs, and a note for each of them."""
+        runs = tuple(replace(run, u=self._without(run.u)) for run in record.runs)
+        noisy = [(o, std) for o, std in zip(record.inputs, self.std, strict=True) if std]
+        said = "white noise, of which a standard deviation of {:.2g} is smoothed away"
+        notes = [Note("input noise", name, f"{name}: {said.format(std)}") for name, std in noisy]
+        return replace(record, runs=runs, notes=(*record.notes, *notes))
+
+    def left(self, u: Array, rng: np.random.Generator) -> Array:
+        """A draw of the error that smoothing leaves in inputs (N, n_u), which have been smoothed."""
+        return self._without(u + self.std * rng.standard_normal(u.shape)) - u
+
+    def _without(self, u: Array) -> Array:
+        return np.column_stack([smoothed(x, std) if std else x for x, std in zip(u.T, self.std, strict=True)])
+
+
+def white_noise(u: Array, limits: DetectionPolicy) -> float:
+    """Standard deviation of the white noise of an input (N,); zero if its spectrum is not flat at the end.
 
     The spectrum is the median over segments, so that single steps of the input do not matter. A smooth input
-    has none of its own in the upper octave of the frequencies; a rough one, such as a random walk, falls
-    there.
+    has no power of its own in the upper octave of the frequencies; that of a rough one falls there.
     """
-    length = limits.input_segment
-    count = len(u) // length
-    if count < limits.input_segments or np.ptp(u) == 0:
+    length = len(u) // limits.input_segments // 4 * 4
+    if length < limits.input_segment or np.ptp(u) == 0:
         return 0.0
-    window = get_window("hann", length)
-    segments = u[: count * length].reshape(count, length)
-    spectra = np.abs(np.fft.rfft((segments - segments.mean(axis=1)[:, None]) * window)) ** 2
-    # the median of a chi-square of two degrees of freedom is log 2 times its mean
-    power = np.median(spectra, axis=0) / np.log(2.0) / np.sum(window**2)
+    # density over the range 0 to 1, which for white noise is its variance
+    _, power = welch(u, 2.0, "hann", length, average="median")
     upper = power[length // 4 : -1]
     low, high = (float(half.mean()) for half in np.array_split(upper, 2))
-    # a median of n scatters by 1 / (log 2 root n) of its mean; neighbours share the window's width of 1.5
-    scatter = np.sqrt(2 * 1.5 / (count * len(upper) / 2)) / np.log(2.0)
-    white = float(upper.mean())
+    # a median of n scatters by 1 / (log 2 root n) of its mean; segments that overlap by half count for 0.6,
+    # and neighbours share the window's width of 1.5
+    count = 0.6 * (2 * len(u) // length - 1) * len(upper) / 2 / (2 * 1.5)
+    white, scatter = float(upper.mean()), 1 / np.log(2.0) / np.sqrt(count)
     flat = abs(low - high) <= limits.input_flat * scatter * white
-    return float(np.sqrt(white)) if flat and 0 < white <= limits.input_noise * float(np.var(u)) else 0.0
+    return float(np.sqrt(white)) if flat else 0.0
 
 
-def caused(problem: Problem, theta: Mapping[str, float]) -> Array | None:
-    """Autocovariance (lags, n_y) of the outputs' noise that comes from white noise of the inputs, or None.
-
-    It is estimated from simulations in which more of that noise is added to the recorded inputs.
-    """
-    record, rng = problem.record, np.random.default_rng(0)
-    limits = problem.policy.detection
-    sizes = np.array([max(white_part(column, limits) for column in each) for each in _columns(record.runs)])
-    if not sizes.any():
-        return None
-    found, still = np.zeros((ORDERS[-1] + 1, len(record.outputs))), problem.simulate(theta)
-    for _ in range(SIMULATIONS):
-        noisy = tuple(replace(run, u=run.u + sizes * rng.standard_normal(run.u.shape)) for run in record.runs)
-        moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
-        for a, b, run in zip(moved, still, record.runs, strict=True):
-            if run.fit.any():
-                found += np.column_stack([autocovariance([y], len(found)) for y in (a - b).T]) / SIMULATIONS
-    return found / sum(run.fit.any() for run in record.runs)
-
-
-def _columns(runs: tuple[Run, ...]) -> list[list[Array]]:
-    """The samples of each input in every run."""
-    return [[run.u[:, j] for run in runs] for j in range(runs[0].u.shape[1])]
+def smoothed(u: Array, std: float) -> Array:
+    """A signal (N,) without white noise of a standard deviation."""
+    n = len(u)
+    levels = min(LEVELS, int(np.log2(n)) - 1)
+    block = 2**levels
+    before = min(block, n - 1)
+    after = before + -(n + 2 * before) % block
+    padded = np.pad(np.pad(u, before, "reflect"), (0, after - before), "edge")
+    rough, *details = pywt.swt(padded, WAVELET, levels, trim_approx=True)
+    least = std * np.sqrt(2 * np.log(n))
+    kept = [np.where(np.abs(d) > least, d, 0.0) for d in details]
+    return np.asarray(pywt.iswt([rough, *kept], WAVELET)[before : before + n])

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from estimator.closeloop.policy import DEFAULT, Policy
+from estimator.closeloop.question.input_noise import InputNoise
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
 from estimator.sensor_faults import faulty
@@ -62,7 +63,8 @@ class Problem:
     builder: builds the FMU with `effects`, pairs of kind and location; declared: values of parameters and of
     the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
     given; form_error: share of an output that the form of the FMU leaves open; policy: the limits of the
-    decision. The object is small and picklable; worker processes open the FMU themselves.
+    decision; input_noise: noise that was smoothed away in the inputs of the record. The object is small and
+    picklable; worker processes open the FMU themselves.
     """
 
     builder: Builder
@@ -74,6 +76,7 @@ class Problem:
     effects: tuple[tuple[str, str], ...] = ()
     form_error: float = 0.0
     policy: Policy = DEFAULT
+    input_noise: InputNoise | None = None
 
     @property
     def plant(self) -> Plant:

@@ -1,0 +1,128 @@
+"""Noise of the inputs: found where there is some, smoothed, and carried to the outputs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scipy.ndimage import gaussian_filter1d
+
+from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_noise
+from estimator.noise import Noise
+from estimator.record import Record, Run
+from estimator.weighting import Weighting
+
+N = 12000
+T = np.arange(N) * 0.005
+LIMITS = DEFAULT.detection
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def ramps(rng):
+    """Levels with ramps of any steepness between them."""
+    times = np.sort(rng.uniform(T[0], T[-1], 16))
+    return np.interp(T, times, 10 * np.repeat(rng.standard_normal(8), 2))
+
+
+def record_of(u, y=None, std=np.nan):
+    y = np.zeros((len(u), 1)) if y is None else y
+    every = np.ones(len(u), bool)
+    run = Run(T[: len(u)], u, y, every, ~every, ~every)
+    names = tuple(f"u{j}" for j in range(u.shape[1]))
+    return Record((run,), names, tuple("ab"[: y.shape[1]]), np.full(y.shape[1], std))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_white_noise_is_found_in_its_size(seed):
+    rng = np.random.default_rng(seed)
+    std = 10 ** rng.uniform(-3, 0)
+    for signal in (ramps(rng), np.full(N, 3.0), np.sin(2 * np.pi * 0.4 * T)):
+        assert white_noise(signal + std * rng.standard_normal(N), LIMITS) == pytest.approx(std, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_has_no_flat_end_of_the_spectrum_is_not_noise(seed):
+    rng = np.random.default_rng(seed)
+    rough = np.cumsum(rng.standard_normal(N))
+    assert white_noise(rough, LIMITS) == 0.0
+    assert white_noise(np.full(N, 3.0), LIMITS) == 0.0
+    assert white_noise(rng.standard_normal(500), LIMITS) == 0.0  # too short to tell
+
+
+def test_a_record_with_clean_inputs_has_no_noise():
+    u = np.column_stack([np.sin(T), gaussian_filter1d(np.random.default_rng(1).standard_normal(N), 40)])
+    assert InputNoise.of(record_of(u), LIMITS) is None
+
+
+@given(st.floats(-10, 10), st.floats(-3, 3), st.floats(1e-3, 1.0))
+def test_a_straight_line_is_not_changed_inside_the_record(level, slope, std):
+    line = level + slope * T
+    assert_allclose(smoothed(line, std)[4000:-4000], line[4000:-4000], atol=1e-9)
+
+
+@given(SEEDS, st.floats(0.01, 100.0))
+def test_smoothing_knows_no_units(seed, factor):
+    rng = np.random.default_rng(seed)
+    u = np.cumsum(rng.standard_normal(3000))
+    assert_allclose(smoothed(factor * u, factor), factor * smoothed(u, 1.0), rtol=1e-9, atol=1e-9 * factor)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_most_of_the_noise_goes_and_corners_stay(seed):
+    rng = np.random.default_rng(seed)
+    clean, std = ramps(rng), 0.1
+    error = smoothed(clean + std * rng.standard_normal(N), std) - clean
+    assert np.sqrt(np.mean(error**2)) < 0.3 * std
+    corner = np.argmax(np.abs(np.diff(clean, 2))) + 1
+    assert np.abs(error[corner - 20 : corner + 20]).max() < 4 * std
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_draws_of_what_is_left_are_as_large_as_what_is_left(seed):
+    rng = np.random.default_rng(seed)
+    std = 0.2
+    clean = ramps(rng) + np.sin(2 * np.pi * 0.15 * T)
+    noise = InputNoise(np.array([std]))
+    record = noise.smoothed(record_of((clean + std * rng.standard_normal(N))[:, None]))
+    [run] = record.runs
+    true = run.u[:, 0] - clean
+    draws = [noise.left(run.u, rng)[:, 0] for _ in range(4)]
+    for sigma in (1, 60):  # also of their slow part, to which a machine answers
+        sizes = [np.std(gaussian_filter1d(d, sigma)) for d in draws]
+        assert 0.6 < np.mean(sizes) / np.std(gaussian_filter1d(true, sigma)) < 1.5
+    assert "u0: white noise" in record.notes[-1].sentence
+
+
+def shared_noise(rng, sensors):
+    """Slow noise that two outputs share in unequal parts, and white noise of their sensors, (N, 2)."""
+    slow = gaussian_filter1d(rng.standard_normal(N), 30)
+    slow /= slow.std()
+    caused = np.column_stack([slow, 0.8 * slow])
+    return caused, caused + sensors * rng.standard_normal((N, 2))
+
+
+def test_weights_of_shared_noise_are_independent_and_can_be_turned_back():
+    rng, sensors = np.random.default_rng(2), np.array([0.05, 0.05])
+    draws = [shared_noise(rng, sensors)[0] for _ in range(4)]
+    _, seen = shared_noise(rng, sensors)
+    record = replace(record_of(np.zeros((N, 1)), seen), noise_std=sensors)
+    noise = Noise.of(record, [seen], 3.0, draws)
+    assert_allclose(noise.std, np.sqrt(sensors**2 + [1.0, 0.64]), rtol=0.1)
+    e = noise.weighting.of(seen, [N])
+    assert_allclose(noise.weighting.back(e, [N]), seen, atol=1e-6)
+    assert_allclose(np.mean(e**2, axis=0), 1.0, atol=0.25)
+    assert abs(np.mean(e[:, 0] * e[:, 1])) < 0.2
+    assert abs(np.corrcoef(seen.T)[0, 1]) > 0.99
+
+
+def test_an_offset_of_one_output_is_seen_beside_noise_that_both_share():
+    rng, sensors = np.random.default_rng(3), np.array([0.05, 0.05])
+    draws = [shared_noise(rng, sensors)[0] for _ in range(4)]
+    record = replace(record_of(np.zeros((N, 1)), draws[0]), noise_std=sensors)
+    weighting = Noise.of(record, [draws[0]], 3.0, draws).weighting
+    offset = np.tile([0.0, 0.1], (N, 1))
+    alone = Weighting(weighting.size, weighting.correlation)  # as if each had noise of its own
+    assert np.sum(weighting.of(offset, [N]) ** 2) > 100 * np.sum(alone.of(offset, [N]) ** 2)
