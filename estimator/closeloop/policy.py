@@ -79,13 +79,13 @@ class DetectionPolicy:
         8,
         "segments",
         "segments into which an input is cut, beside those that overlap two of them",
-        "derivation: the median of all scatters by half of its mean at one frequency, by 8 % over the octave",
+        "derivation: the median of all scatters by half of its mean at one frequency, by a twentieth over the "
+        "octave",
     )
     input_flat: float = limit(
         3.0,
         "standard deviations",
-        "difference between the two halves of an input's upper octave, above which it is not noise; and "
-        "allowance for chance at each frequency of its spectrum",
+        "difference between the two halves of an input's upper octave, above which it is not noise",
         "derivation: 1 in 700, as `chance`",
     )
 
