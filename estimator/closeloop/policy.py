@@ -79,8 +79,7 @@ class DetectionPolicy:
         8,
         "segments",
         "segments into which an input is cut, beside those that overlap two of them",
-        "derivation: the median of all scatters by half of its mean at one frequency, by a twentieth over the "
-        "octave",
+        "derivation: the median of all scatters by half of its mean at one frequency, by 7 % over the octave",
     )
     input_flat: float = limit(
         3.0,

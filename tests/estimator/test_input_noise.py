@@ -1,6 +1,7 @@
 """Noise of the inputs: found where there is some, smoothed, and carried to the outputs."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,8 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 
-from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.fitting.calibrate import nearer
+from estimator.closeloop.fitting.calibrate import smoothed as without_input_noise
+from estimator.closeloop.fitting.noise_left import noise_left
+from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_noise
 from estimator.noise import Noise
 from estimator.record import Record, Run
@@ -126,3 +131,62 @@ def test_an_offset_of_one_output_is_seen_beside_noise_that_both_share():
     offset = np.tile([0.0, 0.1], (N, 1))
     alone = Weighting(weighting.size, weighting.correlation)  # as if each had noise of its own
     assert np.sum(weighting.of(offset, [N]) ** 2) > 100 * np.sum(alone.of(offset, [N]) ** 2)
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A problem whose plant is a delay of first order of its input, with a time constant of 0.5 s."""
+
+    record: Record
+    policy: Policy = DEFAULT
+    input_noise: InputNoise | None = None
+
+    def simulate(self, theta):
+        """See Problem."""
+        return [slow(run.u) for run in self.record.runs]
+
+
+def slow(u):
+    kept = np.exp(-0.005 / 0.5)
+    return lfilter([1 - kept], [1.0, -kept], u - u[0], axis=0) + u[0]
+
+
+def measured(rng, sensor, driven_by_noise=False):
+    """A plant that is driven by a clean input, or by what looks like one with noise; and its error of 0.2."""
+    clean = ramps(rng)[:, None]
+    recorded = clean + 0.2 * rng.standard_normal(clean.shape)
+    y = slow(recorded if driven_by_noise else clean) + sensor * rng.standard_normal(clean.shape)
+    return LowPass(record_of(recorded, y, sensor))
+
+
+def residuals(problem):
+    return tuple(run.y - y for run, y in zip(problem.record.runs, problem.simulate({}), strict=True))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_record_decides_whether_the_noise_drove_the_machine(seed):
+    for driven in (False, True):
+        raw = measured(np.random.default_rng(seed), 0.002, driven)
+        other = without_input_noise(raw, {})
+        one, two = (SimpleNamespace(residuals=residuals(p)) for p in (other, raw))
+        assert nearer(raw, one, two) is not driven
+
+
+def test_noise_that_the_sensors_do_not_show_is_left_alone():
+    raw = measured(np.random.default_rng(0), 1000.0)
+    assert without_input_noise(raw, {}) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_noise_that_stays_in_the_inputs_is_found_at_the_outputs(seed):
+    sensor = 0.002
+    problem = without_input_noise(measured(np.random.default_rng(seed), sensor), {})
+    left = residuals(problem)
+    noise = noise_left(problem, {}, left)
+    assert 0.6 < np.std(left[0]) / noise.std[0] < 1.5
+    assert noise.std[0] > 3 * sensor
+    weighed = noise.weighting.of(left[0], [N])
+    assert 0.6 < np.std(weighed) < 1.5
+    blocks = weighed.reshape(60, -1).mean(axis=1) * np.sqrt(N / 60)
+    assert np.mean(blocks**2) < 6.0  # as it is, they would have some hundred times their size
+    assert np.mean((left[0] / noise.std).reshape(60, -1).mean(axis=1) ** 2) * N / 60 > 30
