@@ -142,8 +142,13 @@ class _JointPredictor:
         left = joint[0] - sum(
             (a @ g.T for a, g in zip(self._ahead, joint[1:], strict=True)), np.zeros((n, n))
         )
-        self._scale = np.linalg.cholesky((left + left.T) / 2)
+        self._scale: Array = np.linalg.cholesky((left + left.T) / 2)
         self._root = np.linalg.cholesky(_blocks(joint, order))
+
+    @property
+    def log_error(self) -> float:
+        """Logarithm of the determinant of the prediction errors' covariance."""
+        return 2 * float(np.sum(np.log(np.diag(self._scale))))
 
     def errors(self, z: Array) -> Array:
         """Prediction errors (N, n) that are independent and of variance 1."""
@@ -186,12 +191,12 @@ def joint_of(draws: Sequence[Array], white: Array) -> Array:
     """
     samples = max(len(d) for d in draws)
     most = min(ORDERS[-1], samples // 4)
-    c = np.mean([_covariance(d, most + 1) for d in draws], axis=0)
+    c: Array = np.mean([_covariance(d, most + 1) for d in draws], axis=0)
     c[0] += np.diag(white**2)
     n = c.shape[1]
     price = n * n * np.log(samples) / samples
     orders = [0, *(p for p in ORDERS if p <= most)]
-    left = {p: np.linalg.slogdet(_JointPredictor(c[: p + 1])._scale)[1] * 2 + price * p for p in orders}
+    left = {p: _JointPredictor(c[: p + 1]).log_error + price * p for p in orders}
     return c[: min(left, key=lambda p: left[p]) + 1]
 
 

@@ -10,9 +10,10 @@ from unittest.mock import patch
 from benchmarks.challenge.match import Answer, judged
 from benchmarks.challenge.truth import Truth
 from estimator.closeloop.decision import law_form
-from estimator.closeloop.decision.detect import Detection
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
+from estimator.closeloop.detection.detect import Detection
+from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -84,7 +85,7 @@ class _Again:
 
     def _detection(self, baseline: Baseline) -> Detection:
         limits, seen = baseline.policy.detection, self.found.detection
-        size = form_of(baseline).importance(seen.likeness, seen.sets_in)
+        size = importance(baseline, seen.likeness, seen.sets_in)
         return replace(seen, level=limits.level, importance=size)
 
 

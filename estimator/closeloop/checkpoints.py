@@ -12,7 +12,7 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import TypeVar, cast
 
-from estimator.closeloop.decision.detect import Detection
+from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.diagnostics.black_box import BlackBox
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.diagnostics.power import Visible

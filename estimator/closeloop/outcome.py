@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from estimator.closeloop.decision.detect import Detection
+from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.baseline import Baseline

@@ -9,10 +9,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.closeloop.checkpoints import Stages
-from estimator.closeloop.decision.detect import Detection, detect
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
+from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.calibrate import calibrate, nearer, smoothed

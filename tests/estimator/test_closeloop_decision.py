@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import completes, judge
+from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.relations import becomes, limits
@@ -28,7 +29,7 @@ FORM = 0.2  # of an output, so 6 times the noise
 
 
 def matters(problem: Problem, h: Hypothesis, likeness: float = 1.0) -> bool:
-    return form_of(baseline(problem, h, NOISE)).importance(likeness, False) >= 1.0
+    return importance(baseline(problem, h, NOISE), likeness, False) >= 1.0
 
 
 def asked(form_error: float = 0.0) -> Problem:

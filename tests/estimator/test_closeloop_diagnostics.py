@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from estimator.closeloop.decision.detect import Detection
+from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.diagnostics.black_box import LARGEST_POLE, black_box
 from estimator.closeloop.diagnostics.decoys import (
     decoy,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import (
     ANSWER,
     Check,
@@ -25,8 +25,8 @@ from tests.helpers.paths import ROOT
 from tests.helpers.verdicts import FAILED, judged
 
 
-def importance(at, h, likeness=1.0, sets_in=False, noise=np.ones(2)):  # noqa: B008
-    return form_of(baseline(at, h, noise)).importance(likeness, sets_in)
+def size_of(at, h, likeness=1.0, sets_in=False, noise=np.ones(2)):  # noqa: B008
+    return importance(baseline(at, h, noise), likeness, sets_in)
 
 
 NAMES = get_args(Name)
@@ -67,8 +67,8 @@ def test_what_is_left_unexplained_stays_so_if_more_is_found_beyond_noise(passed)
 def test_a_larger_residual_matters_no_less(a, b, more, form):
     at = replace(asked(2), form_error=form)
     for sets_in in (False, True):
-        less = importance(at, left(a, b), 0.5, sets_in)
-        assert importance(at, left(more * a, more * b), 0.5, sets_in) >= less
+        less = size_of(at, left(a, b), 0.5, sets_in)
+        assert size_of(at, left(more * a, more * b), 0.5, sets_in) >= less
 
 
 @given(st.floats(0.0, 50.0), st.floats(0.0, 50.0), st.floats(1e-6, 1e6), st.sampled_from([0.0, 0.2]))
@@ -78,9 +78,9 @@ def test_neither_the_order_of_outputs_nor_their_units_matter(a, b, unit, form):
     scaled = replace(at, record=replace(at.record, runs=(replace(run, y=run.y * [unit, 1.0]),)))
     one, other = left(a, b), left(b, a)
     in_units = replace(one, residuals=(one.residuals[0] * [unit, 1.0],))
-    expected = pytest.approx(importance(at, one), rel=1e-9)
-    assert importance(at, other) == expected
-    assert importance(scaled, in_units, noise=np.array([unit, 1.0])) == expected
+    expected = pytest.approx(size_of(at, one), rel=1e-9)
+    assert size_of(at, other) == expected
+    assert size_of(scaled, in_units, noise=np.array([unit, 1.0])) == expected
 
 
 @pytest.mark.parametrize("verdict", sorted(FAILED))

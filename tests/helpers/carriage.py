@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.closeloop.decision.detect import Detection
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import judge
+from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.baseline import Baseline

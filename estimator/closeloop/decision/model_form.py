@@ -14,14 +14,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from estimator.closeloop.detection.importance import TINY, importance, signal_size
 from estimator.closeloop.evidence import Check
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array, BoolArray
-
-TINY = 1e-300  # of a signal, a noise or a sum of squares that is zero
 
 
 @dataclass(frozen=True)
@@ -39,10 +38,6 @@ class ModelForm(ABC):
     @abstractmethod
     def _misfit(self, h: Hypothesis) -> float:
         """The figure by which hypotheses are ranked; smaller is better."""
-
-    @abstractmethod
-    def importance(self, likeness: float, sets_in: bool) -> float:
-        """Size of the residual of the calibrated FMU over the smallest size that matters; see `detect`."""
 
     @abstractmethod
     def reached(self, h: Hypothesis) -> BoolArray:
@@ -64,10 +59,6 @@ class ModelForm(ABC):
     def curve_limit(self, h: Hypothesis) -> float:
         """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected."""
 
-    @abstractmethod
-    def could_be(self, likeness: float) -> bool:
-        """Whether the residual may come from the open form; likeness: share that one effect could explain."""
-
     def noticed(self, h: Hypothesis) -> float:
         """Reduction of the sum of squares by a richer hypothesis, from which on h is incomplete."""
         limits = self.baseline.policy.decision
@@ -79,20 +70,6 @@ class ModelForm(ABC):
         scatter = limits.scatter * np.sqrt(b.noise.redundancy / (2 * len(h.of(b.problem, "choose"))))
         return np.asarray(h.rms(b.problem, "choose") < (limits.clean + scatter) * b.noise.std)
 
-    def _beyond(self, part: Part) -> Array:
-        """Rms (n_y,) of the calibrated FMU's residual on a part, beyond noise and its chance scatter."""
-        b = self.baseline
-        residual = b.hypothesis.of(b.problem, part)
-        chance = 1 + b.policy.detection.chance * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
-        squares = np.mean(residual**2, axis=0) - chance * b.noise.std**2
-        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
-
-    def _material(self, beyond: Array) -> float:
-        """Size beyond noise over the smallest size that matters."""
-        b, limits = self.baseline, self.baseline.policy.detection
-        lowest = np.minimum(limits.signal_share * signal_size(b.problem), limits.noise_share * b.noise.std)
-        return float(np.max(beyond / np.maximum(lowest, TINY)))
-
 
 class Closed(ModelForm):
     """The form is right: with the right effects only noise is left, in every part of the record."""
@@ -101,10 +78,6 @@ class Closed(ModelForm):
 
     def _misfit(self, h: Hypothesis) -> float:
         return -self.baseline.score(h)
-
-    def importance(self, likeness: float, sets_in: bool) -> float:
-        """See ModelForm; the worst part counts."""
-        return self._material(np.maximum(self._beyond("unseen"), self._beyond("fit")))
 
     def reached(self, h: Hypothesis) -> BoolArray:
         """See ModelForm; no form is right to any accuracy, so that little may be left where noise is less.
@@ -137,10 +110,6 @@ class Closed(ModelForm):
         """See ModelForm."""
         return None
 
-    def could_be(self, likeness: float) -> bool:
-        """See ModelForm."""
-        return False
-
     def curve_limit(self, h: Hypothesis) -> float:
         """See ModelForm; more than chance, and most of what the law leaves beyond noise."""
         limits = self.baseline.policy.decision
@@ -158,20 +127,6 @@ class Open(ModelForm):
     def _misfit(self, h: Hypothesis) -> float:
         # on one part alone, an effect that acts in the other part would lose to one that imitates the form
         return 0.5 * cost(h) - self.baseline.score(h)
-
-    def importance(self, likeness: float, sets_in: bool) -> float:
-        """See ModelForm; computed on the parts to choose and to test.
-
-        A residual below the open share matters only if one effect could explain much of it, or if it sets in
-        during the record, which an error of the model's form does not.
-        """
-        b, limits = self.baseline, self.baseline.policy.detection
-        beyond, rms = self._beyond("unseen"), b.hypothesis.rms(b.problem, "unseen")
-        form = np.maximum(self.share * signal_size(b.problem), TINY)
-        large = float(np.max(np.minimum(beyond / form, rms / (limits.open_form_noises * b.noise.std))))
-        if sets_in or not self.could_be(likeness):
-            return max(large, self._material(beyond))
-        return large
 
     def reached(self, h: Hypothesis) -> BoolArray:
         """Whether each output (n_y,) comes down to its noise or to the open share.
@@ -212,7 +167,7 @@ class Open(ModelForm):
 
     def another(self, began: bool) -> Check | None:
         """See ModelForm."""
-        size = self.importance(0.0, began)
+        size = importance(self.baseline, 0.0, began)
         return Check.least("more than another form of the model leaves", size, 1.0)
 
     def curve_limit(self, h: Hypothesis) -> float:
@@ -221,21 +176,11 @@ class Open(ModelForm):
         explained = cost(self.baseline.hypothesis) - cost(h)
         return max(limits.noticed, limits.open_curve_explained * explained)
 
-    def could_be(self, likeness: float) -> bool:
-        """See ModelForm."""
-        return likeness < self.baseline.policy.decision.open_single
-
 
 def form_of(baseline: Baseline) -> ModelForm:
     """The rules for the model of a baseline: Open if a share of its form is declared open, else Closed."""
     share = baseline.problem.form_error
     return Open(baseline, share) if share > 0 else Closed(baseline)
-
-
-def signal_size(problem: Problem) -> Array:
-    """Root mean square of each measured output on the parts to choose and to test, (n_y,)."""
-    measured = np.concatenate([run.y[run.unseen] for run in problem.record.runs])
-    return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
 def gap_closed(before: Array, after: Array, noise: Array) -> Array:

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.decision.detect import Detection
 from estimator.closeloop.decision.equivalence import equivalent, splitting
-from estimator.closeloop.decision.model_form import TINY, form_of
+from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.detection.detect import Detection
+from estimator.closeloop.detection.importance import TINY
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate

@@ -7,6 +7,7 @@ from functools import cached_property
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import explains
+from estimator.closeloop.detection.importance import could_be_form
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose
@@ -53,7 +54,7 @@ class Screened:
     @property
     def open_to_form(self) -> bool:
         """Whether a form error could explain the residual, because it resembles no effect."""
-        return form_of(self.baseline).could_be(self.likeness)
+        return could_be_form(self.baseline, self.likeness)
 
     @property
     def began(self) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.closeloop.decision.model_form import form_of
+from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit
@@ -88,7 +88,7 @@ def detect(
         p_values.append((1 + np.sum(reference >= value)) / (limits.replicates + 1))
         figures[name] = float(value / np.quantile(reference, 0.95))
     p_value = min(1.0, len(p_values) * float(min(p_values)))
-    size = form_of(baseline).importance(likeness, sets_in)
+    size = importance(baseline, likeness, sets_in)
     return Detection(limits.level, p_value, figures, size, likeness, sets_in)
 
 
