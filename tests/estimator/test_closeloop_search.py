@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.hypotheses.relations import becomes, twins, with_twins
 from estimator.closeloop.policy import DEFAULT
@@ -31,6 +31,7 @@ from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search.lookalikes import lookalikes
 from estimator.closeloop.search.nomination import overlooked
 from estimator.closeloop.search.onset import ONSET_BLOCKS, onset
+from estimator.closeloop.search.simpler import from_the_start
 from estimator.plant import between
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -383,3 +384,28 @@ def test_what_sets_in_is_noticed_and_what_was_before_is_found(share, seed):
     assert found is not None
     assert abs(found[0] - share) <= 1.0 / ONSET_BLOCKS
     assert found[1].theta["a"] == pytest.approx(2.0, abs=0.1)
+
+
+def changed_at(t0: float | None, gain: float = 0.0) -> Hypothesis:
+    """A change of damping from a time on, or from the start, that leaves so much less than 100 squares."""
+    size = Unknown("damping_change_secondary_change", 0.0, -1.0, 9.0, 0.1)
+    onset = () if t0 is None else (Unknown("damping_change_secondary_t0", t0, 0.0, 60.0, 0.6),)
+    residual = np.full(100, np.sqrt(1 - gain / 100))
+    n = 1 + len(onset)
+    fit = fit_with((size, *onset), np.full(n, 0.5), np.eye(n), residual, np.zeros((100, n)))
+    return Hypothesis((Candidate("damping_change", "secondary", (size,), onset),), fit, ())
+
+
+@pytest.mark.parametrize(("gain", "kept"), [(0.0, None), (1.9, None), (2.1, 0.4), (50.0, 0.4)])
+def test_an_onset_has_to_be_worth_an_unknown(gain, kept):
+    for found in ([changed_at(0.4, gain), changed_at(None)], [changed_at(None), changed_at(0.4, gain)]):
+        [only] = best_by_label(found)
+        assert only.candidates[0].onset == kept
+
+
+def test_an_effect_that_sets_in_is_also_tried_from_the_start():
+    late, always = changed_at(0.4), changed_at(None)
+    [promise] = from_the_start([late, always], [*late.candidates, *always.candidates])
+    assert promise.candidates == always.candidates
+    assert promise.start["damping_change_secondary_change"] == 0.5
+    assert from_the_start([late], late.candidates) == []

@@ -104,9 +104,17 @@ def mean_square(h: Hypothesis) -> float:
 
 
 def best_by_label(found: Iterable[Hypothesis]) -> list[Hypothesis]:
-    """The best hypothesis for each set of labels, sorted by sum of squares, best first."""
+    """The best hypothesis for each set of labels, sorted by sum of squares, best first.
+
+    Of two with the same labels, the one with fewer unknowns is better unless each further unknown reduces the
+    sum of squares by more than 2 (H. Akaike, IEEE Trans. Automatic Control 19 (1974), 716-723).
+    """
     best: dict[tuple[str, ...], Hypothesis] = {}
     for h in found:
-        if h.key not in best or cost(h) < cost(best[h.key]):
+        if h.key not in best or _criterion(h) < _criterion(best[h.key]):
             best[h.key] = h
     return sorted(best.values(), key=cost)
+
+
+def _criterion(h: Hypothesis) -> float:
+    return cost(h) + 2 * len(h.fit.unknowns)

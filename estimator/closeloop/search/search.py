@@ -22,7 +22,7 @@ from estimator.closeloop.search.nomination import nominated, overlooked
 from estimator.closeloop.search.onset import since
 from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.closeloop.search.screened import Screened
-from estimator.closeloop.search.simpler import simpler
+from estimator.closeloop.search.simpler import from_the_start, simpler
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,9 @@ class Search:
         found = self._form.ranked(best_by_label(found))
         if not found or (s.baseline.noise.known and not s.explained(found[:1])):
             return found
-        promises = simpler(found, [c for c, _ in s.change])
+        every = [c for c, _ in s.change]
+        leading = found[: s.problem.policy.search.finalists]
+        promises = [*simpler(found, every), *from_the_start(leading, every)]
         promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)
         more = self.fitter.finished(distinct(promises))
         return self._form.ranked(best_by_label([*found, *more]))

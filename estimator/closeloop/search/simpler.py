@@ -1,4 +1,4 @@
-"""Replaces laws of the best hypothesis by simpler laws that are their limits."""
+"""Replaces laws of the best hypothesis by simpler laws that are their limits, and onset times by none."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -21,6 +21,19 @@ def simpler(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> lis
         if laws != best.candidates and key(laws) not in known
     ]
     return distinct(promises)
+
+
+def from_the_start(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> list[Promise]:
+    """Promises of the hypotheses of one effect that sets in, with the same effect acting from the start.
+
+    An onset in the first moments of a record is hardly told from the start, but it is one more unknown.
+    """
+    promises = []
+    for h in found:
+        if len(h.candidates) == 1 and h.candidates[0].onset is not None:
+            same = (c for c in candidates if c.label == h.label and c.onset is None)
+            promises += [Promise((c,), 0.0, _start(h, (c,))) for c in same]
+    return promises
 
 
 def _in_place_of(c: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
