@@ -38,10 +38,9 @@ class Noise:
         white = noise_floor(record)
         if caused:
             return cls._shared(record, residuals, white, caused)
-        correlation = []
+        correlation, fitted = [], _stretches(record, residuals)
         for j, declared in enumerate(record.noise_declared):
-            parts = [r[:, j] / white[j] for r in _stretches(record, residuals)]
-            found = _of_noise(parts, chance) if declared else None
+            found = _of_noise([r[:, j] / white[j] for r in fitted], chance) if declared else None
             correlation.append(np.ones(1) if found is None else found)
         size = np.where(record.noise_declared, white, weights(record, residuals))
         return cls(white, Weighting(size, tuple(correlation)), record.noise_declared)

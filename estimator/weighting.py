@@ -55,43 +55,47 @@ class Weighting:
         stretches: lengths of the uninterrupted stretches of samples that follow one another in it.
         """
         z = residual / self.size
-        return z if self.is_white else self._each(_Predictor.errors, _JointPredictor.errors, z, stretches)
+        return z if self.is_white else _each(self._predictor.errors, z, stretches)
 
     def back(self, weighted: Array, stretches: Sequence[int]) -> Array:
         """The residual (N, n_y) of a weighted one; the inverse of `of`."""
         if self.is_white:
             return weighted * self.size
-        return self._each(_Predictor.signal, _JointPredictor.signal, weighted, stretches) * self.size
-
-    def _each(
-        self,
-        alone: Callable[[_Predictor, Array], Array],
-        together: Callable[[_JointPredictor, Array], Array],
-        x: Array,
-        stretches: Sequence[int],
-    ) -> Array:
-        """Each stretch of x (N, n_y), and each column if they are independent, by its predictor."""
-        found, ends = np.empty_like(x), np.cumsum([0, *stretches]).tolist()
-        for a, b in pairwise(ends):
-            if self._together:
-                found[a:b] = together(self._together, x[a:b])
-                continue
-            for j, predictor in enumerate(self._predictors):
-                found[a:b, j] = alone(predictor, x[a:b, j])
-        return found
+        return _each(self._predictor.signal, weighted, stretches) * self.size
 
     @property
     def redundancy(self) -> Array:
         """Samples per independent square, (n_y,): 1 for white noise, more if it is correlated."""
-        return np.array([p.redundancy for p in self._predictors])
+        return np.array([p.redundancy for p in self._alone])
 
     @cached_property
-    def _together(self) -> _JointPredictor | None:
-        return None if self.joint is None else _JointPredictor(self.joint)
-
-    @cached_property
-    def _predictors(self) -> list[_Predictor]:
+    def _alone(self) -> list[_Predictor]:
         return [_Predictor(c) for c in self.correlation]
+
+    @cached_property
+    def _predictor(self) -> _Predictors | _JointPredictor:
+        return _Predictors(self._alone) if self.joint is None else _JointPredictor(self.joint)
+
+
+def _each(work: Callable[[Array], Array], x: Array, stretches: Sequence[int]) -> Array:
+    """The work on each stretch of x (N, n_y)."""
+    ends = np.cumsum([0, *stretches]).tolist()
+    return np.concatenate([work(x[a:b]) for a, b in pairwise(ends)])
+
+
+@dataclass(frozen=True)
+class _Predictors:
+    """Predicts the samples of several outputs, each from its own alone."""
+
+    alone: Sequence[_Predictor]
+
+    def errors(self, z: Array) -> Array:
+        """Prediction errors over their standard deviations, (N, n)."""
+        return np.column_stack([p.errors(column) for p, column in zip(self.alone, z.T, strict=True)])
+
+    def signal(self, errors: Array) -> Array:
+        """The samples (N, n) of these prediction errors; the inverse of `errors`."""
+        return np.column_stack([p.signal(column) for p, column in zip(self.alone, errors.T, strict=True)])
 
 
 class _Predictor:
@@ -142,8 +146,13 @@ class _JointPredictor:
         left = joint[0] - sum(
             (a @ g.T for a, g in zip(self._ahead, joint[1:], strict=True)), np.zeros((n, n))
         )
-        self._scale: Array = np.linalg.cholesky((left + left.T) / 2)
-        self._root = np.linalg.cholesky(_blocks(joint, order))
+        self._scale = np.asarray(np.linalg.cholesky((left + left.T) / 2), dtype=np.float64)
+        self._joint = joint
+
+    @cached_property
+    def _root(self) -> Array:
+        """Root of the covariance of the first samples."""
+        return np.asarray(np.linalg.cholesky(_blocks(self._joint, self._order)), dtype=np.float64)
 
     @property
     def log_error(self) -> float:

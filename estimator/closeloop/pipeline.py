@@ -15,7 +15,7 @@ from estimator.closeloop.decision.verdict import confirmed_on_test, judge, witho
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
-from estimator.closeloop.fitting.calibrate import calibrate, nearer, smoothed
+from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_input_noise
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
@@ -85,7 +85,7 @@ class Chain:
         """
         done = self.stages.done
         found = done("calibrated", lambda: calibrate(self.problem))
-        other = smoothed(self.problem, found[1].theta)
+        other = without_input_noise(self.problem, found[1].theta)
         if other is None:
             return self.problem, *found
         self.tell("inputs", "calibrating with smoothed inputs")

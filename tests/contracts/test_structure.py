@@ -98,6 +98,10 @@ def test_the_decision_can_be_read_in_one_sitting(name, most):
     assert sum(lines) <= most
 
 
+def test_what_decides_does_not_grow():
+    assert sum(len(f.read_text(encoding="utf-8").splitlines()) for f in DECIDING) <= 780
+
+
 def test_no_two_constants_of_closeloop_share_a_name():
     homes: dict[str, list[str]] = defaultdict(list)
     for file in sorted(CLOSELOOP.rglob("*.py")):

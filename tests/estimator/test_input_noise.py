@@ -11,18 +11,17 @@ from numpy.testing import assert_allclose
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
-from estimator.closeloop.fitting.calibrate import nearer
-from estimator.closeloop.fitting.calibrate import smoothed as without_input_noise
+from estimator.closeloop.fitting.calibrate import nearer, without_input_noise
 from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.policy import DEFAULT, Policy
-from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_noise
+from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_part
 from estimator.noise import Noise
 from estimator.record import Record, Run
 from estimator.weighting import Weighting
 
 N = 12000
 T = np.arange(N) * 0.005
-LIMITS = DEFAULT.detection
+LIMITS = DEFAULT.inputs
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -45,16 +44,16 @@ def test_white_noise_is_found_in_its_size(seed):
     rng = np.random.default_rng(seed)
     std = 10 ** rng.uniform(-3, 0)
     for signal in (ramps(rng), np.full(N, 3.0), np.sin(2 * np.pi * 0.4 * T)):
-        assert white_noise(signal + std * rng.standard_normal(N), LIMITS) == pytest.approx(std, rel=0.1)
+        assert white_part(signal + std * rng.standard_normal(N), LIMITS) == pytest.approx(std, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_what_has_no_flat_end_of_the_spectrum_is_not_noise(seed):
     rng = np.random.default_rng(seed)
     rough = np.cumsum(rng.standard_normal(N))
-    assert white_noise(rough, LIMITS) == 0.0
-    assert white_noise(np.full(N, 3.0), LIMITS) == 0.0
-    assert white_noise(rng.standard_normal(500), LIMITS) == 0.0  # too short to tell
+    assert white_part(rough, LIMITS) == 0.0
+    assert white_part(np.full(N, 3.0), LIMITS) == 0.0
+    assert white_part(rng.standard_normal(500), LIMITS) == 0.0  # too short to tell
 
 
 def test_a_record_with_clean_inputs_has_no_noise():
@@ -65,21 +64,22 @@ def test_a_record_with_clean_inputs_has_no_noise():
 @given(st.floats(-10, 10), st.floats(-3, 3), st.floats(1e-3, 1.0))
 def test_a_straight_line_is_not_changed_inside_the_record(level, slope, std):
     line = level + slope * T
-    assert_allclose(smoothed(line, std)[4000:-4000], line[4000:-4000], atol=1e-9)
+    assert_allclose(smoothed(line, std, LIMITS.levels)[4000:-4000], line[4000:-4000], atol=1e-9)
 
 
 @given(SEEDS, st.floats(0.01, 100.0))
 def test_smoothing_knows_no_units(seed, factor):
     rng = np.random.default_rng(seed)
     u = np.cumsum(rng.standard_normal(3000))
-    assert_allclose(smoothed(factor * u, factor), factor * smoothed(u, 1.0), rtol=1e-9, atol=1e-9 * factor)
+    one, other = (smoothed(f * u, f, LIMITS.levels) for f in (1.0, factor))
+    assert_allclose(other, factor * one, rtol=1e-9, atol=1e-9 * factor)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_most_of_the_noise_goes_and_corners_stay(seed):
     rng = np.random.default_rng(seed)
     clean, std = ramps(rng), 0.1
-    error = smoothed(clean + std * rng.standard_normal(N), std) - clean
+    error = smoothed(clean + std * rng.standard_normal(N), std, LIMITS.levels) - clean
     assert np.sqrt(np.mean(error**2)) < 0.3 * std
     corner = np.argmax(np.abs(np.diff(clean, 2))) + 1
     assert np.abs(error[corner - 20 : corner + 20]).max() < 4 * std
@@ -90,7 +90,7 @@ def test_draws_of_what_is_left_are_as_large_as_what_is_left(seed):
     rng = np.random.default_rng(seed)
     std = 0.2
     clean = ramps(rng) + np.sin(2 * np.pi * 0.15 * T)
-    noise = InputNoise(np.array([std]))
+    noise = InputNoise(np.array([std]), LIMITS.levels)
     record = noise.smoothed(record_of((clean + std * rng.standard_normal(N))[:, None]))
     [run] = record.runs
     true = run.u[:, 0] - clean

@@ -15,21 +15,21 @@ from estimator.weighting import Weighting
 
 ROUGH = 1e-3  # tolerance of the first fit, which is enough while the residual is large
 ROUGHLY_MATCHED = 2.0  # mean square of the weighted residual, below which the fit is continued accurately
-SEEN = 1.0  # change of the sum of squares by an error of a start state or an input, below which it is ignored
+SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is not fitted
 
 
-def smoothed(problem: Problem, theta: Mapping[str, float]) -> Problem | None:
+def without_input_noise(problem: Problem, theta: Mapping[str, float]) -> Problem | None:
     """The problem with its recorded inputs smoothed; None if they have no noise that the outputs show.
 
     theta: values with which the outputs are compared. The rounding of a file, for instance, does not show.
     """
-    noise = InputNoise.of(problem.record, problem.policy.detection)
+    noise = InputNoise.of(problem.record, problem.policy.inputs)
     if noise is None:
         return None
     found = replace(problem, record=noise.smoothed(problem.record), input_noise=noise)
     pairs = zip(problem.simulate(theta), found.simulate(theta), strict=True)
     moved = problem.record.of([a - b for a, b in pairs], "fit") / noise_floor(problem.record)
-    return found if np.sum(moved**2) > SEEN else None
+    return found if np.sum(moved**2) > problem.policy.inputs.seen else None
 
 
 def nearer(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:

@@ -9,8 +9,6 @@ from estimator.closeloop.question.problem import Problem
 from estimator.noise import Noise, larger
 from estimator.record import Array
 
-SIMULATIONS = 4  # with noise on the inputs
-
 
 def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> Noise:
     """The noise of the sensors, with that of the inputs where the residual (N, n_y) of a run is larger.
@@ -31,7 +29,7 @@ def caused(problem: Problem, theta: Mapping[str, float]) -> list[Array]:
     if noise is None:
         return []
     found, still = [], problem.simulate(theta)
-    for _ in range(SIMULATIONS):
+    for _ in range(problem.policy.inputs.draws):
         noisy = tuple(replace(run, u=run.u + noise.left(run.u, rng)) for run in record.runs)
         moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
         fitted = zip(moved, still, record.runs, strict=True)

@@ -14,32 +14,35 @@ import numpy as np
 import pywt
 from scipy.signal import welch
 
-from estimator.closeloop.policy import DetectionPolicy
+from estimator.closeloop.policy import InputPolicy
 from estimator.record import Array, Note, Record
 
 WAVELET = "db2"  # it does not see straight lines, and is the shortest that does not
-LEVELS = 10  # scales; what lasts longer than 1024 samples is left as it is
 
 
 @dataclass(frozen=True, eq=False)
 class InputNoise:
-    """White noise of the inputs of a record; std: (n_u,) standard deviation, zero for one without noise."""
+    """White noise of the inputs of a record.
+
+    std: (n_u,) standard deviation, zero for an input without noise; levels: see InputPolicy.
+    """
 
     std: Array
+    levels: int
 
     @classmethod
-    def of(cls, record: Record, limits: DetectionPolicy) -> InputNoise | None:
+    def of(cls, record: Record, limits: InputPolicy) -> InputNoise | None:
         """The noise of a record's inputs; None if none of them has any."""
         found = [
-            max(white_noise(run.u[:, j], limits) for run in record.runs) for j in range(len(record.inputs))
+            max(white_part(run.u[:, j], limits) for run in record.runs) for j in range(len(record.inputs))
         ]
-        return cls(np.array(found)) if any(found) else None
+        return cls(np.array(found), limits.levels) if any(found) else None
 
     def smoothed(self, record: Record) -> Record:
         """The record with smoothed inputs, and a note for each of them."""
         runs = tuple(replace(run, u=self._without(run.u)) for run in record.runs)
         noisy = [(o, std) for o, std in zip(record.inputs, self.std, strict=True) if std]
-        said = "white noise, of which a standard deviation of {:.2g} is smoothed away"
+        said = "white noise with a standard deviation of {:.2g} was found and smoothed away"
         notes = [Note("input noise", name, f"{name}: {said.format(std)}") for name, std in noisy]
         return replace(record, runs=runs, notes=(*record.notes, *notes))
 
@@ -48,17 +51,18 @@ class InputNoise:
         return self._without(u + self.std * rng.standard_normal(u.shape)) - u
 
     def _without(self, u: Array) -> Array:
-        return np.column_stack([smoothed(x, std) if std else x for x, std in zip(u.T, self.std, strict=True)])
+        columns = zip(u.T, self.std, strict=True)
+        return np.column_stack([smoothed(x, std, self.levels) if std else x for x, std in columns])
 
 
-def white_noise(u: Array, limits: DetectionPolicy) -> float:
+def white_part(u: Array, limits: InputPolicy) -> float:
     """Standard deviation of the white noise of an input (N,); zero if its spectrum is not flat at the end.
 
     The spectrum is the median over segments, so that single steps of the input do not matter. A smooth input
     has no power of its own in the upper octave of the frequencies; that of a rough one falls there.
     """
-    length = len(u) // limits.input_segments // 4 * 4
-    if length < limits.input_segment or np.ptp(u) == 0:
+    length = len(u) // limits.segments // 4 * 4
+    if length < limits.segment or np.ptp(u) == 0:
         return 0.0
     # density over the range 0 to 1, which for white noise is its variance
     _, power = welch(u, 2.0, "hann", length, average="median")
@@ -68,14 +72,14 @@ def white_noise(u: Array, limits: DetectionPolicy) -> float:
     # and neighbours share the window's width of 1.5
     count = 0.6 * (2 * len(u) // length - 1) * len(upper) / 2 / (2 * 1.5)
     white, scatter = float(upper.mean()), 1 / np.log(2.0) / np.sqrt(count)
-    flat = abs(low - high) <= limits.input_flat * scatter * white
+    flat = abs(low - high) <= limits.flat * scatter * white
     return float(np.sqrt(white)) if flat else 0.0
 
 
-def smoothed(u: Array, std: float) -> Array:
-    """A signal (N,) without white noise of a standard deviation."""
+def smoothed(u: Array, std: float, levels: int) -> Array:
+    """A signal (N,) without white noise of a standard deviation; levels: see InputPolicy."""
     n = len(u)
-    levels = min(LEVELS, int(np.log2(n)) - 1)
+    levels = min(levels, int(np.log2(n)) - 1)
     block = 2**levels
     before = min(block, n - 1)
     after = before + -(n + 2 * before) % block

@@ -1,4 +1,4 @@
-"""Replaces laws of the best hypothesis by simpler laws that are their limits, and onset times by none."""
+"""Replaces a law by a simpler one that is its limit, and an effect that sets in by one from the start."""
 
 from collections.abc import Sequence
 from itertools import product
