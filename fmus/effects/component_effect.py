@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fmus.component import Component
 from fmus.effects.effect import Effect
 from fmus.effects.parameter_effect import moments
-from fmus.effects.timing import begun, start_time
+from fmus.effects.timing import begun, rise_time, start_time
 from fmus.variables import Expr, Parameter
 
 if TYPE_CHECKING:
@@ -29,9 +29,10 @@ class ComponentEffect(Effect):
     acts_on = "component"
     asks = ("clock",)
     amplitudes = ("change",)
-    of_run = ("t0",)
+    of_run = ("t0", "T_r")
     change = Parameter("1", min=-1.0, doc="change over the sound value, -0.5 = half is left")
     t0 = start_time()
+    T_r = rise_time()
 
     @classmethod
     @abstractmethod
@@ -40,7 +41,7 @@ class ComponentEffect(Effect):
 
     def changed(self, p: Expr) -> Expr:
         """A parameter of the component from its declared value."""
-        return p * (1 + self.change * begun(self.symbols["clock"], self.t0))
+        return p * (1 + self.change * begun(self.symbols["clock"], self.t0, self.T_r))
 
     @classmethod
     def size(cls, duration: float) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from estimator.closeloop.fitting.fit import fit, weighted
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.refined import lower, refined
+from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate, onsets_near
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -24,6 +25,7 @@ WIDTH = 1.96  # standard errors: 95 %
 PROFILE_PLACES = 3  # points of the profile on each side
 FURTHER = 2.0  # largest ratio of the distances of successive points
 PROFILE_EVALUATIONS = 6  # evaluations of the fit of all other unknowns at each point
+HALVINGS = 6  # of the grid's spacing, for the onset times near the best one
 DEEPER = 4.0  # reduction of the sum of squares at a point, above which the fit is restarted there
 DEEPER_ROUNDS = 2  # largest number of such restarts
 
@@ -38,6 +40,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     before: list[Hypothesis] = []
+    h = with_duration(fitter, h)
     for _ in range(DEEPER_ROUNDS):
         h = refined(fitter, h)
         wider, deeper = _profiles(problem, h, weighting)
@@ -51,6 +54,8 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     error = np.sqrt(np.diag(h.fit.covariance))
     least = np.array([wider.get(u.name, 0.0) for u in h.fit.unknowns])
     wide = np.max([error, least, *(reached(h, b) for b in before)], axis=0)
+    open_by_shape = unresolved(h)
+    wide = np.hypot(wide, [open_by_shape.get(u.name, 0.0) for u in h.fit.unknowns])
     factors = np.divide(wide, error, out=np.ones_like(error), where=error > 0)
     return replace(h, fit=replace(h.fit, covariance=h.fit.covariance * np.outer(factors, factors)))
 
@@ -67,7 +72,12 @@ def reached(h: Hypothesis, b: Hypothesis) -> Array:
 def bends(c: Candidate) -> bool:
     """Whether a candidate has an amplitude and a shape parameter, which may compensate each other."""
     free = {u.name for u in c.unknowns}
-    return any(u.name in free for u in c.amplitudes) and any(not u.is_onset for u in c.shape)
+    return any(u.name in free for u in c.amplitudes) and any(_shapes(u) for u in c.shape)
+
+
+def _shapes(u: Unknown) -> bool:
+    """Whether an unknown of the shape is neither an onset time nor the duration of a change."""
+    return not (u.is_onset or u.is_duration)
 
 
 def _profiles(
@@ -80,7 +90,7 @@ def _profiles(
         wider[name] = half / WIDTH
         if deeper:
             return wider, deeper
-    for u in (u for c in h.candidates if bends(c) for u in c.unknowns if not u.is_onset):
+    for u in (u for c in h.candidates if bends(c) for u in c.unknowns if _shapes(u)):
         for side in (-1.0, 1.0):
             half, deeper = _half(problem, h, u, weighting, side)
             wider[u.name] = max(wider.get(u.name, 0.0), half / WIDTH)
@@ -118,10 +128,11 @@ def _half(
 
 
 def _when(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> tuple[float, dict[str, float]]:
-    """Half width of the 95 % interval of an onset time, over the times of the grid.
+    """Half width of the 95 % interval of an onset time, over the times of the grid and finer ones near it.
 
-    The second result holds the onset time with a lower sum of squares, if there is one. All other unknowns
-    follow linearly by the Jacobian.
+    The sum of squares over an onset time is no parabola: it has kinks where the motion has them, and many
+    minima. The second result holds the onset time with a lower sum of squares, if there is one. All other
+    unknowns follow linearly by the Jacobian.
     """
     names = [x.name for x in h.fit.unknowns]
     if name not in names or h.fit.std[name] == 0:
@@ -134,11 +145,31 @@ def _when(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> t
         r = weighted(here, {**h.theta, name: t}, weighting)
         return float(np.sum((r - others @ (others.T @ r)) ** 2))
 
-    tried = np.array(onsets_near(now, length))
+    grid = np.array(onsets_near(now, length))
+    spacing = float(np.min(np.diff(grid))) / 2.0 ** np.arange(1, HALVINGS + 1)
+    near = np.concatenate([now - spacing, now + spacing])
+    tried = np.sort(np.append(grid[grid != now], near[(near > 0.0) & (near < length)]))
     rises = (np.array([squares(t) for t in tried]) - squares(now)) / _usual(h, i)
     if rises.min() < -DEEPER:
         return 0.0, {name: float(tried[np.argmin(rises)])}
-    return float(np.max(np.abs(tried - now)[rises < WIDTH**2], initial=0.0)), {}
+    sides = (tried > now, tried < now)
+    return max(_reach(np.abs(tried - now)[side], rises[side]) for side in sides), {}
+
+
+def _reach(away: Array, rises: Array) -> float:
+    """Distance on one side up to which the sum of squares allows an onset time.
+
+    away: (n,) distances of the times tried; rises: (n,) of the sum of squares there. Between the last time that
+    is allowed and the next one, the root of the rise is taken as linear, as it is about a minimum.
+    """
+    order = np.argsort(away)
+    away = np.append(0.0, away[order])
+    high = np.append(0.0, np.sqrt(np.maximum(rises[order], 0.0)))
+    last = int(np.flatnonzero(high < WIDTH)[-1])
+    if last == len(away) - 1:
+        return float(away[last])
+    share = (WIDTH - high[last]) / (high[last + 1] - high[last])
+    return float(away[last] + share * (away[last + 1] - away[last]))
 
 
 def _usual(h: Hypothesis, i: int) -> float:

@@ -60,6 +60,11 @@ class Candidate:
         """Onset time, in s; None if it acts from the start."""
         return next((u.start for u in self.shape if u.is_onset), None)
 
+    @property
+    def duration_name(self) -> str:
+        """Name of the unknown that is the duration of a change which sets in at a time."""
+        return f"{self.prefix}T_r"
+
     def with_onset(self, t: float) -> Candidate:
         """The candidate with its onset at time t, in s."""
         return replace(self, shape=tuple(replace(u, start=t) if u.is_onset else u for u in self.shape))

@@ -37,6 +37,11 @@ class Unknown:
         """Whether it is the onset time of an effect."""
         return self.name.endswith("_t0")
 
+    @property
+    def is_duration(self) -> bool:
+        """Whether it is the duration of a change that sets in at a time."""
+        return self.name.endswith("_T_r")
+
 
 class Builder(Protocol):
     """Builds the FMU with effects; must be picklable, and must return quickly for effects built before."""
