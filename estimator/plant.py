@@ -28,13 +28,15 @@ class Plant:
         start: Mapping[str, float],
         more: Sequence[str] = (),
         push: Mapping[str, Array] | None = None,
+        finer: int = 1,
     ) -> Array:
         """Simulate a run from its first sample: the outputs, then the variables `more`, (N, n_y + n_more).
 
         start: states and parameters by name; push: samples (N,) that are added to inputs. Inputs are samples
-        of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic.
+        of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic. finer:
+        parts into which each step is divided further.
         """
-        t, inputs, pieces = self._given(run)
+        t, inputs, pieces = self._given(run, finer)
         if push:
             inputs = dict(inputs)
             for name, samples in push.items():
@@ -43,17 +45,19 @@ class Plant:
         alone = self.fmu.simulate_rows(t, inputs, names, [start])  # half the time of a loop over steps
         return (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
 
-    def simulate_rows(self, run: Run, starts: Sequence[Mapping[str, float]]) -> list[Array] | None:
+    def simulate_rows(
+        self, run: Run, starts: Sequence[Mapping[str, float]], finer: int = 1
+    ) -> list[Array] | None:
         """As `simulate` for each of several starts with the same names; None if the FMU does not offer it."""
-        t, inputs, pieces = self._given(run)
+        t, inputs, pieces = self._given(run, finer)
         found = self.fmu.simulate_rows(t, inputs, self.outputs, starts)
         return None if found is None else [y[::pieces] for y in found]
 
-    def _given(self, run: Run) -> tuple[Array, dict[str, Array], int]:
+    def _given(self, run: Run, finer: int) -> tuple[Array, dict[str, Array], int]:
         """Times and inputs of a run as set in the FMU, and the pieces of a step; cached for the run."""
-        if self._fine is None or self._fine[0] is not run:
+        pieces = self._pieces(run.t) * finer
+        if self._fine is None or self._fine[0] is not run or self._fine[3] != pieces:
             inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
-            pieces = self._pieces(run.t)
             fine = (run.t, inputs) if pieces == 1 else between(run.t, inputs, pieces)
             self._fine = run, *fine, pieces
         return self._fine[1:]

@@ -18,6 +18,7 @@ from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_input_noise
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
+from estimator.closeloop.fitting.resolution import resolved
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -119,8 +120,7 @@ class Chain:
         if noise:
             self.tell("weights", "weighting the residuals by the noise that the best fit leaves")
             shown, singles, pairs = self._weighted_anew(shown, singles, pairs, noise)
-        baseline = shown.baseline
-        singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
+        baseline, singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
         self.tell("test", "checking the answer on the test part")
         judgement = confirmed_on_test(baseline, judgement).after(before)
         found = replace(
@@ -152,14 +152,15 @@ class Chain:
     def _answered(
         self, shown: Screened, forces: Sequence[MissingForce],
         singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
-    ) -> tuple[list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
-        """Single hypotheses and pairs, best first, and the judgement with its members as they were judged.
+    ) -> tuple[Baseline, list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
+        """The baseline with which the answer was simulated, single hypotheses and pairs, best first, and the
+        judgement with its members as they were judged.
 
-        The standard errors of every member are taken from its likelihood profile, which may also move its
+        The steps of the simulation are halved if that would move a member. The standard errors of every member are taken from its likelihood profile, which may also move its
         fit. The hypotheses are then judged again, until every member has been judged with its profiled
         values. Each hypothesis is profiled once at most, so that the loop ends.
         """
-        form, fitter = form_of(shown.baseline), self.fitter(shown.baseline, self.jobs)
+        form, noise = form_of(shown.baseline), shown.baseline.noise
         asked: set[tuple[str, ...]] = set()
         tried = False
         for turn in count():
@@ -174,11 +175,14 @@ class Chain:
             if not members:
                 break
             self.tell("intervals", "computing standard errors from the likelihood profile")
+            finer = resolved(shown.baseline.problem, members, noise.weighting)
+            shown = replace(shown, baseline=shown.baseline.asked(finer))
+            fitter = self.fitter(shown.baseline, self.jobs)
             found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, members))
             asked |= {h.key for h in members}
             final = {h.key: h for h in found}
             singles, pairs = (form.ranked([final.get(h.key, h) for h in some]) for some in (singles, pairs))
-        return list(singles), list(pairs), judgement.of([*singles, *pairs])
+        return shown.baseline, list(singles), list(pairs), judgement.of([*singles, *pairs])
 
     def _judged(
         self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.fitting.fit import fit, weighted
-from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.fitting.refined import lower, refined
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate, onsets_near
@@ -40,6 +40,9 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     before: list[Hypothesis] = []
+    if problem.finer > 1:
+        again = fitter.alone.finished(from_there([h]), h.others, guess=h.fit.columns)
+        h = replace(again[0], worth=h.worth) if again else h
     h = with_duration(fitter, h)
     for _ in range(DEEPER_ROUNDS):
         h = refined(fitter, h)

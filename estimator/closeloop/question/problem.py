@@ -68,8 +68,8 @@ class Problem:
     builder: builds the FMU with `effects`, pairs of kind and location; declared: values of parameters and of
     the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
     given; form_error: share of an output that the form of the FMU leaves open; policy: the limits of the
-    decision; input_noise: noise that was smoothed away in the inputs of the record. The object is small and
-    picklable; worker processes open the FMU themselves.
+    decision; input_noise: noise that was smoothed away in the inputs of the record; finer: parts into which
+    each step of the simulation is divided. The object is small and picklable; worker processes open the FMU themselves.
     """
 
     builder: Builder
@@ -82,6 +82,7 @@ class Problem:
     form_error: float = 0.0
     policy: Policy = DEFAULT
     input_noise: InputNoise | None = None
+    finer: int = 1
 
     @property
     def plant(self) -> Plant:
@@ -163,12 +164,12 @@ class Problem:
         return replace(self, record=replace(self.record, runs=tuple(_cut(self.record.runs, share))))
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
-        y = self.plant.simulate(run, self._start(run, theta), more)
+        y = self.plant.simulate(run, self._start(run, theta), more, finer=self.finer)
         return faulty(y, run.t, self.record.outputs, theta)
 
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """Measured minus simulated outputs of a run for each of several unknowns; None if not all at once."""
-        rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas])
+        rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas], self.finer)
         if rows is None:
             return None
         outputs = self.record.outputs
