@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from fmus.effects import EFFECTS
 from fmus.effects.actuator_saturation import ActuatorSaturation
 from fmus.effects.force_law import ForceLaw
-from fmus.effects.timing import RISE, begun
+from fmus.effects.timing import LONGEST, SHORTEST, begun
 from fmus.port import UNITS
 from fmus.units import base_exponents
 from tests.helpers.everything import EVERY_EFFECT, FORCE_LAWS
@@ -186,7 +186,7 @@ def test_nothing_jumps(kind):
     line = np.linspace(0, 1, 10001)
     path = ends[0][:, None] + (ends[1] - ends[0])[:, None] * line
     values = np.array(f.map(path.shape[1])(path))
-    # rounded laws change within RISE or v_s, some thousandths of the line; a jump would take one point
+    # rounded laws change within T_r or v_s, some thousandths of the line; a jump would take one point
     assert np.all(np.abs(np.diff(values, axis=1)).max(axis=1) <= 0.1 * np.ptp(values, axis=1) + 1e-12)
 
 
@@ -199,15 +199,15 @@ def test_only_the_rate_of_a_saturated_input_jumps():
     assert [float(x) for x in f(-2.5, 3.0)] == [-2.0, 0.0]
 
 
-@given(t0=st.floats(0.1, 10), since=st.floats(-5, 5))
-def test_a_step_is_off_before_its_time_on_after_it_and_half_way_at_it(t0, since):
-    found = float(begun(cs.DM(t0 + since), cs.DM(t0)))
-    if abs(since) > RISE / 2:
+@given(t0=st.floats(0.1, 10), since=st.floats(-5, 5), T_r=st.floats(SHORTEST, LONGEST))
+def test_a_step_is_off_before_its_time_on_after_it_and_half_way_at_it(t0, since, T_r):
+    found = float(begun(cs.DM(t0 + since), cs.DM(t0), cs.DM(T_r)))
+    if abs(since) > 0.501 * T_r:
         assert found == (1.0 if since > 0 else 0.0)
     else:
         assert 0.0 <= found <= 1.0
-    assert float(begun(cs.DM(t0), cs.DM(t0))) == 0.5
-    assert float(begun(cs.DM(max(t0 + since, 0.0)), cs.DM(0.0))) == 1.0  # no time given: always
+    assert float(begun(cs.DM(t0), cs.DM(t0), cs.DM(T_r))) == 0.5
+    assert float(begun(cs.DM(max(t0 + since, 0.0)), cs.DM(0.0), cs.DM(T_r))) == 1.0  # no time given: always
 
 
 @pytest.mark.parametrize(

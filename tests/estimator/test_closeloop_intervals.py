@@ -1,0 +1,172 @@
+"""Errors that allow for the duration of a change, for the shape of the sum of squares, and for the steps."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
+from estimator.closeloop.fitting.resolution import FINEST, resolved
+from estimator.closeloop.fitting.slopes import STEP
+from estimator.closeloop.fitting.transition import unresolved, with_duration
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.question.problem import Unknown
+from estimator.record import Array, Run
+from estimator.weighting import Weighting
+from fmus.effects.timing import RISE
+from tests.helpers.baselines import baseline
+from tests.helpers.problems import OneByOne, record_with
+
+SIZE = np.array([0.05])
+AT = "parameter_step_m_"
+DELTA = Unknown(f"{AT}delta", 0.5, -10.0, 10.0, 1.0)
+STEPPED = Candidate("parameter_step", "m", (DELTA,), (Unknown(f"{AT}t0", 4.8, 0.0, 10.0, 0.1),))
+
+
+@given(error=st.floats(1e-3, 1.0), points=st.lists(st.floats(0.01, 10.0), min_size=3, max_size=20, unique=True))
+def test_the_reach_of_a_parabola_is_its_95_percent_width(error, points):
+    away = np.array(points)
+    found = _reach(away, (away / error) ** 2)
+    assert found == pytest.approx(min(WIDTH * error, away.max()))
+
+
+def test_the_reach_includes_the_farthest_of_several_minima():
+    away = np.array([4.0, 1.0, 2.0, 3.0])
+    assert _reach(away, np.array([100.0, 9.0, 1.0, 25.0])) > 2.0
+
+
+@dataclass(frozen=True)
+class Changing(OneByOne):
+    """An output that follows a change with a lag of 0.2 s; the true change is linear over `lasts` s."""
+
+    lasts: float
+    sample: float
+    seed: int
+    declared: Mapping[str, float] = field(default_factory=dict)
+    effects: tuple[tuple[str, str], ...] = ()
+    free_states = ()
+
+    @property
+    def record(self):
+        t = np.arange(0.0, 10.0, self.sample)
+        every = np.ones(len(t), bool)
+        y = followed(np.clip((t - 5.0) / self.lasts + 0.5, 0, 1), self.sample)
+        y += SIZE * np.random.default_rng(self.seed).standard_normal((len(t), 1))
+        return record_with(
+            runs=(Run(t, y, y, every, ~every, ~every),), noise_declared=np.array([True]), outputs=("y",)
+        )
+
+    def with_effects(self, effects):
+        return replace(self, effects=tuple(effects))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        s = np.clip((run.t - theta[f"{AT}t0"]) / theta.get(f"{AT}T_r", RISE) + 0.5, 0, 1)
+        return run.y - theta[f"{AT}delta"] * followed(s**2 * (3 - 2 * s), self.sample)
+
+
+def followed(u: Array, sample: float) -> Array:
+    """The lag's response (N, 1) to u (N,)."""
+    y, keep = np.zeros((len(u), 1)), np.exp(-sample / 0.2)
+    for k in range(1, len(u)):
+        y[k] = keep * y[k - 1] + (1 - keep) * (u[k] + u[k - 1]) / 2
+    return y
+
+
+class Refitter(Fitter):
+    """Fits without an FMU."""
+
+    def finished(
+        self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
+        guess: Mapping[str, Array] | None = None, step: float = STEP,
+    ) -> list[Hypothesis]:  # fmt: skip
+        """See Fitter."""
+        [p] = promises
+        own = p.candidates[0].unknowns
+        return [
+            Hypothesis(p.candidates, fit(self.baseline.problem, own, Weighting.white(SIZE), p.start, step=step), ())
+        ]
+
+
+def stepped(problem: Changing) -> tuple[Refitter, Hypothesis]:
+    """A fitter, and the step fitted with the duration that the library assumes."""
+    fitter = Refitter(baseline(problem, noise=SIZE))
+    [found] = fitter.finished([Promise((STEPPED,), 0.0, {})])
+    return fitter, found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_change_that_lasts_longer_than_assumed_gets_its_duration(seed):
+    fitter, found = stepped(Changing(0.6, 0.01, seed))
+    lasting = with_duration(fitter, found)
+    assert f"{AT}T_r" in lasting.theta
+    assert lasting.theta[f"{AT}T_r"] == pytest.approx(0.7, abs=0.25)  # a cubic as wide as the straight line
+    for name, true in (("delta", 1.0), ("t0", 5.0)):
+        error = np.hypot(lasting.fit.std[AT + name], unresolved(lasting).get(AT + name, 0.0))
+        assert abs(lasting.theta[AT + name] - true) < 3 * error
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_duration_that_hardly_shows_is_kept_as_assumed_unless_it_is_worth_an_unknown(seed):
+    fitter, found = stepped(Changing(RISE, 0.1, seed))
+    kept = with_duration(fitter, found)
+    if kept.own == found.own:
+        assert unresolved(kept) == {f"{AT}t0": pytest.approx(RISE / np.sqrt(12))}
+    else:
+        assert cost(found) - cost(kept) > 2
+        assert unresolved(kept)[f"{AT}t0"] == pytest.approx(kept.theta[f"{AT}T_r"] / np.sqrt(12))
+
+
+def test_what_acts_from_the_start_has_no_duration():
+    always = Candidate("parameter_offset", "m", (DELTA,))
+    h = Hypothesis((always,), stepped(Changing(0.02, 0.1, 0))[1].fit, ())
+    fitter = Refitter(baseline(Changing(0.02, 0.1, 0), noise=SIZE))
+    assert with_duration(fitter, h) is h
+    assert unresolved(h) == {}
+
+
+@dataclass(frozen=True)
+class Stiff(OneByOne):
+    """A line over time, with an integration error of second order that looks like a slope."""
+
+    error: float  # slope of the error at the first step
+    finer: int = 1
+    declared: Mapping[str, float] = field(default_factory=dict)
+    effects: tuple[tuple[str, str], ...] = ()
+    free_states = ()
+
+    @property
+    def record(self):
+        t = np.linspace(0.0, 1.0, 400)
+        every = np.ones(len(t), bool)
+        return record_with(
+            runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),),
+            noise_declared=np.array([True]), outputs=("y",),
+        )  # fmt: skip
+
+    def with_effects(self, effects):
+        return replace(self, effects=tuple(effects))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        return run.y - (theta["slope"] + self.error / self.finer**2) * run.t[:, None]
+
+
+@settings(deadline=None, max_examples=30)
+@given(size=st.floats(0.0, 20.0))
+def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
+    weighting, slope = Weighting.white(SIZE), Unknown("slope", 1.0, -10.0, 10.0, 1.0)
+    exact = fit(Stiff(0.0), [slope], weighting)
+    problem = Stiff(size * exact.std["slope"])
+    h = Hypothesis((), fit(problem, [slope], weighting), ())
+    finer = resolved(problem, [h], weighting).finer
+    moves = [0.75 * size / n**2 for n in (1, 2)]  # by halving the steps, in standard errors
+    if min(abs(m - 0.5) for m in moves) > 0.01:
+        assert finer == (1 if moves[0] < 0.5 else 2 if moves[1] < 0.5 else FINEST)
