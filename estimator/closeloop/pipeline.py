@@ -156,9 +156,10 @@ class Chain:
         """The baseline with which the answer was simulated, single hypotheses and pairs, best first, and the
         judgement with its members as they were judged.
 
-        The steps of the simulation are halved if that would move a member. The standard errors of every member are taken from its likelihood profile, which may also move its
-        fit. The hypotheses are then judged again, until every member has been judged with its profiled
-        values. Each hypothesis is profiled once at most, so that the loop ends.
+        The steps of the simulation are halved if that would move a member. The standard errors of every
+        member are taken from its likelihood profile, which may also move its fit. The hypotheses are then
+        judged again, until every member has been judged with its profiled values. Each hypothesis is profiled
+        once at most, so that the loop ends.
         """
         form, noise = form_of(shown.baseline), shown.baseline.noise
         asked: set[tuple[str, ...]] = set()

@@ -120,7 +120,7 @@ def result_of(
             "material": found.detection.material,
             "figures": dict(found.detection.figures),
         },
-        notes=[n.sentence for n in problem.record.notes],
+        notes=[*(n.sentence for n in problem.record.notes), *_steps(problem)],
         augmented_fmu=augmented[0].name if augmented else "",
         augmented_files=[file.name for file in augmented],
         power=[_line(v) for v in diagnostics.power] if diagnostics else [],
@@ -129,6 +129,16 @@ def result_of(
         seconds={stage: round(s, 2) for stage, s in found.seconds.items()},
         start_values=start_values(problem, found),
     )
+
+
+def _steps(problem: Problem) -> list[str]:
+    """A note if the steps of the simulation had to be divided."""
+    if problem.finer == 1:
+        return []
+    return [
+        f"each step is simulated in {problem.finer} times as many parts as usual, because the error of the "
+        "integration would have moved the fitted values; the errors of the answer hold for these steps"
+    ]
 
 
 def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:

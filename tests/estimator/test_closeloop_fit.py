@@ -396,6 +396,7 @@ def begun(moment: float, start: float, seed: int) -> tuple[Beginning, Hypothesis
 
 def test_errors_of_a_moment_reach_over_a_rest(monkeypatch):
     monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    monkeypatch.setattr(likelihood, "with_duration", lambda _, h: h)
     before, after = [], []
     for seed in range(40):
         true, start = np.random.default_rng(seed).uniform(3.05, 3.25, 2)
@@ -420,6 +421,7 @@ class Refitter(Fitter):
 
 def test_a_moment_a_swing_off_is_fitted_again(monkeypatch):
     monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    monkeypatch.setattr(likelihood, "with_duration", lambda _, h: h)
     monkeypatch.setattr(likelihood, "refined", lambda _, h: h)
     asked, h = begun(5.0, 5.0, 0)
     off = asked.identify_residual({"d": 1.0, "d_t0": 5.35}).ravel() / 0.1

@@ -30,7 +30,9 @@ DELTA = Unknown(f"{AT}delta", 0.5, -10.0, 10.0, 1.0)
 STEPPED = Candidate("parameter_step", "m", (DELTA,), (Unknown(f"{AT}t0", 4.8, 0.0, 10.0, 0.1),))
 
 
-@given(error=st.floats(1e-3, 1.0), points=st.lists(st.floats(0.01, 10.0), min_size=3, max_size=20, unique=True))
+@given(
+    error=st.floats(1e-3, 1.0), points=st.lists(st.floats(0.01, 10.0), min_size=3, max_size=20, unique=True)
+)
 def test_the_reach_of_a_parabola_is_its_95_percent_width(error, points):
     away = np.array(points)
     found = _reach(away, (away / error) ** 2)
@@ -91,7 +93,9 @@ class Refitter(Fitter):
         [p] = promises
         own = p.candidates[0].unknowns
         return [
-            Hypothesis(p.candidates, fit(self.baseline.problem, own, Weighting.white(SIZE), p.start, step=step), ())
+            Hypothesis(
+                p.candidates, fit(self.baseline.problem, own, Weighting.white(SIZE), p.start, step=step), ()
+            )
         ]
 
 

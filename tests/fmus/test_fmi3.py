@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -80,6 +80,7 @@ def test_an_alias_is_read_but_is_no_second_state(fresh):
     mu=st.floats(0, 3), x0=st.floats(-2, 2), x1=st.floats(-2, 2), t0=st.floats(-10, 100), even=st.booleans()
 )
 def test_a_run_is_the_solution(running, mu, x0, x1, t0, even):
+    assume(x0 or abs(x1) > 1e-9)  # at exact rest the reference divides no error by no error
     s = np.linspace(0, 1, 41)
     t = t0 + 4 * (s if even else s**2)
     u = stirred(t)

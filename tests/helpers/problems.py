@@ -17,6 +17,7 @@ class OneByOne:
     """What the fits ask of a problem whose simulations are made one after the other."""
 
     at_once = 1
+    finer = 1
 
     def identify_residuals(self, thetas):
         """See Problem."""

@@ -162,8 +162,8 @@ def _when(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> t
 def _reach(away: Array, rises: Array) -> float:
     """Distance on one side up to which the sum of squares allows an onset time.
 
-    away: (n,) distances of the times tried; rises: (n,) of the sum of squares there. Between the last time that
-    is allowed and the next one, the root of the rise is taken as linear, as it is about a minimum.
+    away: (n,) distances of the times tried; rises: (n,) of the sum of squares there. Between the last time
+    that is allowed and the next one, the root of the rise is taken as linear, as it is about a minimum.
     """
     order = np.argsort(away)
     away = np.append(0.0, away[order])

@@ -1,7 +1,7 @@
 """Steps so short that the error of the integration does not move what is fitted.
 
-Friction that is rounded over a millimetre per second is stiff, and a fixed step that suits the bare FMU then adds
-an error of its own, for which the parameters of the fit make up. Halving the step shows that error.
+Friction that is rounded over a millimetre per second is stiff, and a fixed step that suits the bare FMU then
+adds an error of its own, for which the parameters of the fit make up. Halving the step shows that error.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
 """The duration of a change that sets in at a time.
 
-In the search, a change lasts as long as the library assumes. A record whose samples resolve the change rejects
-a wrong duration, and the other unknowns of the effect would make up for it. The duration is therefore fitted
-with the errors of the answer, where it is worth an unknown.
+In the search, a change lasts as long as the library assumes. A record whose samples resolve the change
+rejects a wrong duration, and the other unknowns of the effect would make up for it. The duration is therefore
+fitted with the errors of the answer, where it is worth an unknown.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,6 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Record
-from fmus.effects import EFFECTS
 from fmus.effects.timing import LONGEST, RISE, SHORTEST
 
 FINE = 10.0  # samples: scale of the onset time and of the duration, of which differences are a hundredth
@@ -39,9 +38,7 @@ def unresolved(h: Hypothesis) -> Mapping[str, float]:
     Nobody knows how a change proceeds within its duration, so that it may have happened at any time in it.
     """
     durations = {c.prefix: h.theta.get(c.duration_name, RISE) for c in h.candidates}
-    return {
-        u.name: durations[c.prefix] / np.sqrt(12) for c in h.candidates for u in c.shape if u.is_onset
-    }
+    return {u.name: durations[c.prefix] / np.sqrt(12) for c in h.candidates for u in c.shape if u.is_onset}
 
 
 def _lasting(c: Candidate, record: Record) -> Candidate:

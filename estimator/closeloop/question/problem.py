@@ -69,7 +69,8 @@ class Problem:
     the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
     given; form_error: share of an output that the form of the FMU leaves open; policy: the limits of the
     decision; input_noise: noise that was smoothed away in the inputs of the record; finer: parts into which
-    each step of the simulation is divided. The object is small and picklable; worker processes open the FMU themselves.
+    each step of the simulation is divided. The object is small and picklable; worker processes open the FMU
+    themselves.
     """
 
     builder: Builder
