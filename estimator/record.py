@@ -36,6 +36,11 @@ class Run:
         """(N,) samples that no fit uses: the part to choose and the test part."""
         return self.choose | self.test
 
+    @property
+    def sample(self) -> float:
+        """Usual time between two samples, s."""
+        return float(np.median(np.diff(self.t)))
+
     def fit_time(self, share: float) -> float:
         """Time from the first sample until a share of the fitted samples has passed, s."""
         fitted = self.t[self.fit]

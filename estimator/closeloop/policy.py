@@ -231,6 +231,18 @@ class SearchPolicy:
         "hypotheses that are fitted again with the noise of the best fit, if noise is not declared",
         CHALLENGE,
     )
+    moved_by_steps: float = limit(
+        0.5,
+        "standard errors",
+        "movement of an unknown of an answer by halved steps of the simulation, above which they are halved",
+        "derivation: a bias of half of an error adds 12 % to it, as `noise_share`",
+    )
+    parts_of_a_step: int = limit(
+        4,
+        "parts",
+        "largest number of parts into which each usual step of the simulation is divided for that",
+        "derivation: an error of second order is then a sixteenth of that of the usual step",
+    )
     dated: int = limit(
         3,
         "hypotheses",

@@ -136,8 +136,8 @@ def _steps(problem: Problem) -> list[str]:
     if problem.finer == 1:
         return []
     return [
-        f"each step is simulated in {problem.finer} times as many parts as usual, because the error of the "
-        "integration would have moved the fitted values; the errors of the answer hold for these steps"
+        f"the usual steps of the simulation were divided by {problem.finer} for the answer, because their "
+        "integration error would have changed the fitted values; the error after holds for the divided steps"
     ]
 
 

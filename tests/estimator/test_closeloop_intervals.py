@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
-from estimator.closeloop.fitting.resolution import FINEST, resolved
+from estimator.closeloop.fitting.resolution import resolved
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array, Run
 from estimator.weighting import Weighting
@@ -142,6 +143,7 @@ class Stiff(OneByOne):
 
     error: float  # slope of the error at the first step
     finer: int = 1
+    policy = DEFAULT
     declared: Mapping[str, float] = field(default_factory=dict)
     effects: tuple[tuple[str, str], ...] = ()
     free_states = ()
@@ -170,7 +172,8 @@ def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
     exact = fit(Stiff(0.0), [slope], weighting)
     problem = Stiff(size * exact.std["slope"])
     h = Hypothesis((), fit(problem, [slope], weighting), ())
+    limits = problem.policy.search
     finer = resolved(problem, [h], weighting).finer
     moves = [0.75 * size / n**2 for n in (1, 2)]  # by halving the steps, in standard errors
     if min(abs(m - 0.5) for m in moves) > 0.01:
-        assert finer == (1 if moves[0] < 0.5 else 2 if moves[1] < 0.5 else FINEST)
+        assert finer == (1 if moves[0] < 0.5 else 2 if moves[1] < 0.5 else limits.parts_of_a_step)

@@ -76,8 +76,8 @@ def test_the_error_before_and_after_is_that_of_a_free_run_of_the_fmus(demo: tupl
     result, out = demo
     data = np.genfromtxt(DEMO / "data.csv", delimiter=",", names=True)
     test = data["time"] > 30
-    [note] = [n for n in result.notes if "times as many parts" in n]
-    parts = int(note.split("simulated in ")[1].split()[0])
+    [note] = [n for n in result.notes if "steps of the simulation were divided" in n]
+    parts = int(note.split("divided by ")[1].split()[0])
     t, u = between(data["time"], {n: data[n] for n in ("T_P", "f_sync")}, parts)
     import tomllib
 

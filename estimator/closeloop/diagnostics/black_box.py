@@ -81,7 +81,7 @@ def black_box(record: Record, residuals: Sequence[Array], size: Array) -> BlackB
     return BlackBox(
         None if model is None else len(model.a) - 1,
         np.roots([1.0] if model is None else model.a).astype(complex),
-        every * float(np.median(np.diff(record.runs[0].t))),
+        every * record.runs[0].sample,
         left,
         np.sqrt(np.mean(held_out**2, axis=0)),
     )

@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.fitting.fit import fit, weighted
-from estimator.closeloop.fitting.fitter import Fitter, from_there
+from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.refined import lower, refined
+from estimator.closeloop.fitting.resolution import in_divided_steps
 from estimator.closeloop.fitting.transition import unresolved, with_duration
-from estimator.closeloop.hypotheses.candidate import Candidate, onsets_near
+from estimator.closeloop.hypotheses.candidate import Candidate, onsets_beside, onsets_near
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
@@ -25,7 +26,6 @@ WIDTH = 1.96  # standard errors: 95 %
 PROFILE_PLACES = 3  # points of the profile on each side
 FURTHER = 2.0  # largest ratio of the distances of successive points
 PROFILE_EVALUATIONS = 6  # evaluations of the fit of all other unknowns at each point
-HALVINGS = 6  # of the grid's spacing, for the onset times near the best one
 DEEPER = 4.0  # reduction of the sum of squares at a point, above which the fit is restarted there
 DEEPER_ROUNDS = 2  # largest number of such restarts
 
@@ -40,10 +40,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     before: list[Hypothesis] = []
-    if problem.finer > 1:
-        again = fitter.alone.finished(from_there([h]), h.others, guess=h.fit.columns)
-        h = replace(again[0], worth=h.worth) if again else h
-    h = with_duration(fitter, h)
+    h = with_duration(fitter, in_divided_steps(fitter, h))
     for _ in range(DEEPER_ROUNDS):
         h = refined(fitter, h)
         wider, deeper = _profiles(problem, h, weighting)
@@ -148,15 +145,11 @@ def _when(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> t
         r = weighted(here, {**h.theta, name: t}, weighting)
         return float(np.sum((r - others @ (others.T @ r)) ** 2))
 
-    grid = np.array(onsets_near(now, length))
-    spacing = float(np.min(np.diff(grid))) / 2.0 ** np.arange(1, HALVINGS + 1)
-    near = np.concatenate([now - spacing, now + spacing])
-    tried = np.sort(np.append(grid[grid != now], near[(near > 0.0) & (near < length)]))
+    tried = np.array([t for t in (*onsets_near(now, length), *onsets_beside(now, length)) if t != now])
     rises = (np.array([squares(t) for t in tried]) - squares(now)) / _usual(h, i)
     if rises.min() < -DEEPER:
         return 0.0, {name: float(tried[np.argmin(rises)])}
-    sides = (tried > now, tried < now)
-    return max(_reach(np.abs(tried - now)[side], rises[side]) for side in sides), {}
+    return max(_reach(np.abs(tried - now)[side], rises[side]) for side in (tried > now, tried < now)), {}
 
 
 def _reach(away: Array, rises: Array) -> float:

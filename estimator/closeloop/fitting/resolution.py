@@ -1,7 +1,8 @@
 """Steps so short that the error of the integration does not move what is fitted.
 
-Friction that is rounded over a millimetre per second is stiff, and a fixed step that suits the bare FMU then
-adds an error of its own, for which the parameters of the fit make up. Halving the step shows that error.
+An effect can make the equations stiffer than those of the FMU without it. Friction that is rounded over a
+millimetre per second does so. With the usual step, the integration then adds an error of its own, and the fit
+changes its parameters to make up for that error. A simulation with halved steps shows how large it is.
 """
 
 from collections.abc import Sequence
@@ -10,30 +11,40 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.fitting.fit import weighted
+from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
 from estimator.weighting import Weighting
 
-MOVED = 0.5  # standard errors: a bias of this size adds 12 % to an error
-FINEST = 4  # largest number of parts of a step
-
 
 def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting) -> Problem:
-    """The problem with its steps halved until that moves no unknown of the hypotheses, by their slopes."""
+    """The problem with its steps halved until this would no longer move an unknown of the hypotheses.
+
+    How far an unknown would move follows from the slopes of its fit, without another fit.
+    """
     for h in some:
         problem = _resolved(problem, h, weighting)
     return problem
 
 
+def in_divided_steps(fitter: Fitter, h: Hypothesis) -> Hypothesis:
+    """The hypothesis, fitted again if the steps of the problem are divided."""
+    if fitter.baseline.problem.finer == 1:
+        return h
+    again = fitter.alone.finished(from_there([h]), h.others, guess=h.fit.columns)
+    return replace(again[0], worth=h.worth) if again else h
+
+
 def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
+    limits = problem.policy.search
     residual = weighted(built(problem, h.candidates), h.theta, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
-    while problem.finer < FINEST:
+    while problem.finer < limits.parts_of_a_step:
         halved = replace(problem, finer=2 * problem.finer)
         now = weighted(built(halved, h.candidates), h.theta, weighting)
         moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
-        if np.all(np.abs(moved) <= MOVED * error):
+        if np.all(np.abs(moved) <= limits.moved_by_steps * error):
             break
         problem, residual = halved, now
     return problem

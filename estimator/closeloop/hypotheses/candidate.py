@@ -11,6 +11,7 @@ from estimator.closeloop.question.problem import Unknown
 from estimator.sensor_faults import FAULTS
 
 REACH, REACH_STEPS = 0.05, 25  # half width of the grid, as share of the fitted length; steps per side
+HALVINGS = 6  # of a step, for the onset times beside the best one
 
 
 @dataclass(frozen=True)
@@ -74,3 +75,9 @@ def onsets_near(now: float, length: float) -> list[float]:
     """A grid of onset times about `now`, in s, ascending and within the fitted length."""
     grid = now + REACH * length * np.arange(-REACH_STEPS, REACH_STEPS + 1) / REACH_STEPS
     return [float(t) for t in np.unique(np.clip(grid, 0.0, length))]
+
+
+def onsets_beside(now: float, length: float) -> list[float]:
+    """Onset times on both sides of `now`, in s, closer than those of the grid, within the fitted length."""
+    away = REACH * length / REACH_STEPS / 2.0 ** np.arange(1, HALVINGS + 1)
+    return [float(t) for t in (*(now - away), *(now + away)) if 0.0 < t < length]

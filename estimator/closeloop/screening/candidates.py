@@ -59,11 +59,10 @@ def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
     found = []
     y = np.vstack([run.y for run in record.runs])
     length = max(float(run.t[-1] - run.t[0]) for run in record.runs)
-    step = float(np.median(np.diff(record.runs[0].t)))
     for j, output in enumerate(record.outputs):
         spread = float(np.std(y[:, j])) + float(noise[j])
         for fault in FAULTS.values():
-            size = fault.size(spread, length, step)
+            size = fault.size(spread, length, record.runs[0].sample)
             unknown = Unknown(fault.name_at(output), 0.0, fault.low, fault.high, size)
             found.append(Candidate(fault.kind, output, (unknown,)))
     return found

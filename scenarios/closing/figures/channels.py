@@ -130,7 +130,7 @@ SPECTRUM = (
 def _spectrum(ax: Axes, problem: Problem, shown: Series, j: int, noise: float) -> None:
     k = int(np.argmax([run.test.sum() for run in problem.record.runs]))
     run = problem.record.runs[k]
-    rate = 1 / float(np.median(np.diff(run.t)))
+    rate = 1 / run.sample
     for name, h, colour in shown:
         f, density = _density(h.residuals[k][run.test, j], rate)
         ax.loglog(f, density, color=colour, linewidth=1.1, label=name)

@@ -71,10 +71,9 @@ def runs(case: Case) -> list[Row]:
 
 
 def _run(run: Run) -> Row:
-    step = float(np.median(np.diff(run.t)))
     return {
         "duration": f"{short(run.t[-1] - run.t[0])} s",
-        "samples": f"{len(run.t)} at {short(1 / step)} Hz",
+        "samples": f"{len(run.t)} at {short(1 / run.sample)} Hz",
         "identify": _window(run, run.fit),
         "choose": _window(run, run.choose),
         "test": _window(run, run.test),
