@@ -20,6 +20,7 @@ from estimator.closeloop.fitting.slopes import (
     STEP,
     Slopes,
 )
+from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose, sandwich
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -346,7 +347,8 @@ def test_errors_reach_as_far_as_the_valley_does(monkeypatch):
         found = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), h).fit
         assert found.theta == h.fit.theta
         held += [abs(found.theta[n] - v) < 1.96 * found.std[n] for n, v in true.items()]
-        wider += [found.std[n] / h.fit.std[n] for n in true]
+        at_minimum = within_error(asked, h, Weighting.white(np.array([0.2]))).fit
+        wider += [found.std[n] / at_minimum.std[n] for n in true]
     assert np.mean(held) > 0.9
     assert min(wider) > 1 - 1e-9
     assert max(wider) > 1.3
@@ -356,9 +358,9 @@ def test_errors_of_a_linear_law_stay(monkeypatch):
     monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
     asked, h = played(1)
     linear = replace(h, candidates=(Candidate("constant_force", "spring", h.candidates[0].amplitudes),))
-    assert_allclose(
-        likelihood.profiled(Fitter(baseline(asked, noise=0.2)), linear).fit.covariance, h.fit.covariance
-    )
+    found = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), linear).fit
+    at_minimum = within_error(asked, linear, Weighting.white(np.array([0.2]))).fit
+    assert_allclose(found.covariance, at_minimum.covariance)
     wide = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), h).fit.std
     asked.record.noise_declared = np.array(
         [False]

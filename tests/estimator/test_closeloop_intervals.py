@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
 from estimator.closeloop.fitting.resolution import resolved
-from estimator.closeloop.fitting.slopes import STEP
+from estimator.closeloop.fitting.slopes import FINE_STEP, STEP
+from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -177,3 +179,67 @@ def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
     moves = [0.75 * size / n**2 for n in (1, 2)]  # by halving the steps, in standard errors
     if min(abs(m - 0.5) for m in moves) > 0.01:
         assert finer == (1 if moves[0] < 0.5 else 2 if moves[1] < 0.5 else limits.parts_of_a_step)
+
+
+# ---- slopes of unknowns that make up for each other
+
+
+class Compensating(OneByOne):
+    """A force that hardly saturates, a tanh(b q): only the product a b is determined well."""
+
+    free_states = ()
+    true: ClassVar = {"a": 1.0, "b": 0.6}
+
+    def __init__(self, seed: int) -> None:
+        t = np.linspace(0.0, 10.0, 4000)
+        self.q = np.sin(2 * np.pi * t)
+        y = np.tanh(0.6 * self.q) + SIZE * np.random.default_rng(seed).standard_normal(len(t))
+        every = np.ones(len(t), bool)
+        run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
+        self.record = record_with(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        return run.y - theta["a"] * np.tanh(theta["b"] * self.q)[:, None]
+
+    def jacobian(self, a: float, b: float) -> Array:
+        """Derivatives of the weighted residual, (m, 2), on paper."""
+        return -np.column_stack([np.tanh(b * self.q), a * self.q / np.cosh(b * self.q) ** 2]) / SIZE
+
+
+def compensated(seed: int, wrong: float) -> tuple[Compensating, Hypothesis]:
+    """A fit whose slope of a is wrong by a share of the residual, as secants leave it."""
+    asked = Compensating(seed)
+    unknowns = Unknown("a", 0.9, 0.0, np.inf, 1.0), Unknown("b", 0.7, 0.0, np.inf, 1.0)
+    found = fit(asked, unknowns, Weighting.white(SIZE), step=FINE_STEP)
+    slopes = found.slopes[0] + wrong * found.residual, found.slopes[1]
+    return asked, Hypothesis((), replace(found, slopes=slopes), ())
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=st.integers(0, 1000), wrong=st.floats(-1.0, 1.0))
+def test_slopes_within_the_errors_are_those_on_paper_whatever_the_search_left(seed, wrong):
+    asked, h = compensated(seed, wrong)
+    exact = asked.jacobian(*h.fit.values)
+    found = within_error(asked, h, Weighting.white(SIZE)).fit
+    assert np.all(np.linalg.norm(found.jacobian - exact, axis=0) < 1e-4 * np.linalg.norm(exact, axis=0))
+
+
+def test_errors_of_what_compensates_hold_the_true_values_only_with_such_slopes():
+    before, after = [], []
+    for seed in range(60):
+        asked, h = compensated(seed, 2.0)
+        here = replace(h, fit=replace(h.fit, covariance=np.linalg.inv(h.fit.jacobian.T @ h.fit.jacobian)))
+        found = within_error(asked, here, Weighting.white(SIZE)).fit
+        for some, fitted in ((before, here.fit), (after, found)):
+            some += [abs(fitted.theta[n] - v) < WIDTH * fitted.std[n] for n, v in asked.true.items()]
+    assert np.mean(before) < 0.7
+    assert np.mean(after) > 0.9
+
+
+def test_a_slope_at_a_bound_is_taken_to_one_side():
+    asked, h = compensated(1, 0.0)
+    a, b = h.fit.unknowns
+    held = replace(h, fit=replace(h.fit, unknowns=(replace(a, high=float(h.fit.values[0])), b)))
+    found = within_error(asked, held, Weighting.white(SIZE)).fit.jacobian
+    assert found[:, 0] == pytest.approx(asked.jacobian(*h.fit.values)[:, 0], rel=1e-6)

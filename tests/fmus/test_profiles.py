@@ -138,7 +138,11 @@ def test_noisy_wheel_in_any_direction(tmp_path_factory, seed, n, noise, down, tu
     points = points * [-1 if turned else 1, -1 if down else 1] + [0, 0.0123]
     file = write_points(tmp_path_factory.mktemp("wheel") / "worn.txt", points[:: -1 if seed % 2 else 1])
     made, true = measured_profile(file, "wheel"), exact_profile("S1002")
-    assert_allclose(made.height(TREAD), true.height(TREAD), atol=noise)
+    # p parameters fitted to n points leave an error of noise sqrt(p/n) rms; 600 draws had 1.0 of that in the
+    # median and 2.7 at most, since only some ten of the parameters lie on the tread
+    p = float(made.found.split(" parameters")[0].split()[-1])
+    away = made.height(TREAD) - true.height(TREAD)
+    assert np.sqrt(np.mean(away**2)) < 4 * noise * np.sqrt(p / n)
     wrong = made.curvature(TREAD) - true.curvature(TREAD)
     # the tread's own curvature is 4 /m rms over these places; the reverse slope begins with a step of 4
     assert np.sqrt(np.mean(wrong**2)) < 1.0

@@ -13,6 +13,7 @@ from estimator.closeloop.fitting.fit import fit, weighted
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.refined import lower, refined
 from estimator.closeloop.fitting.resolution import in_divided_steps
+from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate, onsets_beside, onsets_near
 from estimator.closeloop.hypotheses.fitted import Fit
@@ -33,16 +34,17 @@ DEEPER_ROUNDS = 2  # largest number of such restarts
 def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis with the standard errors of its laws widened to those of the likelihood profile.
 
-    The wider side of each parameter counts. If the profile finds a lower sum of squares, the hypothesis is
-    fitted again from there, and its former values count as a point of the profile. Laws that are linear in
-    their parameters keep their errors. Onset times are evaluated on a grid, because the sum of squares has
-    many local minima over them.
+    Its covariance is that of slopes within the errors (see `within_error`). The wider side of each parameter
+    counts. If the profile finds a lower sum of squares, the hypothesis is fitted again from there, and its
+    former values count as a point of the profile. Laws that are linear in their parameters keep their errors.
+    Onset times are evaluated on a grid, because the sum of squares has many local minima over them.
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     before: list[Hypothesis] = []
     h = with_duration(fitter, in_divided_steps(fitter, h))
+    here = built(problem, h.candidates)
     for _ in range(DEEPER_ROUNDS):
-        h = refined(fitter, h)
+        h = within_error(here, refined(fitter, h), weighting)
         wider, deeper = _profiles(problem, h, weighting)
         if not deeper:
             break
@@ -50,7 +52,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
         now = lower(h, fitter.alone.finished([there], h.others))
         if now is h:
             break
-        before, h = [*before, h], now
+        before, h = [*before, h], within_error(here, now, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
     least = np.array([wider.get(u.name, 0.0) for u in h.fit.unknowns])
     wide = np.max([error, least, *(reached(h, b) for b in before)], axis=0)

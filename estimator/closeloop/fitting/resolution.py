@@ -12,6 +12,7 @@ import numpy as np
 
 from estimator.closeloop.fitting.fit import weighted
 from estimator.closeloop.fitting.fitter import Fitter, from_there
+from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
@@ -38,7 +39,9 @@ def in_divided_steps(fitter: Fitter, h: Hypothesis) -> Hypothesis:
 
 def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
     limits = problem.policy.search
-    residual = weighted(built(problem, h.candidates), h.theta, weighting)
+    here = built(problem, h.candidates)
+    h = within_error(here, h, weighting)
+    residual = weighted(here, h.theta, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
     while problem.finer < limits.parts_of_a_step:
         halved = replace(problem, finer=2 * problem.finer)
