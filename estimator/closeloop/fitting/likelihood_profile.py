@@ -52,7 +52,9 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
         now = lower(h, fitter.alone.finished([there], h.others))
         if now is h:
             break
-        before, h = [*before, h], within_error(here, now, weighting)
+        before, h = [*before, h], now
+    else:  # the last round has moved the fit
+        h = within_error(here, h, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
     least = np.array([wider.get(u.name, 0.0) for u in h.fit.unknowns])
     wide = np.max([error, least, *(reached(h, b) for b in before)], axis=0)
