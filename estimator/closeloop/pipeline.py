@@ -21,12 +21,13 @@ from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.resolution import resolved
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
 from estimator.closeloop.search.free_form import free_form
+from estimator.closeloop.search.rivals import as_carefully
 from estimator.closeloop.search.screened import Screened, screened
 from estimator.closeloop.search.search import Search
 from estimator.noise import Noise
@@ -157,11 +158,12 @@ class Chain:
         judgement with its members as they were judged.
 
         The steps of the simulation are halved if that would move a member. The standard errors of every
-        member are taken from its likelihood profile, which may also move its fit. The hypotheses are then
-        judged again, until every member has been judged with its profiled values. Each hypothesis is profiled
-        once at most, so that the loop ends.
+        member are taken from its likelihood profile, which may also move its fit. If it does, the nearest
+        rivals are fitted again too. The hypotheses are then judged again, until every member has been judged
+        with its profiled values. Each hypothesis is profiled once at most for each length of the steps, so
+        that the loop ends.
         """
-        form, noise = form_of(shown.baseline), shown.baseline.noise
+        form = form_of(shown.baseline)
         asked: set[tuple[str, ...]] = set()
         tried = False
         for turn in count():
@@ -176,11 +178,14 @@ class Chain:
             if not members:
                 break
             self.tell("intervals", "computing standard errors from the likelihood profile")
-            finer = resolved(shown.baseline.problem, members, noise.weighting)
-            shown = replace(shown, baseline=shown.baseline.asked(finer))
+            shown, again = _in_fine_steps(shown, members, judgement.members)
             fitter = self.fitter(shown.baseline, self.jobs)
-            found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, members))
-            asked |= {h.key for h in members}
+            found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, again))
+            asked |= {h.key for h in again}
+            if any(new.theta != old.theta for new, old in zip(found, again, strict=True)):
+                self.tell("rivals", "fitting the rivals of the answer as carefully as the answer")
+                others = [[h for h in some if h.key not in asked] for some in (singles, pairs)]
+                found = self.stages.done(f"careful {turn}", partial(_with_rivals, fitter, found, others))
             final = {h.key: h for h in found}
             singles, pairs = (form.ranked([final.get(h.key, h) for h in some]) for some in (singles, pairs))
         return shown.baseline, list(singles), list(pairs), judgement.of([*singles, *pairs])
@@ -192,6 +197,27 @@ class Chain:
         """The judgement by comparison of the fits, and the same after the test of the law's curve."""
         leading = judge(shown.baseline, singles, pairs, shown.began)
         return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))
+
+
+def _in_fine_steps(
+    shown: Screened, new: Sequence[Hypothesis], members: Sequence[Hypothesis]
+) -> tuple[Screened, list[Hypothesis]]:
+    """The problem in steps that are fine enough for the new members of an answer, and those to be profiled.
+
+    If the steps become finer, these are all members, since hypotheses are compared in the same steps.
+    """
+    before = shown.baseline
+    finer = resolved(before.problem, new, before.noise.weighting)
+    again = new if finer.finer == before.problem.finer else members
+    return replace(shown, baseline=before.asked(finer)), list(again)
+
+
+def _with_rivals(
+    fitter: Fitter, members: Sequence[Hypothesis], others: Sequence[Sequence[Hypothesis]]
+) -> list[Hypothesis]:
+    """The members of an answer, and their nearest rivals of each list (best first) fitted as carefully."""
+    best = min(members, key=cost)
+    return [*members, *(h for some in others for h in as_carefully(fitter, best, some))]
 
 
 def _profiled(fitter: Fitter, members: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -17,7 +17,7 @@ import numpy as np
 from estimator.closeloop.detection.importance import TINY, importance, signal_size
 from estimator.closeloop.evidence import Check
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array, BoolArray
@@ -40,8 +40,8 @@ class ModelForm(ABC):
         """The figure by which hypotheses are ranked; smaller is better."""
 
     @abstractmethod
-    def reached(self, h: Hypothesis) -> BoolArray:
-        """Whether the residual of each output (n_y,) comes down to its noise or to the open share."""
+    def reached(self, h: Hypothesis, part: Part = "choose") -> BoolArray:
+        """Whether the residual of each output (n_y,) on a part comes down to its noise or the open share."""
 
     @abstractmethod
     def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
@@ -64,11 +64,11 @@ class ModelForm(ABC):
         limits = self.baseline.policy.decision
         return max(limits.noticed, limits.missed * (cost(self.baseline.hypothesis) - cost(h)))
 
-    def _at_noise(self, h: Hypothesis) -> BoolArray:
-        """Outputs (n_y,) whose residual comes down to the noise, or nearly so, with a hypothesis."""
+    def _at_noise(self, h: Hypothesis, part: Part) -> BoolArray:
+        """Outputs (n_y,) whose residual on a part comes down to the noise, or nearly so."""
         b, limits = self.baseline, self.baseline.policy.decision
-        scatter = limits.scatter * np.sqrt(b.noise.redundancy / (2 * len(h.of(b.problem, "choose"))))
-        return np.asarray(h.rms(b.problem, "choose") < (limits.clean + scatter) * b.noise.std)
+        scatter = limits.scatter * np.sqrt(b.noise.redundancy / (2 * len(h.of(b.problem, part))))
+        return np.asarray(h.rms(b.problem, part) < (limits.clean + scatter) * b.noise.std)
 
 
 class Closed(ModelForm):
@@ -79,16 +79,16 @@ class Closed(ModelForm):
     def _misfit(self, h: Hypothesis) -> float:
         return -self.baseline.score(h)
 
-    def reached(self, h: Hypothesis) -> BoolArray:
+    def reached(self, h: Hypothesis, part: Part = "choose") -> BoolArray:
         """See ModelForm; no form is right to any accuracy, so that little may be left where noise is less.
 
         Little is a small share of the signal and, at the same time, of what was there before.
         """
         b, noise = self.baseline, self.baseline.noise.std
-        before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
+        before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)
         beyond = np.sqrt(np.maximum(after**2 - noise**2, 0.0))
         little = beyond <= b.policy.detection.signal_share * signal_size(b.problem)
-        return self._at_noise(h) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
+        return self._at_noise(h, part) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
 
     def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
         """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
@@ -128,27 +128,27 @@ class Open(ModelForm):
         # on one part alone, an effect that acts in the other part would lose to one that imitates the form
         return 0.5 * cost(h) - self.baseline.score(h)
 
-    def reached(self, h: Hypothesis) -> BoolArray:
+    def reached(self, h: Hypothesis, part: Part = "choose") -> BoolArray:
         """Whether each output (n_y,) comes down to its noise or to the open share.
 
         An output whose residual was small before must not grow. One effect must explain at least half of the
-        variance beyond noise of all outputs together, over both parts, and on the part to choose as well
-        unless little is left over both: an effect may act in one part only. Several effects can imitate an
-        error of form, so that they must leave noise alone. A sensor fault that leaves noise alone on its own
-        output need not explain the others.
+        variance beyond noise of all outputs together, over the part to identify and the given one, and on the
+        latter as well unless little is left over both: an effect may act in one part only. Several effects
+        can imitate an error of form, so that they must leave noise alone. A sensor fault that leaves noise
+        alone on its own output need not explain the others.
         """
         b, limits = self.baseline, self.baseline.policy
-        noise, down = b.noise.std, self._at_noise(h)
+        noise, down = b.noise.std, self._at_noise(h, part)
         if len(h.candidates) > 1:
             return down
-        before, after = b.hypothesis.rms(b.problem, "choose"), h.rms(b.problem, "choose")
+        before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)
         left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
         share = (self.share * signal_size(b.problem) / noise) ** 2
         no_worse = after <= limits.decision.clean * before
         if np.any(_faulty(b.problem, h) & down & (was >= limits.detection.noise_share**2)):
             return np.asarray(down | no_worse)
         half = limits.decision.open_single
-        of_all = b.beyond_noise_of_all(h) / max(b.beyond_noise_of_all(b.hypothesis), TINY)
+        of_all = b.beyond_noise_of_all(h, part) / max(b.beyond_noise_of_all(b.hypothesis, part), TINY)
         if of_all > half or (of_all > half**2 and np.sum(left) > half * np.sum(was)):
             return down
         small = (was < share) | (before < limits.detection.open_form_noises * noise)

@@ -39,8 +39,7 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
         better("better than without it on the part to choose", baseline, h, "choose"),
     ]
     if declared.any():
-        left = int(np.sum(declared & ~form_of(baseline).reached(h)))
-        found.append(Check.most("outputs left above their noise", left, 0))
+        found.append(above_noise("outputs left above their noise", baseline, h, "choose"))
     if not declared.all():
         after, before = (
             np.mean((x.of(baseline.problem, "choose") / baseline.noise.scale)[:, ~declared] ** 2)
@@ -57,6 +56,12 @@ def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
     mean, error = baseline.lead(h, baseline.hypothesis, part)
     z = mean / error if error > 0 else 0.0
     return Check(name, float(z), limit, bool(mean > limit * error))
+
+
+def above_noise(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
+    """The check that h brings every output with declared noise down to it, or nearly so, on a part."""
+    above = baseline.noise.declared & ~form_of(baseline).reached(h, part)
+    return Check.most(name, int(np.sum(above)), 0)
 
 
 def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check], Judgement | None]:
@@ -85,24 +90,32 @@ def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check],
 
 
 def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
-    """The judgement after one check on the test part, which neither fitting nor choosing has used.
+    """The judgement after two checks on the test part, which neither fitting nor choosing has used.
 
-    The best member must be better than the calibrated FMU there too; otherwise there is no answer. The other
-    members are not checked, since that would be a choice among them on the test part.
+    The best member must be better than the calibrated FMU there too, and it must account for the residual as
+    it does on the part to choose; otherwise there is no answer. The other members are not checked, since that
+    would be a choice among them on the test part.
     """
     if not found.members:
         return found
     best = found.members[0]
-    check = better("better than without it on the test part", baseline, best, "test")
-    if check.passed:
-        return replace(found, checks=(*found.checks, check))
+    checks = (
+        better("better than without it on the test part", baseline, best, "test"),
+        above_noise("outputs left above their noise on the test part", baseline, best, "test"),
+    )
+    if all(c.passed for c in checks):
+        return replace(found, checks=(*found.checks, *checks))
     gained, error = baseline.lead(best, baseline.hypothesis, "test")
+    shown = f"the log score changes by {gained:.3g} there, with a standard error of {error:.2g}"
+    if checks[0].passed:
+        left = ", ".join(f"{r:.2f}" for r in best.rms(baseline.problem, "test") / baseline.noise.std)
+        shown = f"it leaves {left} times the noise of the outputs there"
     reason = (
         f"{best.label} accounts for the residual on the part to choose, but the test part does not confirm "
-        f"it: the log score changes by {gained:.3g} there, with a standard error of {error:.2g}"
+        f"it: {shown}"
     )
     advice = "a record in which the discrepancy appears in all three parts"
-    return Judgement((*found.checks, check), (), reason, advice)
+    return Judgement((*found.checks, *checks), (), reason, advice)
 
 
 def judge(

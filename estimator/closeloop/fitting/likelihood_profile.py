@@ -41,10 +41,10 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     before: list[Hypothesis] = []
-    h = with_duration(fitter, in_divided_steps(fitter, h))
+    h = carefully(fitter, h)
     here = built(problem, h.candidates)
     for _ in range(DEEPER_ROUNDS):
-        h = within_error(here, refined(fitter, h), weighting)
+        h = within_error(here, h, weighting)
         wider, deeper = _profiles(problem, h, weighting)
         if not deeper:
             break
@@ -52,7 +52,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
         now = lower(h, fitter.alone.finished([there], h.others))
         if now is h:
             break
-        before, h = [*before, h], now
+        before, h = [*before, h], refined(fitter, now)
     else:  # the last round has moved the fit
         h = within_error(here, h, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
@@ -62,6 +62,11 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     wide = np.hypot(wide, [open_by_shape.get(u.name, 0.0) for u in h.fit.unknowns])
     factors = np.divide(wide, error, out=np.ones_like(error), where=error > 0)
     return replace(h, fit=replace(h.fit, covariance=h.fit.covariance * np.outer(factors, factors)))
+
+
+def carefully(fitter: Fitter, h: Hypothesis) -> Hypothesis:
+    """The hypothesis fitted as an answer is: in divided steps, with its durations, with finer differences."""
+    return refined(fitter, with_duration(fitter, in_divided_steps(fitter, h)))
 
 
 def reached(h: Hypothesis, b: Hypothesis) -> Array:

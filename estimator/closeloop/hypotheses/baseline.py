@@ -70,13 +70,13 @@ class Baseline:
         chance = self.policy.detection.chance
         return bool(h.fit.beyond_noise < chance * np.sqrt(2 * len(h.fit.residual)))
 
-    def beyond_noise(self, h: Hypothesis) -> float:
-        """Sum of squares on the part to choose minus its expectation for pure noise."""
-        return float(np.sum(self._weighted(h, "choose") ** 2 - 1))
+    def beyond_noise(self, h: Hypothesis, part: Part = "choose") -> float:
+        """Sum of squares on a part minus its expectation for pure noise."""
+        return float(np.sum(self._weighted(h, part) ** 2 - 1))
 
-    def beyond_noise_of_all(self, h: Hypothesis) -> float:
-        """Sum of squares on the parts to identify and to choose minus its expectation for pure noise."""
-        return h.fit.beyond_noise + self.beyond_noise(h)
+    def beyond_noise_of_all(self, h: Hypothesis, part: Part = "choose") -> float:
+        """Sum of squares on the part to identify and another part minus its expectation for pure noise."""
+        return h.fit.beyond_noise + self.beyond_noise(h, part)
 
     def idle(self, h: Hypothesis) -> list[Candidate]:
         """Candidates of a hypothesis whose size does not differ significantly from zero."""

@@ -7,10 +7,9 @@ from functools import cached_property
 from estimator.closeloop.decision.model_form import ModelForm, form_of
 from estimator.closeloop.fitting.fitter import BRIEF, Fitter
 from estimator.closeloop.fitting.refined import evenly
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import twins, with_twins
-from estimator.closeloop.policy import SearchPolicy
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
@@ -21,6 +20,7 @@ from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.search.nomination import nominated, overlooked
 from estimator.closeloop.search.onset import since
 from estimator.closeloop.search.pairs import beside, try_pairs
+from estimator.closeloop.search.rivals import from_its_values
 from estimator.closeloop.search.screened import Screened
 from estimator.closeloop.search.simpler import from_the_start, simpler
 
@@ -196,14 +196,6 @@ class Search:
         promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)
         more = self.fitter.finished(distinct(promises))
         return self._form.ranked(best_by_label([*found, *more]))
-
-
-def from_its_values(found: Sequence[Hypothesis], limits: SearchPolicy) -> list[Promise]:
-    """Promises of the rivals of the best hypothesis, best first, whose other unknowns start at its values."""
-    best, *rivals = found
-    shared = {u.name: best.theta[u.name] for u in best.others}
-    near = [h for h in rivals if h.candidates and cost(h) < limits.hopeless * cost(best)][: limits.nominees]
-    return [Promise(h.candidates, 0.0, {**h.theta, **shared}) for h in near]
 
 
 def sets_in(h: Hypothesis) -> bool:

@@ -1,0 +1,135 @@
+"""Rivals of an answer are fitted from its values and as carefully as it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.closeloop.decision.verdict import confirmed_on_test, named
+from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.likelihood_profile import carefully
+from estimator.closeloop.fitting.slopes import STEP
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.search.rivals import as_carefully, from_its_values
+from estimator.record import Array, Record, Run
+from estimator.weighting import Weighting
+from tests.helpers.baselines import NOTHING, baseline
+from tests.helpers.problems import OneByOne, record_with
+from tests.helpers.verdicts import DETECTED
+
+SIZE = np.array([0.1])
+STIFFNESS = Unknown("k", 10.0, 0.0, np.inf, 10.0)
+TURNS_OFF = 3.0  # N/m too stiff a start, several turns of the motion away
+
+
+def law(kind: str) -> Candidate:
+    return Candidate(kind, "spring", (Unknown(f"{kind}_spring_q", 1.0, 0.0, np.inf, 1.0),))
+
+
+class Swinging(OneByOne):
+    """A spring of calibrated stiffness k, with an amplitude that several laws give alike."""
+
+    policy = DEFAULT
+    free_states = ()
+
+    def __init__(self, seed: int) -> None:
+        t = np.arange(4000) * 0.02
+        every = np.ones(len(t), bool)
+        y = (
+            SIZE * np.random.default_rng(seed).standard_normal((len(t), 1))
+            + np.cos(np.sqrt(10.0) * t)[:, None]
+        )
+        self.record = record_with(
+            runs=(Run(t, y, y, every, ~every, ~every),), noise_declared=np.array([True]), outputs=("y",)
+        )
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        [q] = (v for n, v in theta.items() if n.endswith("_q"))
+        return run.y - q * np.cos(np.sqrt(theta["k"]) * run.t)[:, None]
+
+
+class Refitter(Fitter):
+    """Fits without an FMU."""
+
+    def finished(
+        self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
+        guess: Mapping[str, Array] | None = None, step: float = STEP,
+    ) -> list[Hypothesis]:  # fmt: skip
+        """See Fitter."""
+        [p], weighting = promises, Weighting.white(SIZE)
+        every = [*(unknowns or ()), *p.candidates[0].unknowns]
+        return [
+            Hypothesis(p.candidates, fit(self.baseline.problem, every, weighting, p.start, step=step), ())
+        ]
+
+
+def fitted(fitter: Fitter, kind: str, k: float) -> Hypothesis:
+    c = law(kind)
+    [h] = fitter.finished([Promise((c,), 0.0, {"k": k, c.amplitudes[0].name: 1.0})], [STIFFNESS])
+    return h
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rival_that_has_not_arrived_arrives_from_the_values_of_the_answer(seed):
+    fitter = Refitter(baseline(Swinging(seed), noise=SIZE))
+    answer, beside = fitted(fitter, "a", 10.0), fitted(fitter, "b", 10.0 + TURNS_OFF)
+    assert cost(beside) > 10 * cost(answer)
+    assert cost(carefully(fitter, beside)) > 10 * cost(answer)  # its own values do not lead there
+    near = replace(beside, fit=replace(beside.fit, residual=1.2 * answer.fit.residual))
+    [found] = as_carefully(fitter, answer, [near])
+    assert found.candidates == beside.candidates
+    assert cost(found) == pytest.approx(cost(answer), abs=0.1)  # far within what noise decides
+
+
+def test_rivals_far_behind_and_the_calibrated_fmu_are_left_out():
+    fitter = Refitter(baseline(Swinging(0), noise=SIZE))
+    answer, beside = fitted(fitter, "a", 10.0), fitted(fitter, "b", 10.0 + TURNS_OFF)
+    assert as_carefully(fitter, answer, [beside, NOTHING]) == []
+
+
+def test_a_rival_keeps_its_own_values_and_takes_those_it_shares():
+    fitter = Refitter(baseline(Swinging(1), noise=SIZE))
+    answer, rival = fitted(fitter, "a", 10.0), fitted(fitter, "b", 10.2)
+    [promise] = from_its_values([answer, rival], DEFAULT.search)
+    assert promise.start["k"] == answer.theta["k"]
+    assert promise.start["b_spring_q"] == rival.theta["b_spring_q"]
+    assert "a_spring_q" not in promise.start
+
+
+# ---- the test part
+
+T = np.arange(9000.0)
+NOISE = np.ones(1)
+
+
+def over_parts(**rms: float) -> Hypothesis:
+    """An effect whose residual has these rms values on the parts to identify, to choose and to test."""
+    one = np.where(np.arange(len(T)) % 2, 1.0, -1.0)
+    size = np.repeat([rms["fit"], rms["choose"], rms["test"]], len(T) // 3)
+    c = law("a")
+    left = (one * size)[:, None]
+    return Hypothesis((c,), replace(NOTHING.fit, residual=left[: len(T) // 3, 0]), (left,))
+
+
+@pytest.mark.parametrize(
+    ("on_test", "traced"),
+    [(1.0, True), (1.06, True), (1.8, False), (5.0, False)],
+)
+def test_an_answer_accounts_for_the_test_part_as_for_the_part_to_choose(on_test, traced):
+    y = 5 * np.sin(T)[:, None]
+    parts = T * 3 // len(T)
+    run = Run(T, y[:, :0], y, *(parts == i for i in range(3)))
+    problem = Problem(lambda _: None, Record((run,), (), ("y",), NOISE), {}, {})
+    base = over_parts(fit=6.0, choose=6.0, test=6.0)
+    at = baseline(problem, replace(base, candidates=()), NOISE)
+    found = confirmed_on_test(at, named([over_parts(fit=1.0, choose=1.0, test=on_test)])).after(DETECTED)
+    assert (found.verdict == "traced") is traced
+    assert (found.verdict == "unexplained") is not traced
+    assert ("times the noise" in found.reason) is not traced
