@@ -18,6 +18,7 @@ from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_input_noise
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
+from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.resolution import resolved
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
@@ -78,7 +79,15 @@ class Chain:
             declared, baseline, detection, tuple(forces), tuple(shown.promises), (), (),
             early or Judgement(tuple(before), (), ""), diagnostics,
         )  # fmt: skip
-        return found if early else self._searched(found, shown, before)
+        return self._over_forms(found if early else self._searched(found, shown, before))
+
+    def _over_forms(self, found: Outcome) -> Outcome:
+        """The outcome, without an answer with the errors of the calibrated FMU over all plausible forms."""
+        if found.chosen:
+            return found
+        fitter = self.fitter(found.baseline, self.jobs)
+        base = self.stages.done("forms", lambda: over_forms(fitter, found.base))
+        return replace(found, baseline=replace(found.baseline, hypothesis=base))
 
     def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
         """The problem and what `calibrate` finds, with smoothed inputs if the FMU is nearer with these.

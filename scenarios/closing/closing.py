@@ -2,9 +2,10 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import product
 from math import isfinite
 from pathlib import Path
 
@@ -157,7 +158,20 @@ def pose(e: Experiment, builder: Builder) -> Problem:
     calibrate = {**form, **e.calibrate}
     declared = {**_starts(description, calibrate), **e.parameters, **e.initial}
     free = tuple(n for n in description.states if n not in e.initial)
-    return Problem(builder, record, declared, calibrate, free, builder.ports, form_error=builder.form_error)
+    return Problem(
+        builder, record, declared, calibrate, free, builder.ports,
+        form_error=builder.form_error, other_forms=_other_forms(builder, description, e.parameters),
+    )  # fmt: skip
+
+
+def _other_forms(
+    builder: Builder, description: FmuDescription, declared: Mapping[str, float]
+) -> tuple[dict[str, float], ...]:
+    """Every combination of the choices that the model's form leaves open, without the FMU's own choice."""
+    choices = {n: values for n, values in builder.form_choices.items() if n not in declared}
+    chosen = {n: description.variables[n].start for n in choices}
+    every = (dict(zip(choices, values, strict=True)) for values in product(*choices.values()))
+    return tuple(choice for choice in every if choice != chosen)
 
 
 def _starts(description: FmuDescription, calibrate: Iterable[str]) -> dict[str, float]:

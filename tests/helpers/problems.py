@@ -18,6 +18,7 @@ class OneByOne:
 
     at_once = 1
     finer = 1
+    other_forms = ()
 
     def identify_residuals(self, thetas):
         """See Problem."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from estimator.closeloop.fitting.fit import fit, weighted
 from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.refined import lower, refined
 from estimator.closeloop.fitting.resolution import in_divided_steps
 from estimator.closeloop.fitting.slopes_within_error import within_error
@@ -61,7 +62,8 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     open_by_shape = unresolved(h)
     wide = np.hypot(wide, [open_by_shape.get(u.name, 0.0) for u in h.fit.unknowns])
     factors = np.divide(wide, error, out=np.ones_like(error), where=error > 0)
-    return replace(h, fit=replace(h.fit, covariance=h.fit.covariance * np.outer(factors, factors)))
+    covariance = h.fit.covariance * np.outer(factors, factors)
+    return over_forms(fitter, replace(h, fit=replace(h.fit, covariance=covariance)))
 
 
 def carefully(fitter: Fitter, h: Hypothesis) -> Hypothesis:

@@ -67,7 +67,8 @@ class Problem:
 
     builder: builds the FMU with `effects`, pairs of kind and location; declared: values of parameters and of
     the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
-    given; form_error: share of an output that the form of the FMU leaves open; policy: the limits of the
+    given; form_error: share of an output that the form of the FMU leaves open; other_forms: values of
+    parameters that choose other forms of the model, as plausible as the chosen one; policy: the limits of the
     decision; input_noise: noise that was smoothed away in the inputs of the record; finer: parts into which
     each step of the simulation is divided. The object is small and picklable; worker processes open the FMU
     themselves.
@@ -81,6 +82,7 @@ class Problem:
     ports: tuple[PortNames, ...] = ()
     effects: tuple[tuple[str, str], ...] = ()
     form_error: float = 0.0
+    other_forms: tuple[dict[str, float], ...] = ()
     policy: Policy = DEFAULT
     input_noise: InputNoise | None = None
     finer: int = 1

@@ -44,6 +44,11 @@ class ModelBuilder:
         return model_class(self.model).form
 
     @property
+    def form_choices(self) -> Mapping[str, tuple[float, ...]]:
+        """Values of the parameters that choose a form of the model, where several are plausible."""
+        return model_class(self.model).form_choices
+
+    @property
     def form_error(self) -> float:
         """Share of an output that the model's form leaves open."""
         return model_class(self.model).form_error
@@ -108,6 +113,7 @@ class ForeignBuilder:
     folder: Path
     quick: ClassVar[bool] = False
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
     form_error: ClassVar[float] = 0.0
 
     @property
