@@ -19,7 +19,7 @@ from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_inp
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
-from estimator.closeloop.fitting.resolution import resolved
+from estimator.closeloop.fitting.resolution import in_fine_steps
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -28,6 +28,7 @@ from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
 from estimator.closeloop.search.free_form import free_form
+from estimator.closeloop.search.pairs import with_worth
 from estimator.closeloop.search.rivals import as_carefully
 from estimator.closeloop.search.screened import Screened, screened
 from estimator.closeloop.search.search import Search
@@ -187,9 +188,10 @@ class Chain:
             if not members:
                 break
             self.tell("intervals", "computing standard errors from the likelihood profile")
-            shown, again = _in_fine_steps(shown, members, judgement.members)
             fitter = self.fitter(shown.baseline, self.jobs)
-            found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, again))
+            shown, again = _in_fine_steps(fitter, shown, members, judgement.members)
+            fitter = self.fitter(shown.baseline, self.jobs)
+            found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, again, singles))
             asked |= {h.key for h in again}
             if any(new.theta != old.theta for new, old in zip(found, again, strict=True)):
                 self.tell("rivals", "fitting the rivals of the answer as carefully as the answer")
@@ -209,14 +211,14 @@ class Chain:
 
 
 def _in_fine_steps(
-    shown: Screened, new: Sequence[Hypothesis], members: Sequence[Hypothesis]
+    fitter: Fitter, shown: Screened, new: Sequence[Hypothesis], members: Sequence[Hypothesis]
 ) -> tuple[Screened, list[Hypothesis]]:
     """The problem in steps that are fine enough for the new members of an answer, and those to be profiled.
 
     If the steps become finer, these are all members, since hypotheses are compared in the same steps.
     """
     before = shown.baseline
-    finer = resolved(before.problem, new, before.noise.weighting)
+    finer = in_fine_steps(fitter, new)
     again = new if finer.finer == before.problem.finer else members
     return replace(shown, baseline=before.asked(finer)), list(again)
 
@@ -229,7 +231,15 @@ def _with_rivals(
     return [*members, *(h for some in others for h in as_carefully(fitter, best, some))]
 
 
-def _profiled(fitter: Fitter, members: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Hypotheses with their standard errors taken from the likelihood profile."""
+def _profiled(
+    fitter: Fitter, members: Sequence[Hypothesis], singles: Sequence[Hypothesis]
+) -> list[Hypothesis]:
+    """Hypotheses with their standard errors taken from the likelihood profile.
+
+    These may leave a doubt whether a pair needs both of its members, which the fits without them answer.
+    """
     tasks = (delayed(profiled)(fitter.alone, h) for h in members)
-    return list(Parallel(min(fitter.jobs, len(members)))(tasks))
+    found = list(Parallel(min(fitter.jobs, len(members)))(tasks))
+    pairs, _ = with_worth(fitter, [h for h in found if len(h.candidates) > 1], singles)
+    valued = {h.key: h for h in pairs}
+    return [valued.get(h.key, h) for h in found]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
-from estimator.closeloop.fitting.resolution import resolved
+from estimator.closeloop.fitting.resolution import in_fine_steps, resolved
 from estimator.closeloop.fitting.slopes import FINE_STEP, STEP
 from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
@@ -179,6 +179,43 @@ def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
     moves = [0.75 * size / n**2 for n in (1, 2)]  # by halving the steps, in standard errors
     if min(abs(m - 0.5) for m in moves) > 0.01:
         assert finer == (1 if moves[0] < 0.5 else 2 if moves[1] < 0.5 else limits.parts_of_a_step)
+
+
+@dataclass(frozen=True)
+class Held(Stiff):
+    """A line with a wave that an interpolated input adds or a held one: which of them is true is given."""
+
+    seed: int = 0
+    true_finer: int = 1
+
+    @property
+    def record(self):
+        record = super().record
+        [run] = record.runs
+        noise = 0.05 * np.random.default_rng(self.seed).standard_normal(run.y.shape)
+        y = run.y + self.wave(run.t, self.true_finer) + noise
+        return record_with(runs=(replace(run, y=y),), noise_declared=np.array([True]), outputs=("y",))
+
+    def wave(self, t: Array, finer: int) -> Array:
+        return (0.02 if finer > 1 else -0.02) * np.cos(40 * t)[:, None]
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        error = self.error / self.finer**2 - self.error / self.true_finer**2
+        return run.y - self.wave(run.t, self.finer) - (theta["slope"] + error) * run.t[:, None]
+
+
+@pytest.mark.parametrize("true", [1, 4])
+@pytest.mark.parametrize("seed", range(5))
+def test_finer_steps_are_not_taken_if_the_record_was_made_with_the_coarse_ones(true, seed):
+    """Between samples, finer steps change the inputs, which can be further from the truth."""
+    slope = Unknown("slope", 1.0, -10.0, 10.0, 1.0)
+    problem = Held(0.1, seed=seed, true_finer=true)
+    c = Candidate("viscous_damping", "here", (slope,))
+    fitter = Refitter(baseline(problem, noise=SIZE))
+    [h] = fitter.finished([Promise((c,), 0.0, {})])
+    assert resolved(problem, [h], Weighting.white(SIZE)).finer > 1  # by the movement of the slope alone
+    assert in_fine_steps(fitter, [h]).finer == (1 if true == 1 else 4)
 
 
 # ---- slopes of unknowns that make up for each other

@@ -23,7 +23,7 @@ from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.screen import Screening
 from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
-from estimator.closeloop.search.pairs import beside, try_pairs
+from estimator.closeloop.search.pairs import beside, try_pairs, with_worth
 from estimator.record import Run
 from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
@@ -154,6 +154,36 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, leas
     beside(asking, Hypothesis((best,), found, ()), Seen(), change, least)
     assert [p.candidates[1].label for p in fitted] == asked
     assert all(p.candidates[0] is best for p in fitted)
+
+
+@pytest.mark.parametrize(
+    ("freed", "alone", "idle"),
+    [
+        (900.0, None, []),  # much worse without the stop, whose stiffness has no upper bound
+        (104.0, None, ["bump_stop"]),  # hardly worse
+        (900.0, 104.0, ["bump_stop"]),  # the fit without it had only not arrived
+    ],
+)
+def test_a_member_that_errors_leave_in_doubt_is_needed_if_the_fit_without_it_is_worse(freed, alone, idle):
+    pair = several(("viscous_damping", "wheel"), ("bump_stop", "wheel"))
+    pair = replace(pair, fit=replace(pair.fit, values=np.array([10.0, 1.0])))  # of errors of 1
+    rest = several(("viscous_damping", "wheel"), squares=freed)
+    asked = []
+    fitter = SimpleNamespace(
+        baseline=baseline(SimpleNamespace(policy=DEFAULT)),
+        finished=lambda promises: asked.extend(promises) or [rest],
+    )
+    singles = [] if alone is None else [several(("viscous_damping", "wheel"), squares=alone)]
+    [valued], _ = with_worth(fitter, [pair], singles)
+    assert [p.label for p in asked] == ["viscous_damping@wheel"]
+    assert [c.kind for c in fitter.baseline.idle(valued)] == idle
+
+
+def test_a_pair_that_is_clear_by_its_errors_is_fitted_without_nothing():
+    pair = several(("viscous_damping", "wheel"), ("bump_stop", "wheel"))
+    pair = replace(pair, fit=replace(pair.fit, values=np.array([10.0, 10.0])))
+    fitter = SimpleNamespace(baseline=baseline(SimpleNamespace(policy=DEFAULT)))
+    assert with_worth(fitter, [pair], []) == ([pair], [])
 
 
 def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_suggests(tmp_path):

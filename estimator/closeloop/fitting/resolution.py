@@ -13,7 +13,7 @@ import numpy as np
 from estimator.closeloop.fitting.fit import weighted
 from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.fitting.slopes_within_error import within_error
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
 from estimator.weighting import Weighting
@@ -27,6 +27,25 @@ def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting)
     for h in some:
         problem = _resolved(problem, h, weighting)
     return problem
+
+
+def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
+    """The problem of the fitter in steps that are fine enough for hypotheses, if the record does not reject
+    these.
+
+    Finer steps also change what the FMU receives between two samples: inputs are interpolated there, and a
+    record may show that they were not. If the coarse steps are right, the best hypothesis fits worse in fine
+    ones; if the fine ones are right, the difference of its residuals only adds the noise along it.
+    """
+    before, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
+    finer = resolved(before, some, weighting)
+    if finer.finer == before.finer:
+        return before
+    best = min(some, key=cost)
+    again = in_divided_steps(fitter.asked(finer), best)
+    apart = float(np.linalg.norm(again.fit.residual - best.fit.residual))
+    worse = (cost(again) - cost(best)) / 2
+    return before if worse > fitter.baseline.policy.decision.telling * apart else finer
 
 
 def in_divided_steps(fitter: Fitter, h: Hypothesis) -> Hypothesis:

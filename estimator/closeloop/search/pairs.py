@@ -46,12 +46,25 @@ def try_pairs(
         promises += _partners(baseline, screening, list(alone.values())[: limits.paired], physical)
     found = fitter.hypotheses(promises, limits.finalist_pairs)
     reached = min((cost(h) for h in singles), default=cost(baseline.hypothesis))
+    certain = [h for h in found if not baseline.idle(h)]
     doubtful = [h for h in found if baseline.idle(h) and cost(h) < reached]
-    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in doubtful for c in baseline.idle(h)]
+    valued, freed = with_worth(fitter, doubtful, list(alone.values()))
+    return best_by_label([*certain, *(h for h in valued if not baseline.idle(h))]), freed
+
+
+def with_worth(
+    fitter: Fitter, found: Sequence[Hypothesis], singles: Sequence[Hypothesis]
+) -> tuple[list[Hypothesis], list[Hypothesis]]:
+    """Pairs with the worth of their members, and the fits without those members whose errors leave a doubt.
+
+    The standard error of an amplitude that has no upper bound says nothing about whether the record needs it.
+    Pairs whose members are all clear of zero by their errors stay as they are.
+    """
+    idle = {h: fitter.baseline.idle(h) for h in found}
+    without = [Promise(_rest(h, c), 0.0, h.fit.theta) for h in found for c in idle[h]]
     freed = fitter.finished(without) if without else []
-    least = {h.label: cost(h) for h in best_by_label([*alone.values(), *freed])}
-    found = [replace(h, worth=_worth(h, least)) if h in doubtful else h for h in found]
-    return [h for h in found if not baseline.idle(h)], freed
+    least = {h.label: cost(h) for h in best_by_label([*singles, *freed])}
+    return [replace(h, worth=_worth(h, least)) if idle[h] else h for h in found], freed
 
 
 def _rest(h: Hypothesis, c: Candidate) -> tuple[Candidate, ...]:
