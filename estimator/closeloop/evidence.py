@@ -31,6 +31,7 @@ Name = Literal[
     "more than another form of the model leaves",
     "the force follows the law",
     "better than without it on the test part",
+    "no worse than without it on the test part",
     "outputs left above their noise on the test part",
     "alternatives that this record does not tell apart",
     "effects that are needed",
@@ -46,6 +47,7 @@ ANSWER: tuple[Name, ...] = (
     "nothing richer gains on the part to identify",
     "the force follows the law",
     "better than without it on the test part",
+    "no worse than without it on the test part",
     "outputs left above their noise on the test part",
 )
 

@@ -346,18 +346,13 @@ class DecisionPolicy:
         "`signal_share`",
         CHALLENGE,
     )
-    explained: float = limit(
-        0.75,
-        "share of the residual's variance",
-        "share that an answer must explain if noise is not declared, so that the noise floor is unknown",
-        CHALLENGE,
-    )
-    open_single: float = limit(
+    most: float = limit(
         0.5,
-        "share of the variance beyond noise",
-        "share that one effect must explain of all outputs together if the model form is open; a residual of "
-        "which no effect could explain as much is left to the form",
-        CHALLENGE,
+        "share of the variance",
+        "share that an answer must explain of the residual's variance if noise is not declared, and that one "
+        "effect must explain of the variance beyond noise if the model form is open; a residual of which no "
+        "effect could explain as much is left to the form",
+        "derivation: what explains less than it leaves is not what the residual is mainly made of",
     )
     open_alike: float = limit(
         0.25,

@@ -16,14 +16,16 @@ LIMITS = {  # of the checks whose limit is one of the policy
     "the outputs move out of their noise": DECISION.excited,
     "the size is clear of zero": DECISION.significant,
     "better than without it on the part to choose": DECISION.telling,
-    "share of the variance taken away": DECISION.explained,
+    "share of the variance taken away": DECISION.most,
     "better than without it on the test part": DECISION.telling,
+    "no worse than without it on the test part": -DECISION.telling,
 }
 
 AT_MOST = {  # all others have to reach their limit
     "the residual is more than noise",  # a probability
     "every sensor moves",
     "outputs left above their noise",
+    "outputs left above their noise on the test part",
     "nothing richer gains on the part to identify",
     "the force follows the law",
     "alternatives that this record does not tell apart",

@@ -96,7 +96,7 @@ def test_an_open_form_leaves_what_is_like_no_effect_alone(rms, likeness, matter)
 def test_less_matters_where_the_form_is_open(a, b, likeness):
     if matters(asked(FORM), left(a, b), likeness):
         assert matters(asked(), left(a, b))
-    assert likeness >= DEFAULT.decision.open_single or not matters(
+    assert likeness >= DEFAULT.decision.most or not matters(
         asked(FORM), left(min(a, 5.9), min(b, 5.9)), likeness
     )
 

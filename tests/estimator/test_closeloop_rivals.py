@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.closeloop.decision.verdict import confirmed_on_test, named
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import carefully
@@ -15,13 +14,12 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
-from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.search.rivals import as_carefully, from_its_values
-from estimator.record import Array, Record, Run
+from estimator.record import Array, Run
 from estimator.weighting import Weighting
 from tests.helpers.baselines import NOTHING, baseline
 from tests.helpers.problems import OneByOne, record_with
-from tests.helpers.verdicts import DETECTED
 
 SIZE = np.array([0.1])
 STIFFNESS = Unknown("k", 10.0, 0.0, np.inf, 10.0)
@@ -101,35 +99,3 @@ def test_a_rival_keeps_its_own_values_and_takes_those_it_shares():
     assert promise.start["k"] == answer.theta["k"]
     assert promise.start["b_spring_q"] == rival.theta["b_spring_q"]
     assert "a_spring_q" not in promise.start
-
-
-# ---- the test part
-
-T = np.arange(9000.0)
-NOISE = np.ones(1)
-
-
-def over_parts(**rms: float) -> Hypothesis:
-    """An effect whose residual has these rms values on the parts to identify, to choose and to test."""
-    one = np.where(np.arange(len(T)) % 2, 1.0, -1.0)
-    size = np.repeat([rms["fit"], rms["choose"], rms["test"]], len(T) // 3)
-    c = law("a")
-    left = (one * size)[:, None]
-    return Hypothesis((c,), replace(NOTHING.fit, residual=left[: len(T) // 3, 0]), (left,))
-
-
-@pytest.mark.parametrize(
-    ("on_test", "traced"),
-    [(1.0, True), (1.06, True), (1.8, False), (5.0, False)],
-)
-def test_an_answer_accounts_for_the_test_part_as_for_the_part_to_choose(on_test, traced):
-    y = 5 * np.sin(T)[:, None]
-    parts = T * 3 // len(T)
-    run = Run(T, y[:, :0], y, *(parts == i for i in range(3)))
-    problem = Problem(lambda _: None, Record((run,), (), ("y",), NOISE), {}, {})
-    base = over_parts(fit=6.0, choose=6.0, test=6.0)
-    at = baseline(problem, replace(base, candidates=()), NOISE)
-    found = confirmed_on_test(at, named([over_parts(fit=1.0, choose=1.0, test=on_test)])).after(DETECTED)
-    assert (found.verdict == "traced") is traced
-    assert (found.verdict == "unexplained") is not traced
-    assert ("times the noise" in found.reason) is not traced

@@ -147,7 +147,7 @@ class Open(ModelForm):
         no_worse = after <= limits.decision.clean * before
         if np.any(_faulty(b.problem, h) & down & (was >= limits.detection.noise_share**2)):
             return np.asarray(down | no_worse)
-        half = limits.decision.open_single
+        half = limits.decision.most
         of_all = b.beyond_noise_of_all(h, part) / max(b.beyond_noise_of_all(b.hypothesis, part), TINY)
         if of_all > half or (of_all > half**2 and np.sum(left) > half * np.sum(was)):
             return down

@@ -46,7 +46,7 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
             for x in (h, base)
         )
         taken = 1 - float(after) / max(float(before), TINY)
-        found.append(Check.least("share of the variance taken away", taken, limits.explained))
+        found.append(Check.least("share of the variance taken away", taken, limits.most))
     return found
 
 
@@ -58,10 +58,21 @@ def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
     return Check(name, float(z), limit, bool(mean > limit * error))
 
 
+def no_worse(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
+    """The check that the calibrated FMU is not better than h on a part, in standard errors of the score."""
+    check = better(name, baseline, h, part)
+    return replace(check, limit=-check.limit, passed=check.value >= -check.limit)
+
+
 def above_noise(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
     """The check that h brings every output with declared noise down to it, or nearly so, on a part."""
     above = baseline.noise.declared & ~form_of(baseline).reached(h, part)
     return Check.most(name, int(np.sum(above)), 0)
+
+
+def visible(baseline: Baseline, h: Hypothesis, part: Part) -> bool:
+    """Whether h, if it is right, can be expected to lead the calibrated FMU by enough standard errors."""
+    return baseline.apart(h, baseline.hypothesis, part) / 2 > baseline.policy.decision.telling
 
 
 def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check], Judgement | None]:
@@ -93,18 +104,24 @@ def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
     """The judgement after two checks on the test part, which neither fitting nor choosing has used.
 
     The best member must be better than the calibrated FMU there too, and it must account for the residual as
-    it does on the part to choose; otherwise there is no answer. The other members are not checked, since that
-    would be a choice among them on the test part.
+    it does on the part to choose; otherwise there is no answer. An effect that hardly acts in the test part
+    cannot be confirmed by it, however right it is, and need only not be worse. The other members are not
+    checked, since that would be a choice among them on the test part.
     """
     if not found.members:
         return found
     best = found.members[0]
+    silent = not visible(baseline, best, "test")
     checks = (
-        better("better than without it on the test part", baseline, best, "test"),
+        no_worse("no worse than without it on the test part", baseline, best, "test")
+        if silent
+        else better("better than without it on the test part", baseline, best, "test"),
         above_noise("outputs left above their noise on the test part", baseline, best, "test"),
     )
     if all(c.passed for c in checks):
-        return replace(found, checks=(*found.checks, *checks))
+        unconfirmed = "; it hardly acts in the test part, which can neither confirm nor deny it"
+        reason = found.reason + unconfirmed * silent
+        return replace(found, checks=(*found.checks, *checks), reason=reason)
     gained, error = baseline.lead(best, baseline.hypothesis, "test")
     shown = f"the log score changes by {gained:.3g} there, with a standard error of {error:.2g}"
     if checks[0].passed:

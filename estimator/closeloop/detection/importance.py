@@ -33,7 +33,7 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
 
 def could_be_form(baseline: Baseline, likeness: float) -> bool:
     """Whether the residual may come from the open form, because it is like no effect; likeness: its share."""
-    return baseline.problem.form_error > 0 and likeness < baseline.policy.decision.open_single
+    return baseline.problem.form_error > 0 and likeness < baseline.policy.decision.most
 
 
 def signal_size(problem: Problem) -> Array:

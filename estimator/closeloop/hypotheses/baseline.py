@@ -51,6 +51,14 @@ class Baseline:
         error = float(np.sqrt(max(np.sum(apart**2), np.sum(np.square(sums)))))
         return float(np.sum(other**2) - np.sum(own**2)) / 2, error
 
+    def apart(self, a: Hypothesis, b: Hypothesis, part: Part) -> float:
+        """Root of the sum of squares of what two hypotheses differ in on a part, in units of the noise.
+
+        If one of them is right, its lead over the other is half of the square, with this standard error for
+        white noise, so that on average it leads by half of this many standard errors.
+        """
+        return float(np.linalg.norm(self._weighted(b, part) - self._weighted(a, part)))
+
     def _weighted(self, h: Hypothesis, part: Part) -> Array:
         """Residual of h on a part of the record in units of the noise, (m, n_y)."""
         return self.noise.weighting.of(h.of(self.problem, part), self.problem.record.stretches(part))

@@ -143,7 +143,7 @@ class Search:
         """Pairs of one effect that explains and a second effect."""
         s = self.screened
         self.tell("second", "looking for a second effect in the remaining residual")
-        least = 0.0 if self._form.exact else s.problem.policy.decision.open_single
+        least = 0.0 if self._form.exact else s.problem.policy.decision.most
         return s.stages.done("beside", lambda: beside(self.fitter, one, s.screening, self._single, least))
 
     def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:

@@ -85,7 +85,7 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
             - _squares(problem, found, h)[~declared].sum()
             / _squares(problem, found, found.base)[~declared].sum()
         )
-        needed = problem.policy.decision.explained
+        needed = problem.policy.decision.most
         if share < needed:
             yield f"explains {percent(max(share, 0.0))} of the residual's variance ({needed:.0%} needed)"
 
