@@ -1,7 +1,7 @@
 """The result of close-loop, as it is written to result.json."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -120,7 +120,11 @@ def result_of(
             "material": found.detection.material,
             "figures": dict(found.detection.figures),
         },
-        notes=[*(n.sentence for n in problem.record.notes), *_steps(problem)],
+        notes=[
+            *(n.sentence for n in problem.record.notes),
+            *_steps(problem),
+            *left_by_the_answer(problem, found, rms),
+        ],
         augmented_fmu=augmented[0].name if augmented else "",
         augmented_files=[file.name for file in augmented],
         power=[_line(v) for v in diagnostics.power] if diagnostics else [],
@@ -138,6 +142,20 @@ def _steps(problem: Problem) -> list[str]:
     return [
         f"the usual steps of the simulation were divided by {problem.finer} for the answer, because their "
         "integration error would have changed the fitted values; the error after holds for the divided steps"
+    ]
+
+
+def left_by_the_answer(problem: Problem, found: Outcome, rms: Mapping[str, Array]) -> list[str]:
+    """A note on the outputs for which an answer leaves more than noise on the test part."""
+    if not found.chosen:
+        return []
+    before, after, limit = rms["before"], rms["after"], problem.policy.decision.clean * found.noise
+    return [
+        f"{output}: the answer explains {1 - (after[j] / before[j]) ** 2:.0%} of the residual's variance on "
+        f"the test part; what is left there is {after[j] / found.noise[j]:.1f} times the noise, and the "
+        "library does not explain it"
+        for j, output in enumerate(problem.record.outputs)
+        if limit[j] < after[j] < before[j]
     ]
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.closeloop.decision.verdict import confirmed_on_test, named, visible
+from estimator.closeloop.decision.verdict import confirmed_on_test, named
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -60,7 +60,7 @@ def with_effect(size: float) -> Array:
 @pytest.mark.parametrize("size", [0.0, 1.0, 3.0])
 def test_a_test_part_without_the_effect_neither_confirms_nor_denies_it(size):
     at, found = judged(with_effect(size), with_effect(size) - np.repeat([5.0, 5.0, size / np.sqrt(N)], N))
-    assert not visible(at, found.members[0], "test")
+    assert not at.shows(found.members[0], "test")
     assert found.verdict == "traced"
     assert "neither confirm nor deny" in found.reason
     [check] = [c for c in found.checks if c.name == "no worse than without it on the test part"]
@@ -70,22 +70,22 @@ def test_a_test_part_without_the_effect_neither_confirms_nor_denies_it(size):
 def test_a_test_part_with_the_effect_has_to_confirm_it():
     effect = np.repeat([5.0, 5.0, 100 / np.sqrt(N)], N)
     at, right = judged(with_effect(100.0), with_effect(100.0) - effect)
-    assert visible(at, right.members[0], "test")
+    assert at.shows(right.members[0], "test")
     assert right.verdict == "traced"
     assert "neither" not in right.reason
     _, wrong = judged(with_effect(0.0), with_effect(0.0) - effect)
     assert wrong.verdict == "unexplained"
 
 
-def test_what_is_expected_of_a_right_answer_is_what_it_gets_on_average():
-    """Over many draws of noise, the lead of the right hypothesis is half of what it can be seen by."""
+@pytest.mark.parametrize(("size", "shown"), [(3.9, False), (4.1, True)])
+def test_a_part_shows_what_leads_by_two_standard_errors_on_average_if_it_is_right(size, shown):
     rng, leads = np.random.default_rng(2), []
-    effect = np.repeat([0.0, 0.0, 6 / np.sqrt(N)], N)
+    effect = np.repeat([0.0, 0.0, size / np.sqrt(N)], N)
     for _ in range(200):
         noise = rng.standard_normal(3 * N)
         at, _ = judged(noise + effect, noise)
-        leads.append(at.lead(leaves(noise), leaves(noise + effect), "test")[0])
-        expected = at.apart(leaves(noise), leaves(noise + effect), "test")
-    assert expected == pytest.approx(6.0)
-    assert np.mean(leads) == pytest.approx(expected**2 / 2, abs=4 * expected / np.sqrt(200))
-    assert np.std(leads) == pytest.approx(expected, rel=0.2)
+        right = leaves(noise)
+        leads.append(at.lead(right, at.hypothesis, "test")[0])
+        assert at.shows(right, "test") is shown
+    assert np.mean(leads) == pytest.approx(size**2 / 2, abs=4 * size / np.sqrt(200))
+    assert np.std(leads) == pytest.approx(size, rel=0.2)

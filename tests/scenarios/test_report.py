@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from estimator.closeloop.fitting.calibrate import calibrate
+from estimator.closeloop.policy import DEFAULT
 from estimator.plant import PLANTS
 from scenarios import close_loop
 from scenarios.closing.closing import builder_for, experiment_of, pose
 from scenarios.closing.page import sections
-from scenarios.closing.result import Result, start_values
+from scenarios.closing.result import Result, left_by_the_answer, start_values
 from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 from tests.truth.rig import write_null_record
 
@@ -135,3 +136,17 @@ def test_the_result_tells_the_start_values(page: str, demo: tuple[Result, Path])
     assert demo[0].start_values == {n: {"how": "not seen", "value": 0.0} for n in ("theta_w", "theta_r")}
     assert "would not have shown in the residual: theta_w = 0 rad, theta_r = 0 rad." in words(page)
     assert "fitted together with the parameters:" not in words(page)
+
+
+@pytest.mark.parametrize(("after", "told"), [(1.0, False), (1.04, False), (5.0, True), (12.0, False)])
+def test_what_an_answer_leaves_is_said_beside_it(after: float, told: bool) -> None:
+    """It is said where more than noise is left, and not for an output that the answer does not improve."""
+    problem = SimpleNamespace(policy=DEFAULT, record=SimpleNamespace(outputs=("speed",)))
+    found = SimpleNamespace(chosen=object(), noise=np.array([2.0]))
+    rms = {"before": np.array([20.0]), "after": np.array([2.0 * after])}
+    notes = left_by_the_answer(problem, found, rms)
+    assert len(notes) == told
+    if told:
+        assert "75% of the residual's variance" in notes[0]
+        assert "5.0 times the noise" in notes[0]
+    assert left_by_the_answer(problem, SimpleNamespace(chosen=None, noise=found.noise), rms) == []

@@ -1,16 +1,13 @@
-"""The class of hypotheses that a record cannot tell apart, and the experiment that would."""
+"""The class of hypotheses that a record cannot tell apart."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.relations import becomes, includes, one_way, reversal
-from estimator.sensor_faults import FAULTS
-from fmus.effects import EFFECTS
+from estimator.closeloop.hypotheses.relations import becomes, includes, one_way
 
 
 def equivalent(baseline: Baseline, best: Hypothesis, others: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -41,21 +38,3 @@ def _replaces(other: Hypothesis, h: Hypothesis, members: Sequence[Hypothesis]) -
     lost = one_way(h) - one_way(other)
     alike = {(c.kind, c.location) for m in members for c in m.candidates}
     return becomes(h, other) and not lost & alike
-
-
-def splitting(members: Sequence[Hypothesis]) -> str:
-    """The experiment that would tell the members of a class apart, by what their laws declare."""
-    kinds = {c.kind for m in members for c in m.candidates}
-    where = " and ".join(places := sorted({c.location for m in members for c in m.candidates}))
-    advice = []
-    if any(reversal(a, b) for a, b in combinations(kinds, 2)):
-        advice.append(f"a record in which the velocity at {where} changes its sign")
-    curves = {kind for kind in kinds & set(EFFECTS) if EFFECTS[kind].over == "velocity"}
-    if any(b != a and not reversal(a, b) for a in curves for b in kinds):
-        advice.append(f"records at two or more clearly different speeds at {where}")
-    advice += dict.fromkeys(fault.splitting for kind, fault in FAULTS.items() if kind in kinds)
-    if len(places) > 1:
-        advice.append(
-            f"a record that excites {where} by different amounts, for example at another load or torque"
-        )
-    return "; ".join(advice) or f"a record with a wider range of speed and displacement at {where}"

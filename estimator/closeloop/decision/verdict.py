@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.decision.equivalence import equivalent, splitting
+from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.detection.importance import TINY
@@ -15,7 +15,7 @@ from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
-from estimator.closeloop.hypotheses.relations import becomes
+from estimator.closeloop.hypotheses.relations import becomes, splitting
 from fmus.effects import EFFECTS
 
 
@@ -50,29 +50,21 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     return found
 
 
-def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
-    """The check that h is better than the calibrated FMU on a part, in standard errors of the log score."""
-    limit = baseline.policy.decision.telling
+def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part, sign: float = 1.0) -> Check:
+    """The check that h is better than the calibrated FMU on a part, in standard errors of the log score.
+
+    sign: -1.0 for the check that it is not worse.
+    """
+    limit = sign * baseline.policy.decision.telling
     mean, error = baseline.lead(h, baseline.hypothesis, part)
     z = mean / error if error > 0 else 0.0
-    return Check(name, float(z), limit, bool(mean > limit * error))
-
-
-def no_worse(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
-    """The check that the calibrated FMU is not better than h on a part, in standard errors of the score."""
-    check = better(name, baseline, h, part)
-    return replace(check, limit=-check.limit, passed=check.value >= -check.limit)
+    return Check(name, float(z), limit, bool(z > limit))
 
 
 def above_noise(name: Name, baseline: Baseline, h: Hypothesis, part: Part) -> Check:
     """The check that h brings every output with declared noise down to it, or nearly so, on a part."""
     above = baseline.noise.declared & ~form_of(baseline).reached(h, part)
     return Check.most(name, int(np.sum(above)), 0)
-
-
-def visible(baseline: Baseline, h: Hypothesis, part: Part) -> bool:
-    """Whether h, if it is right, can be expected to lead the calibrated FMU by enough standard errors."""
-    return baseline.apart(h, baseline.hypothesis, part) / 2 > baseline.policy.decision.telling
 
 
 def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check], Judgement | None]:
@@ -111,9 +103,9 @@ def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
     if not found.members:
         return found
     best = found.members[0]
-    silent = not visible(baseline, best, "test")
+    silent = not baseline.shows(best, "test")
     checks = (
-        no_worse("no worse than without it on the test part", baseline, best, "test")
+        better("no worse than without it on the test part", baseline, best, "test", -1.0)
         if silent
         else better("better than without it on the test part", baseline, best, "test"),
         above_noise("outputs left above their noise on the test part", baseline, best, "test"),

@@ -51,13 +51,14 @@ class Baseline:
         error = float(np.sqrt(max(np.sum(apart**2), np.sum(np.square(sums)))))
         return float(np.sum(other**2) - np.sum(own**2)) / 2, error
 
-    def apart(self, a: Hypothesis, b: Hypothesis, part: Part) -> float:
-        """Root of the sum of squares of what two hypotheses differ in on a part, in units of the noise.
+    def shows(self, h: Hypothesis, part: Part) -> bool:
+        """Whether a part can show that h is better than the calibrated FMU, if h is right.
 
-        If one of them is right, its lead over the other is half of the square, with this standard error for
-        white noise, so that on average it leads by half of this many standard errors.
+        With d the difference of their residuals, h then leads by d'd / 2 on average, with a standard error
+        of the root of d'd for white noise. That must be enough standard errors.
         """
-        return float(np.linalg.norm(self._weighted(b, part) - self._weighted(a, part)))
+        apart = self._weighted(self.hypothesis, part) - self._weighted(h, part)
+        return float(np.linalg.norm(apart)) / 2 > self.policy.decision.telling
 
     def _weighted(self, h: Hypothesis, part: Part) -> Array:
         """Residual of h on a part of the record in units of the noise, (m, n_y)."""

@@ -6,12 +6,13 @@ fitted. Effects that one particular record cannot tell apart are found in decisi
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import permutations
+from itertools import combinations, permutations
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array
+from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 
 Twins = Mapping[str, tuple[str, ...]]  # labels of twins by the label of the one that is fitted
@@ -93,3 +94,21 @@ def reversal(kind: str, other: str) -> bool:
     """Whether two kinds are the same in a motion that keeps its sign, and differ where it turns round."""
     pairs = ((kind, other), (other, kind))
     return any(b in EFFECTS[a].one_way for a, b in pairs if a in EFFECTS)
+
+
+def splitting(members: Sequence[Hypothesis]) -> str:
+    """The experiment that would tell the members of a class apart, by what their laws declare."""
+    kinds = {c.kind for m in members for c in m.candidates}
+    where = " and ".join(places := sorted({c.location for m in members for c in m.candidates}))
+    advice = []
+    if any(reversal(a, b) for a, b in combinations(kinds, 2)):
+        advice.append(f"a record in which the velocity at {where} changes its sign")
+    curves = {kind for kind in kinds & set(EFFECTS) if EFFECTS[kind].over == "velocity"}
+    if any(b != a and not reversal(a, b) for a in curves for b in kinds):
+        advice.append(f"records at two or more clearly different speeds at {where}")
+    advice += dict.fromkeys(fault.splitting for kind, fault in FAULTS.items() if kind in kinds)
+    if len(places) > 1:
+        advice.append(
+            f"a record that excites {where} by different amounts, for example at another load or torque"
+        )
+    return "; ".join(advice) or f"a record with a wider range of speed and displacement at {where}"
