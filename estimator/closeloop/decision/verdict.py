@@ -93,32 +93,32 @@ def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check],
 
 
 def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
-    """The judgement after two checks on the test part, which neither fitting nor choosing has used.
+    """The judgement after the checks on the test part, which neither fitting nor choosing has used.
 
-    The best member must be better than the calibrated FMU there too, and it must account for the residual as
-    it does on the part to choose; otherwise there is no answer. An effect that hardly acts in the test part
-    cannot be confirmed by it, however right it is, and need only not be worse. The other members are not
-    checked, since that would be a choice among them on the test part.
+    The best member must be better than the calibrated FMU there too; otherwise there is no answer. An effect
+    that hardly acts there cannot be confirmed, however right it is, and need only not be worse. Several
+    effects can imitate a mechanism that is none of them, so that they must account for the test part too. The
+    other members are not checked, since that would be a choice among them on the test part.
     """
     if not found.members:
         return found
     best = found.members[0]
     silent = not baseline.shows(best, "test")
-    checks = (
+    checks = [
         better("no worse than without it on the test part", baseline, best, "test", -1.0)
         if silent
-        else better("better than without it on the test part", baseline, best, "test"),
-        above_noise("outputs left above their noise on the test part", baseline, best, "test"),
-    )
+        else better("better than without it on the test part", baseline, best, "test")
+    ]
+    if len(best.candidates) > 1:
+        checks.append(above_noise("outputs left above their noise on the test part", baseline, best, "test"))
     if all(c.passed for c in checks):
-        unconfirmed = "; it hardly acts in the test part, which can neither confirm nor deny it"
-        reason = found.reason + unconfirmed * silent
-        return replace(found, checks=(*found.checks, *checks), reason=reason)
+        more = "; it hardly acts in the test part, which cannot confirm or deny it" * silent
+        return replace(found, checks=(*found.checks, *checks), reason=found.reason + more)
     gained, error = baseline.lead(best, baseline.hypothesis, "test")
     shown = f"the log score changes by {gained:.3g} there, with a standard error of {error:.2g}"
     if checks[0].passed:
         left = ", ".join(f"{r:.2f}" for r in best.rms(baseline.problem, "test") / baseline.noise.std)
-        shown = f"it leaves {left} times the noise of the outputs there"
+        shown = f"they leave {left} times the noise of the outputs there"
     reason = (
         f"{best.label} accounts for the residual on the part to choose, but the test part does not confirm "
         f"it: {shown}"

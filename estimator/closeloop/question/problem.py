@@ -19,6 +19,7 @@ from fmus.export.around.outside import Outside
 from fmus.host.description import PortNames
 
 START_SAMPLES = 20  # first samples from which the start value of a measured state is estimated
+HIGHEST_DEGREE = 6  # of the polynomial through them
 START_ERROR = 3.0  # times the scatter of these samples: bound of the error of that start value
 
 
@@ -142,16 +143,16 @@ class Problem:
     def start_states(self, run: Run) -> dict[str, tuple[float, float]]:
         """First guess of each free state, and a bound of its error.
 
-        If the state is measured, the guess comes from a line through the first samples; otherwise it is the
-        start value of the FMU, with an infinite bound.
+        If the state is measured, the guess comes from a polynomial through the first samples; otherwise it is
+        the start value of the FMU, with an infinite bound.
         """
         head = slice(START_SAMPLES)
         guess = {}
         for name in self.free_states:
             if name in self.measured_state:
                 t, y = run.t[head] - run.t[0], run.y[head, self.measured_state[name]]
-                line = np.polynomial.Polynomial.fit(t, y, 1)
-                guess[name] = float(line(0.0)), START_ERROR * float(np.std(y - line(t)))
+                curve = smooth_start(t, y)
+                guess[name] = float(curve(0.0)), START_ERROR * float(np.std(y - curve(t)))
             else:
                 guess[name] = self.plant.fmu.description.variables[name].start or 0.0, np.inf
         return guess
@@ -189,6 +190,20 @@ class Problem:
         """Start values of the FMU: the declared ones, and those in theta that are variables of the FMU."""
         known = self.plant.fmu.description.variables
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
+
+
+def smooth_start(t: Array, y: Array) -> np.polynomial.Polynomial:
+    """The polynomial through samples y (N,) at times t (N,) whose degree Akaike's criterion chooses.
+
+    The criterion is that of short series (C. M. Hurvich, C.-L. Tsai, Biometrika 76 (1989), 297-307). A line
+    would be wrong by far if the samples cover a large part of an oscillation.
+    """
+    n, tried = len(t), {}
+    for degree in range(1, max(1, min(HIGHEST_DEGREE, n - 4)) + 1):
+        curve, free = np.polynomial.Polynomial.fit(t, y, degree), degree + 2
+        left = float(np.sum((y - curve(t)) ** 2)) + np.finfo(float).tiny
+        tried[degree] = n * np.log(left / n) + 2 * free * n / max(n - free - 1, 1), curve
+    return min(tried.values(), key=lambda found: found[0])[1]
 
 
 def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:
