@@ -325,8 +325,8 @@ def test_a_large_free_swing_of_a_pendulum_follows_no_law_but_a_curve_is_found(tm
 
 
 NAMED = ["silverbox", "emps", "tanks", "electric_drives", "electric_drives_uniform"]
-# Richer laws in place of both effects lead by 5.9 +- 2.9 units of log score for one more unknown, so that the pair
-# that the literature knows is not in the class, though both of its effects are; see docs/benchmarks.md.
+# Richer laws lead by 5.9 +- 2.9 units of log score, so that the known pair is not in the class, but both
+# of its effects are; see docs/benchmarks.md.
 AMBIGUOUS = pytest.mark.xfail(reason="Stribeck friction and free play are named beside the pair", strict=True)
 
 
