@@ -27,6 +27,7 @@ SIZES: list[int] = MODEL["sizes"]  # how many states, inputs, parameters, output
 SETTABLE = sum(SIZES[:3])
 START = array("d", [v["start"] for v in VARIABLES])
 LARGEST = sys.float_info.max
+TOLD: set[str] = set()  # names of the instances whose note is in the log: a reset makes a new slave
 
 
 def limits(key: str, without: float) -> list[float]:
@@ -68,6 +69,7 @@ def let_go_in_time(binaries: Path) -> None:
 class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     """One instance: values of all variables in the order of the model description."""
 
+    note = ""  # what a user should know of how it runs here, in one sentence
     computed = SETTABLE  # variables from here on are brought up to date when they are asked for
 
     def __init__(self, **kwargs: Any) -> None:
@@ -78,6 +80,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         self.guid, self.version = MODEL["guid"], MODEL["version"]
         self.values = START[:]
         self.failure, self.stale = "", True
+        if self.note and kwargs["instance_name"] not in TOLD:
+            TOLD.add(kwargs["instance_name"])
+            self.log(self.note, Fmi2Status.warning)
 
     def refresh(self) -> None:
         """Compute the outputs from states, inputs and parameters."""
