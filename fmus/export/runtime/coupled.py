@@ -83,6 +83,12 @@ class Slave(common.Slave):
         self.base.leave()
         self.running = True
 
+    @common.caught
+    def terminate(self) -> None:
+        """Terminate the carried FMU."""
+        if self.running and not self.failure:
+            self.base.terminate()
+
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Keep values, and pass them on where the carried FMU runs."""
         super().set_real(vrs, values)
