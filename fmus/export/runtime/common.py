@@ -11,6 +11,7 @@ import ctypes
 import json
 import math
 import sys
+import zlib
 from array import array
 from functools import cache, wraps
 from pathlib import Path
@@ -150,17 +151,33 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
 
     @caught
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if len(state["values"]) != len(self.values):
-            raise ValueError("the saved state is not one of this FMU")
+        if "damage" in state:
+            raise ValueError(state["damage"])
         self.values[:] = array("d", state["values"])
         self.failure, self.stale = state["failure"], True
 
     @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        data = json.dumps(state).encode()
+        return json.dumps({"of": MODEL["guid"], "sum": zlib.crc32(data)}).encode() + b"\n" + data
+
+    @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        """A state from bytes, or what is wrong with them, for the refusal when it is set.
+
+        An exception here would be fmi2Fatal, after which every further call ends the host (PythonFMU 0.7).
+        """
+        head, _, data = state.partition(b"\n")
         try:
-            return dict(json.loads(state.decode("utf-8")))
-        except (ValueError, TypeError):
-            return {"values": []}  # refused when it is set
+            said = json.loads(head)
+            whole = said["sum"] == zlib.crc32(data)
+        except (ValueError, TypeError, KeyError):
+            whole = False
+        if not whole:
+            return {"damage": "the bytes of the saved state are damaged; nothing was restored"}
+        if said["of"] != MODEL["guid"]:
+            return {"damage": "the saved state is not one of this FMU; nothing was restored"}
+        return dict(json.loads(data))
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description, completed by what PythonFMU leaves out."""
