@@ -28,9 +28,11 @@ from fmus.export.provenance import (
     common,
     on_page,
     record,
+    rights,
     sealed,
 )
-from fmus.export.table import sizes, unit_table, variable_table
+from fmus.export.table import STOP, sizes, unit_table, variable_table
+from fmus.export.zipped import entry
 from fmus.model import Model, equations
 
 HERE = Path(__file__).parent
@@ -58,7 +60,6 @@ except ImportError as error:
     need = error.name
     raise ImportError("{name} needs the Python package %s: run 'pip install %s'" % (need, need)) from error
 '''
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,13 @@ def build_python(model: Model, out: Path, origin: Origin | None = None) -> Path:
     card = {
         "description": model.about,
         "step_size": model.step_size,
+        "rights": rights(model),
+        "experiment": {
+            "startTime": 0.0,
+            "stopTime": STOP,
+            "tolerance": model.tolerance,
+            "stepSize": model.step_size,
+        },
         "sizes": sizes(model),
         "units": unit_table(v.unit for v in model.variables.values()),
         "variables": variable_table(model),
@@ -104,14 +112,14 @@ def pack(content: Content, out: Path) -> Path:
     target.parent.mkdir(parents=True, exist_ok=True)
     about = {**common(content.name, "python", 2), **content.provenance}
     with tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
-        entry, package = _write_sources(content, Path(folder))
+        script, package = _write_sources(content, Path(folder))
         documents = Path(folder) / "documentation"
         documents.mkdir()
         (documents / "index.html").write_text(on_page(content.page, about), encoding="utf-8")
         bundled = [f"{package.name}.{f}" for f in ("common", *content.modules)]
-        with _clean_imports(entry.stem, package.name, *bundled):
+        with _clean_imports(script.stem, package.name, *bundled):
             packed = FmuBuilder.build_FMU(
-                entry,
+                script,
                 Path(folder) / "packed.fmu",
                 project_files=[package],
                 documentation_folder=documents,
@@ -140,10 +148,10 @@ def _write_sources(content: Content, folder: Path) -> tuple[Path, Path]:
     place.mkdir()
     for name, data in files.items():
         (place / name).write_bytes(data)
-    entry = folder / f"{place.name}_entry.py"
+    script = folder / f"{place.name}_entry.py"
     text = ENTRY.format(name=content.name, package=place.name, description=card["description"])
-    entry.write_text(text, encoding="utf-8")
-    return entry, place
+    script.write_text(text, encoding="utf-8")
+    return script, place
 
 
 def documentation(name: str, card: dict[str, Any], effects: Sequence[str], extra: str = "") -> str:
@@ -171,4 +179,4 @@ def _repack(source: Path, target: Path, about: dict[str, Any]) -> None:
     files[PLACE] = sealed(about, files)
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
         for name in sorted(files):
-            new.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], compress_type=zipfile.ZIP_DEFLATED)
+            new.writestr(entry(name), files[name], compress_type=zipfile.ZIP_DEFLATED)

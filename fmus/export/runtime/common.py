@@ -197,7 +197,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         root.set("guid", str(self.guid))
         del root.attrib["generationDateAndTime"]  # the same source gives the same bytes
         root.set("variableNamingConvention", "flat")
+        made_by = f"railfmi {MODEL['version']} with PythonFMU {MODEL['pythonfmu']}"
+        for key, value in {"generationTool": made_by, **MODEL.get("rights", {})}.items():
+            root.set(key, value)
         place = [node.tag for node in root].index("LogCategories")
+        if "experiment" in MODEL:
+            times = {k: repr(float(v)) for k, v in MODEL["experiment"].items()}
+            root.insert(place + 1, Element("DefaultExperiment", times))
         root.insert(place, units_xml())
         for node, v in zip(root.iter("ScalarVariable"), VARIABLES, strict=True):
             complete(node, v)
