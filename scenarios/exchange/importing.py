@@ -24,6 +24,7 @@ from fmus.units import conversion
 from scenarios.exchange.settings import PLACE
 from scenarios.exchange.toml_text import toml_text
 from scenarios.output import writable
+from scenarios.simulating.expression import in_formula
 from scenarios.simulating.reading import load_scenario
 
 Tell = Callable[[str], None]
@@ -171,7 +172,7 @@ def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: lis
 
 def _finite(name: str, fmu: FmuDescription) -> dict[str, Any]:
     """Expectations for FMUs about which nothing else is known."""
-    parts = [f"max(abs({name}.{output})) < 1e300" for output in fmu.outputs]
+    parts = [f"max(abs({in_formula(f'{name}.{output}')})) < 1e300" for output in fmu.outputs]
     return {"that": " and ".join(parts), "because": f"the outputs of {name} stay finite"}
 
 

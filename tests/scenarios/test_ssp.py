@@ -19,11 +19,12 @@ from numpy.testing import assert_allclose
 from fmus.errors import BadInput
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.provenance import PLACE
-from fmus.export.ssp import read_package
+from fmus.export.ssp import Component, Link, System, read_package, write_package
 from fmus.export.ssp.source import signal_source
 from fmus.host.fmu import Fmu
 from fmus.host.master.recording import read_recording
 from fmus.model import Model
+from fmus.models import MODELS
 from fmus.variables import (
     Input,
     Output,
@@ -33,7 +34,7 @@ from fmus.variables import (
 from scenarios.exchange import export_ssp, import_ssp
 from scenarios.exchange.toml_text import toml_text
 from scenarios.simulating import run
-from tests.helpers.packed import repacked
+from tests.helpers.packed import repacked, with_description
 from tests.helpers.paths import ROOT
 from tests.helpers.scenario_files import (
     GOOD,
@@ -516,3 +517,29 @@ TABLES = st.recursive(
 @given(TABLES)
 def test_toml_that_is_written_is_read_again(table):
     assert tomllib.loads(toml_text(table)) == table
+
+
+def test_a_package_whose_variables_have_brackets_is_imported_and_run(tmp_path):
+    """Names as Modelica's tools give them, in connections, values and expectations."""
+    plain, named = build_python(MODELS["drive"](), tmp_path / "plain"), tmp_path / "named.fmu"
+    for old, new in (("q_dot", "der(body[1].q)"), ("F_ext", "body[1].f[2,1]"), ("M", "body[1].mass of it")):
+        replacement = f'name="{new}"'.encode()
+        with_description(plain, named, f'name="{old}"'.encode(), replacement)
+        plain = named.rename(tmp_path / f"{old}.fmu")
+    fmu = Component("a", "resources/a.fmu", start={"body[1].mass of it": (50.0, "kg"), "F": (1.0, "N")})
+    other = Component("b", "resources/b.fmu")
+    system = System(
+        name="brackets",
+        components=(fmu, other),
+        links=(Link(("a", "der(body[1].q)"), ("b", "body[1].f[2,1]"), gain=100.0),),
+        stop=0.1,
+        step=0.01,
+    )
+    data = {c.source: plain.read_bytes() for c in (fmu, other)}
+    scenario = import_ssp(write_package(system, data, tmp_path / "it.ssp"), tmp_path / "back")
+    result = run(scenario, tmp_path / "out")
+    assert result.ok
+    table = tomllib.loads(scenario.read_text(encoding="utf-8"))
+    assert 'max(abs("a.der(body[1].q)")) < 1e300' in table["expect"][0]["that"]
+    recorded = read_recording(result.folder / next(iter(result.runs.values())).recording).data
+    assert np.abs(recorded["b.q"]).max() > 0  # pushed through the connection
