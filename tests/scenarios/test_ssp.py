@@ -385,6 +385,33 @@ def test_a_value_in_another_unit_is_converted(loop, tmp_path):
     assert table["fmus"]["rig"]["initial"]["omega_w"] == pytest.approx(2 * np.pi)
 
 
+MAPPING = """<ssm:ParameterMapping version="1.0"
+    xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">
+  <ssm:MappingEntry source="set.omega_w" target="omega_w">
+    <ssc:LinearTransformation factor="0.5" offset="1.0"/></ssm:MappingEntry>
+  <ssm:MappingEntry source="set.omega_w" target="omega_r"/>
+  <ssm:MappingEntry source="set.not_there" target="theta_w"/>
+</ssm:ParameterMapping>"""
+
+
+@pytest.mark.parametrize("inline", [False, True])
+def test_parameters_go_where_a_mapping_says(loop, tmp_path, inline):
+    """Two targets of one value, a factor and an offset, a prefix, and names of no variable."""
+    inner = f">{MAPPING}</ssd:ParameterMapping>" if inline else ' source="m.ssm"/>'
+    binding = f'<ssd:ParameterBinding source="resources/rig.ssv" prefix="set."><ssd:ParameterMapping{inner}'
+    pattern = r'<ssd:ParameterBinding source="resources/rig.ssv" />'
+    other = edited(loop, tmp_path / "other.ssp", pattern, f"{binding}</ssd:ParameterBinding>")
+    with zipfile.ZipFile(other, "a") as packed:
+        packed.writestr("m.ssm", MAPPING)
+    said = []
+    table = tomllib.loads(import_ssp(other, tmp_path / "back", said.append).read_text(encoding="utf-8"))
+    assert table["fmus"]["rig"]["initial"] == {"omega_w": 7.08, "omega_r": 12.16}
+    left_out = [line for line in said if "is not in its FMU and is left out" in line]
+    assert any("'set.omega_r' of component 'rig'" in line for line in left_out)
+    assert not any("omega_w'" in line for line in left_out)
+
+
 def test_what_hangs_on_the_system_s_own_connectors_is_left_out_and_told(loop, tmp_path):
     outer = '<ssd:Connectors><ssd:Connector name="speed" kind="output"/></ssd:Connectors><ssd:Elements>'
     other = edited(loop, tmp_path / "other.ssp", "<ssd:Elements>", outer)
@@ -428,7 +455,7 @@ def test_a_file_that_was_changed_is_told(loop, tmp_path):
             r'<ssd:ParameterBinding source="resources/rig.ssv" />',
             '<ssd:ParameterBinding source="resources/rig.ssv"><ssd:ParameterMapping source="m.ssm"/>'
             "</ssd:ParameterBinding>",
-            "are mapped",
+            "the mapping of parameters of 'rig' is 'm.ssm', which is missing",
         ),
     ],
 )
