@@ -26,9 +26,8 @@ class Equations:
             from .symbolic import entries
 
             self._entries: dict[str, Any] = entries(code)
-        except (
-            Exception
-        ) as error:  # whatever a version of CasADi may lack, the numbers are the same without it
+        except Exception as error:
+            # whatever a version of CasADi may lack, the numbers are the same without it
             why = "is not installed" if isinstance(error, ImportError) else f"cannot build them ({error})"
             self.note = (
                 f"the equations run in plain Python, which is slower, because the package casadi {why}"

@@ -128,7 +128,9 @@ def choice(_x: Any, n_in: int, _n_out: int, cases: list[Helper]) -> cs.Function:
     return cs.Function("choose", [x], switch.call([x[0], x[1:]], False, True))
 
 
-TABLES: dict[tuple[int, int], cs.Function] = {}
+TABLES: dict[
+    tuple[int, int], tuple[list[float], cs.Function]
+] = {}  # with the table, which keeps its identity
 
 
 def rows(table: list[float], place: Any, n: int) -> list[Any]:
@@ -136,8 +138,9 @@ def rows(table: list[float], place: Any, n: int) -> list[Any]:
     key = id(table), n
     if key not in TABLES:
         at = cs.MX.sym("at")
-        TABLES[key] = cs.Function("rows", [at], [cs.MX(cs.DM(table))[at + cs.DM(range(n))]])
-    return Helper(TABLES[key])([place])
+        found = cs.Function("rows", [at], [cs.MX(cs.DM(table))[at + cs.DM(range(n))]])
+        TABLES[key] = table, found
+    return Helper(TABLES[key][1])([place])
 
 
 WORDS: dict[str, Any] = {
