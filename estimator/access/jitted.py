@@ -55,7 +55,7 @@ def _run(fmi3, way, fn, components, saved, set_refs, get_refs, values, out, t, d
         if status <= WARNING and way == 2:
             status = initialise(fmi3, fn, c, t)
         if status <= WARNING and dt > 0:
-            status = advance(fmi3, fn[STEP], c, t, dt, answers)
+            status = advance(fmi3, fn[STEP], c, t, dt, answers, way != 1)
             if fmi3 and (told[1] | told[2]) != 0:
                 status = np.int32(REFUSED)
         if status <= WARNING:

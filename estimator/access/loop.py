@@ -82,7 +82,7 @@ class _Copy:
         self._mine, self._found = self._in[: len(recipe.set_refs)], np.ctypeslib.as_array(self._out)
         self._set = setter(f, component, refs, memory)
         self._get = getter(f, component, recipe.get_refs, self._out)
-        self._step, self._enter = stepper(f, component), entrance(f, component)
+        self._step, self._enter = stepper(f, component, recipe.way is not Way.RESUME), entrance(f, component)
         self._prepare = {Way.SET: self._set, Way.RESUME: self._resume, Way.RESTART: self._restart}[recipe.way]
         self._calls, self._component, self._t0 = f.calls, c_void_p(component), recipe.t0
         self._saved = c_void_p(saved[number]) if saved else None

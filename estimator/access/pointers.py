@@ -68,16 +68,19 @@ def getter(f: Functions, component: int, references: NDArray[np.uint32], values:
     return lambda: raw(c_void_p(component), refs, n, values, *size)
 
 
-def stepper(f: Functions, component: int) -> Call:
-    """A call (t, dt) that makes a step; a step that an FMI 3.0 FMU ends early counts as an error."""
+def stepper(f: Functions, component: int, final: bool) -> Call:
+    """A call (t, dt) that makes a step; a step that an FMI 3.0 FMU ends early counts as an error.
+
+    final: whether no state from before the end of a step will come back.
+    """
     raw = f.calls["step"]
     if not f.fmi3:
-        return lambda t, dt: raw(c_void_p(component), c_double(t), c_double(dt), 1)
+        return lambda t, dt: raw(c_void_p(component), c_double(t), c_double(dt), int(final))
     event, ends, early, reached = c_bool(), c_bool(), c_bool(), c_double()
     told = [byref(v) for v in (event, ends, early, reached)]
 
     def step(t: float, dt: float) -> int:
-        status: int = raw(c_void_p(component), c_double(t), c_double(dt), True, *told)
+        status: int = raw(c_void_p(component), c_double(t), c_double(dt), final, *told)
         return 3 if ends.value or early.value else status
 
     return step

@@ -3,6 +3,7 @@
 Nothing in it depends on when or where the FMU was built, so that the same build gives the same bytes.
 """
 
+import inspect
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -22,6 +23,11 @@ from fmus.variables import Parameter
 
 HERE = Path(__file__).parent
 FOLDER = "extra/org.railfmi"  # FMI and SSP: a folder named by the reversed domain of who adds it
+OWN = {
+    "author": "the authors of railfmi",
+    "copyright": "Copyright the authors of railfmi",
+    "license": "Apache-2.0",
+}
 PLACE = f"{FOLDER}/provenance.json"
 
 
@@ -67,6 +73,11 @@ def record_around(
         "effects": [_named(effect, location, values) for effect, location in effects],
         "origin": None if origin is None else asdict(origin),
     }
+
+
+def rights(model: Model) -> dict[str, str]:
+    """Author, copyright and license for a model description: those of a model of railfmi, else none."""
+    return OWN if Path(inspect.getfile(type(model))).is_relative_to(HERE.parent) else {}
 
 
 def common(model: str, kind: str, fmi: int) -> dict[str, Any]:

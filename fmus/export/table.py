@@ -13,6 +13,7 @@ from fmus.variables import (
     Variable,
 )
 
+STOP = 10.0  # s, of the default experiment
 KINDS = (State, Input, Parameter, Output)
 
 

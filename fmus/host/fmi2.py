@@ -52,15 +52,18 @@ class Fmi2Instance(Instance):
 
     def get(self, references: Sequence[int]) -> list[float]:
         """Read Real variables."""
+        self._initialised()
         values: list[float] = self._call(self._slave.getReal, list(references))
         return values
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt, s."""
-        self._call(self._slave.doStep, t, dt)
+        self._initialised()
+        self._call(self._slave.doStep, t, dt, int(self.final))
 
     def state(self) -> Any:
         """A saved FMU state."""
+        self.final = False
         return self._call(self._slave.getFMUstate)
 
     def restore(self, state: Any) -> None:
@@ -74,6 +77,7 @@ class Fmi2Instance(Instance):
 
     def deserialised(self, data: bytes) -> Any:
         """A saved FMU state from bytes."""
+        self.final = False
         return self._call(self._slave.deSerializeFMUstate, data)
 
     def forget(self, state: Any) -> None:
@@ -92,7 +96,7 @@ class Fmi2Instance(Instance):
         raw, component = self._slave.dll.fmi2DoStep, self._slave.component
 
         def step(t: float, dt: float) -> int:
-            status: int = raw(component, t, dt, 1)
+            status: int = raw(component, t, dt, self.final)
             return status
 
         return step

@@ -39,16 +39,19 @@ class Fmi3Instance(Instance):
 
     def get(self, references: Sequence[int]) -> list[float]:
         """Read Float64 variables."""
+        self._initialised()
         values: list[float] = self._call(self._slave.getFloat64, list(references))
         return values
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt, s; CallFailed also where the FMU wants to stop."""
-        _, ends, early, reached = self._call(self._slave.doStep, t, dt)
+        self._initialised()
+        _, ends, early, reached = self._call(self._slave.doStep, t, dt, self.final)
         self._refuse_to_stop(t, ends, early, reached)
 
     def state(self) -> Any:
         """A saved FMU state."""
+        self.final = False
         return self._call(self._slave.getFMUState)
 
     def restore(self, state: Any) -> None:
@@ -62,6 +65,7 @@ class Fmi3Instance(Instance):
 
     def deserialised(self, data: bytes) -> Any:
         """A saved FMU state from bytes."""
+        self.final = False
         return self._call(self._slave.deserializeFMUState, data)
 
     def forget(self, state: Any) -> None:
@@ -82,7 +86,7 @@ class Fmi3Instance(Instance):
         told = [byref(value) for value in (event, ends, early, reached)]
 
         def step(t: float, dt: float) -> int:
-            status: int = raw(component, t, dt, True, *told)
+            status: int = raw(component, t, dt, self.final, *told)
             if status <= WARNING:
                 self._refuse_to_stop(t, ends.value, early.value, reached.value)
             return status

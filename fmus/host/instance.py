@@ -5,6 +5,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from ctypes import c_double, c_uint, c_void_p, cast
 from functools import cache
 from itertools import count
@@ -31,7 +32,12 @@ class CallFailed(Exception):
 
 
 class Instance(ABC):
-    """One instance between instantiation and free; references are FMI value references."""
+    """One instance between instantiation and free; references are FMI value references.
+
+    It calls what FMI's state machine allows at each place: a new instance is not reset, nothing is read and
+    no step is made before initialisation, and a running one is terminated before it is freed. Once a state
+    was saved, steps no longer promise that no earlier state comes back.
+    """
 
     FMI3: ClassVar[bool]
     CALLS: ClassVar[tuple[str, str, str]]  # names of the functions that set, step and get
@@ -40,6 +46,8 @@ class Instance(ABC):
         unique = f"{name}_{next(NUMBERS)}"
         self._name, self.messages = unique, MESSAGES[unique]
         self._fatal = ""  # why no call may be made any more, not even to free it
+        self._new, self._running = True, False  # instantiated and nothing else; initialised and not failed
+        self.final = True  # no state before the end of a step will come back
         with STARTING:
             path, here = sys.path.copy(), Path.cwd()
             try:
@@ -116,13 +124,17 @@ class Instance(ABC):
     def enter(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
         """Reset, set the values, begin initialisation at t0: inputs can be set and outputs read."""
         self.messages.clear()
-        self._call(self._slave.reset)
+        self._running = False
+        if not self._new:
+            self._call(self._slave.reset)
         self.set(references, values)
+        self._new = False
         self._enter_initialisation(t0)
 
     def leave(self) -> None:
         """End initialisation."""
         self._call(self._slave.exitInitializationMode)
+        self._running = True
 
     def pusher(self, references: Sequence[int]) -> tuple[Any, Callable[[], int]]:
         """A C array, and a raw call that sets variables to what it holds and returns its status."""
@@ -165,6 +177,7 @@ class Instance(ABC):
         of this very time. The loop of every simulation: raw calls on arrays made once.
         """
         self._refuse_after_fatal()
+        self._initialised()
         n_u, n_y = len(set_refs), len(get_refs)
         y = np.empty((len(t) - 1, n_y))
         rows, last = ((u[1:] + u[:-1]) / 2, u[1:]) if n_u and len(u) == len(t) else (u, None)
@@ -213,6 +226,7 @@ class Instance(ABC):
             np.array(get_refs, dtype=np.uint32),
             y,
             told,
+            self.final,
         )
         if k >= 0:
             if status <= WARNING:
@@ -229,6 +243,9 @@ class Instance(ABC):
 
     def close(self) -> None:
         """Free the instance and unload the library; one that failed fatally stays where it is."""
+        if self._running:
+            with suppress(CallFailed):  # it is done with all the same
+                self._call(self._slave.terminate)
         if not self._fatal:
             self._slave.freeInstance()
         MESSAGES.pop(self._name, None)
@@ -247,7 +264,13 @@ class Instance(ABC):
         if self._fatal:
             raise CallFailed(f"cannot be used any more after a fatal failure ({self._fatal})")
 
+    def _initialised(self) -> None:
+        """CallFailed where nothing can be read and no step be made yet."""
+        if self._new:
+            raise CallFailed("it is not initialised; restart it first")
+
     def _failed(self, what: str, status: int) -> str:
+        self._new = self._running = False
         reason = self._reason(what)
         if status == FATAL:
             self._fatal = reason

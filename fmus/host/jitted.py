@@ -19,7 +19,6 @@ WHOLE, REAL, BOOL, INT = ir.IntType(64), ir.DoubleType(), ir.IntType(8), ir.IntT
 KINDS = {WHOLE: types.int64, REAL: types.float64, BOOL: types.uint8, INT: types.int32}
 WARNING = 1
 STOPPED = -1  # an FMI 3.0 FMU ended a step early, or wants to end the simulation
-YES = np.uint8(1)
 
 
 def external(*kinds: Any) -> Any:
@@ -49,17 +48,20 @@ def _transfer(fmi3, address, component, refs, n, values):  # type: ignore[no-unt
     return values2(address, (component, refs, n, values))
 
 
-def _advance(fmi3, address, component, t, dt, told):  # type: ignore[no-untyped-def]
-    """Make a step; told: address of what FMI 3.0 answers, 8 bytes each for event, ends, early, time."""
+def _advance(fmi3, address, component, t, dt, told, final):  # type: ignore[no-untyped-def]
+    """Make a step; told: address of what FMI 3.0 answers, 8 bytes each for event, ends, early, time.
+
+    final: whether no state from before its end will come back.
+    """
     if fmi3:
-        return step3(address, (component, t, dt, YES, told, told + 8, told + 16, told + 24))
-    return step2(address, (component, t, dt, np.int32(1)))
+        return step3(address, (component, t, dt, np.uint8(final), told, told + 8, told + 16, told + 24))
+    return step2(address, (component, t, dt, np.int32(final)))
 
 
 transfer, advance = (numba.njit(cache=True)(function) for function in (_transfer, _advance))
 
 
-def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told):  # type: ignore[no-untyped-def]
+def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told, final):  # type: ignore[no-untyped-def]
     """Steps through t; (-1, 0), or the step that failed and its status or STOPPED."""
     push, step, pull = calls
     n, m = u.shape[1], y.shape[1]
@@ -73,7 +75,7 @@ def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told):  # 
         if n > 0:
             status = transfer(fmi3, push, component, into, n, rows + 8 * n * k)
         if status <= WARNING:
-            status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], answers)
+            status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], answers, final)
             if fmi3 and status <= WARNING and (told[1] | told[2]) != 0:
                 return k, np.int32(STOPPED)
         if status <= WARNING and settles:
@@ -91,7 +93,7 @@ def march() -> Callable[..., tuple[int, int]]:
 
     calls: addresses of the functions that set, step and get; u: (N-1, n_u) acts over a step; ends: (N-1, n_u)
     is set after it, (0, n_u) for none; told: (4,) int64, all 0, becomes what the last step of an FMI 3.0 FMU
-    answered: event, ends, early, the time that it reached.
+    answered: event, ends, early, the time that it reached; final: whether no earlier state will come back.
     """
     compiled: Callable[..., tuple[int, int]] = numba.njit(cache=True, nogil=True)(_march)
     return compiled

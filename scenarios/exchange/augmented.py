@@ -23,6 +23,7 @@ from fmus.host.description import FmuDescription
 from scenarios.exchange.exporting import export_ssp
 from scenarios.exchange.form import Kind
 from scenarios.exchange.toml_text import toml_text
+from scenarios.simulating.expression import in_formula
 
 BASE, EFFECTS = "base", "effects"  # members of the system
 TIME, DATA = "time", "record.csv"
@@ -80,9 +81,10 @@ def _scenario(
     t, base, plugs = record.runs[0].t, describe(fmu), model.plugs
     longest = MOST // (2 * max(len(record.inputs), 1)) * step
     outputs = [name for name in record.outputs if name in base.outputs]
-    panels = [{"draw": [f"{BASE}.{name}"], "label": name} for name in outputs]
+    written = {name: in_formula(f"{BASE}.{name}") for name in outputs}
+    panels = [{"draw": [written[name]], "label": name} for name in outputs]
     expected = [
-        {"that": f"max(abs({BASE}.{name})) < 1e300", "because": f"{name} stays finite"} for name in outputs
+        {"that": f"max(abs({written[name]})) < 1e300", "because": f"{name} stays finite"} for name in outputs
     ]
     return {
         "question": f"How does {base.name} behave with the effects found: {model.about}?",

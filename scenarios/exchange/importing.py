@@ -24,6 +24,7 @@ from fmus.units import conversion
 from scenarios.exchange.settings import PLACE
 from scenarios.exchange.toml_text import toml_text
 from scenarios.output import writable
+from scenarios.simulating.expression import in_formula
 from scenarios.simulating.reading import load_scenario
 
 Tell = Callable[[str], None]
@@ -50,14 +51,14 @@ def import_ssp(package: str | Path, out: str | Path, tell: Tell = lambda _: None
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(data)
     try:
-        table = _scenario(system, files, folder)
+        table = _scenario(system, files, folder, lambda line: tell(f"{package}: {line}"))
     except BadInput as error:
         raise BadInput(f"{package}: {error}") from error
     (folder / FILE).write_text(toml_text(table), encoding="utf-8")
     return load_scenario(folder / FILE).file
 
 
-def _scenario(system: System, files: Mapping[str, bytes], folder: Path) -> dict[str, Any]:
+def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Tell) -> dict[str, Any]:
     ours = _settings(files)
     sources = _sources(system, files)
     members = [c for c in system.components if c.name not in sources]
@@ -71,7 +72,7 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path) -> dict[
         "duration": _duration(system),
         "step": _step(system, ours, fmus),
     }
-    table["fmus"] = {names[c.name]: _member(c, fmus[c.name], names[c.name], inputs) for c in members}
+    table["fmus"] = {names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, tell) for c in members}
     links = [link for link in system.links if link.source[0] not in sources]
     table["connections"] = [_wire(link, fmus, names, ours.get("delayed", [])) for link in links]
     for link in system.links:
@@ -130,13 +131,16 @@ def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
     return float(ours.get("step") or min(own, default=STEP))
 
 
-def _member(c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any]) -> dict[str, Any]:
-    """An FMU with its values; values of inputs are added to `inputs`."""
+def _member(
+    c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any], tell: Tell
+) -> dict[str, Any]:
+    """An FMU with its values; values of inputs are added to `inputs`, and those of no variable are told."""
     member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
     for variable, (value, unit) in c.start.items():
         known = fmu.variables.get(variable)
         if known is None:
-            raise BadInput(f"parameter '{variable}' of component '{c.name}' is not in its FMU; correct it")
+            tell(f"parameter '{variable}' of component '{c.name}' is not in its FMU and is left out")
+            continue
         if unit is not None and known.unit is not None:
             factor, offset = conversion(unit, known.unit, f"parameter '{variable}' of '{c.name}'")
             value = factor * value + offset
@@ -171,7 +175,7 @@ def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: lis
 
 def _finite(name: str, fmu: FmuDescription) -> dict[str, Any]:
     """Expectations for FMUs about which nothing else is known."""
-    parts = [f"max(abs({name}.{output})) < 1e300" for output in fmu.outputs]
+    parts = [f"max(abs({in_formula(f'{name}.{output}')})) < 1e300" for output in fmu.outputs]
     return {"that": " and ".join(parts), "because": f"the outputs of {name} stay finite"}
 
 

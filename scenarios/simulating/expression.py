@@ -1,9 +1,15 @@
-"""Expressions over signals, such as 'max(abs(variant.fmu.output)) < 2e-3'; no other code can be run."""
+"""Expressions over signals, such as 'max(abs(variant.fmu.output)) < 2e-3'; no other code can be run.
+
+A signal whose name is no name in a formula stands in quotes: 'max(abs("fmu.gear[2].phi")) < 2e-3'.
+"""
 
 import ast
+import json
 import operator
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from keyword import iskeyword
 from types import MappingProxyType
 from typing import Any
 
@@ -105,9 +111,16 @@ def statement(text: str, where: str) -> Statement:
     return Statement(text, where, tree, tuple(dict.fromkeys(names)))
 
 
+def in_formula(signal: str) -> str:
+    """The name of a signal as a formula holds it: in quotes where it has brackets, spaces or the like."""
+    parts = signal.split(".")
+    plain = signal.isascii() and all(p.isidentifier() and not iskeyword(p) for p in parts)
+    return signal if plain else json.dumps(signal, ensure_ascii=False)
+
+
 def _parsed(text: str, where: str) -> ast.expr:
     try:
-        return ast.parse(" ".join(text.split()), mode="eval").body
+        return ast.parse(re.sub(r"[\r\n]", " ", text).strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise BadInput(
             f"{where}: '{text[:80]}' is not a formula; write one such as 'max(abs(fmu.output)) < 3e3'"
@@ -137,6 +150,8 @@ def _names(node: ast.expr, where: str) -> Iterator[str]:
             return
         case ast.Name() | ast.Attribute():
             yield _dotted(node, where)
+        case ast.Constant(value=str() as name) if "." in name:
+            yield name
         case ast.UnaryOp(op=op, operand=inner) if type(op) in SIGNS:
             yield from _names(inner, where)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
@@ -175,7 +190,8 @@ def _is_signal(node: ast.expr) -> bool:
     """Whether a formula gives a signal, not a number."""
     match node:
         case ast.Constant() | ast.Name() | ast.Attribute():
-            return not (isinstance(node, ast.Constant) or getattr(node, "id", "") in CONSTANTS)
+            is_number = isinstance(node, ast.Constant) and not isinstance(node.value, str)
+            return not (is_number or getattr(node, "id", "") in CONSTANTS)
         case ast.UnaryOp(operand=inner):
             return _is_signal(inner)
         case ast.Call(func=ast.Name(id=name), args=arguments):
@@ -195,6 +211,8 @@ def _value(node: ast.expr, lookup: Lookup, where: str) -> Value:
             return Value(CONSTANTS[name])
         case ast.Name() | ast.Attribute():
             return lookup(_dotted(node, where))
+        case ast.Constant(value=str() as name):
+            return lookup(name)
     try:
         match node:
             case ast.UnaryOp(op=op, operand=inner):

@@ -6,6 +6,7 @@ import sys
 import textwrap
 import zipfile
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -41,6 +42,34 @@ def xml_of(path):
 @pytest.mark.parametrize("effects", [(), ("all",)], ids=["bare", "all effects"])
 def test_validation_has_nothing_to_object(built, name, effects):
     assert problems(built(name, *effects)) == []
+
+
+@pytest.mark.parametrize("build", [build_python, build_native])
+def test_description_says_whose_it_is_what_made_it_and_how_to_run_it(build, tmp_path):
+    path = build(Drive(), tmp_path)
+    root = xml_of(path)
+    assert root.get("license") == "Apache-2.0"
+    assert root.get("author") == "the authors of railfmi"
+    assert root.get("copyright").startswith("Copyright")
+    assert root.get("version") == version("railfmi")
+    assert root.get("generationTool").startswith(f"railfmi {version('railfmi')}")
+    experiment = root.find("DefaultExperiment")
+    assert float(experiment.get("stepSize")) == Drive.step_size
+    assert float(experiment.get("stopTime")) > float(experiment.get("startTime")) == 0
+    assert problems(path) == []
+    with zipfile.ZipFile(path) as packed:
+        assert {info.external_attr >> 16 for info in packed.infolist()} == {0o644}
+
+
+def test_a_model_from_elsewhere_is_not_said_to_be_ours(tmp_path):
+    class Theirs(Drive):
+        """A model of somebody else."""
+
+        name = "Theirs"
+
+    root = xml_of(build_python(Theirs(), tmp_path))
+    assert not {"author", "copyright", "license"} & set(root.attrib)
+    assert root.get("generationTool").startswith("railfmi")
 
 
 @every_model

@@ -40,10 +40,6 @@ def wrongs(model):
         "backwards": (lambda fmu: fmu.step(-DT), "step size -0.0001 s is not positive"),
         "no step": (lambda fmu: fmu.step(0.0), "step size 0.0 s is not positive"),
         "endless": (lambda fmu: fmu.step(np.inf), "step size inf s is not positive and finite"),
-        "unknown state": (
-            lambda fmu: (fmu.restore(fmu.deserialised(b"nonsense")), fmu.step(DT)),
-            "not one of this FMU",
-        ),
         "wrong type": (
             lambda fmu: (fmu._instance._slave.getInteger([0]), fmu.step(DT)),
             "Real variables only",
@@ -119,9 +115,31 @@ def test_a_state_of_another_fmu_is_refused(built):
         drive.restart()
         saved = rig.save()
         drive.restore(drive.deserialised(rig.serialised(saved)))
-        with pytest.raises(FmuError, match="not one of this FMU"):
+        with pytest.raises(FmuError, match="not one of this FMU; nothing was restored"):
             drive.step(DT)
         rig.forget(saved)
+
+
+@settings(max_examples=30)
+@given(where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), cut=st.booleans())
+def test_a_damaged_byte_of_a_state_is_never_taken_for_a_state(moving_drive, where, bit, cut):
+    fmu, data = moving_drive
+    place = int(where * len(data))
+    wrong = data[:place] if cut else data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :]
+    fmu.restart(q=0.5)
+    fmu.restore(fmu.deserialised(wrong))
+    assert "nothing was restored" in fmu.instance.messages[-1]  # said at once
+    assert fmu["q"] == 0.5
+    with pytest.raises(FmuError, match=r"damaged|not one of this FMU"):
+        fmu.step(DT)
+
+
+@pytest.fixture(scope="module")
+def moving_drive(built):
+    with Fmu(built("drive")) as fmu:
+        fmu.restart(q=0.25, q_dot=1.0)
+        fmu.step(DT)
+        yield fmu, fmu.serialised(fmu.save())
 
 
 @every_model

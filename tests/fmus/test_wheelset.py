@@ -1,6 +1,7 @@
 """The wheelset: laws of physics, limits by hand, the thesis's runs, and its independent truth."""
 
 from array import array
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from fmus.contact.forces.conditions import CONDITIONS, PARAMETERS
 from fmus.contact.forces.laws import LAWS
 from fmus.contact.geometry.table import SEARCHES
 from fmus.export.runtime.stepping import Stepper
+from fmus.export.runtime.symbolic import on_memory
 from fmus.host.fmu import Fmu
 from fmus.model import equations
 from fmus.variables import (
@@ -59,7 +61,7 @@ def outputs(**changed):
 def run(duration, dt=1e-3, inputs=None, **changed):
     """States (n, 6) every 1 ms; inputs(t) -> values of inputs held over the millisecond after t, s."""
     x, u, p = (array("d", column(kind, changed)) for kind in (State, Input, Parameter))
-    stepper = Stepper(MADE.step, *map(memoryview, (x, u, p)), dt)
+    stepper = Stepper(partial(on_memory, MADE.step), *map(memoryview, (x, u, p)), dt)
     found = [list(x)]
     for i in range(round(duration / 1e-3)):
         for name, value in (inputs(i * 1e-3) if inputs else {}).items():

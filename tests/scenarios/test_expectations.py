@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmus.errors import BadInput
-from scenarios.simulating.expression import expression, statement
+from scenarios.simulating.expression import expression, in_formula, statement
 from scenarios.simulating.value import Value
 
 T = np.linspace(0.0, 10.0, 10001)
@@ -85,6 +85,21 @@ NUMBERS = [
 @pytest.mark.parametrize(("text", "expected"), NUMBERS)
 def test_functions_on_signals_whose_answer_is_known(text, expected):
     assert value(text).number() == pytest.approx(expected, rel=1e-4, abs=1e-9)
+
+
+@given(st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1))
+def test_any_name_of_a_variable_can_stand_in_a_formula(variable):
+    name = f"a.{variable}"
+    formula = statement(f"max(abs({in_formula(name)})) < 3 and 1 < last({in_formula(name)})", "here")
+    assert formula.names == (name,)
+    signal = Value(np.array([0.0, 2.0]), np.array([0.0, 1.0]), "m")
+    assert formula.verdict({name: signal}.__getitem__).holds
+
+
+@pytest.mark.parametrize("text", ['"a.x" < 1', '2 * "a.x" < 1'])
+def test_a_name_in_quotes_is_a_signal_as_one_without(text):
+    with pytest.raises(BadInput, match="is a signal; compare its max"):
+        statement(text, "here")
 
 
 def test_a_cone_has_its_own_conicity():

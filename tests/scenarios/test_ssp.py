@@ -19,11 +19,12 @@ from numpy.testing import assert_allclose
 from fmus.errors import BadInput
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.provenance import PLACE
-from fmus.export.ssp import read_package
+from fmus.export.ssp import Component, Link, System, read_package, write_package
 from fmus.export.ssp.source import signal_source
 from fmus.host.fmu import Fmu
 from fmus.host.master.recording import read_recording
 from fmus.model import Model
+from fmus.models import MODELS
 from fmus.variables import (
     Input,
     Output,
@@ -33,7 +34,7 @@ from fmus.variables import (
 from scenarios.exchange import export_ssp, import_ssp
 from scenarios.exchange.toml_text import toml_text
 from scenarios.simulating import run
-from tests.helpers.packed import repacked
+from tests.helpers.packed import repacked, with_description
 from tests.helpers.paths import ROOT
 from tests.helpers.scenario_files import (
     GOOD,
@@ -384,6 +385,33 @@ def test_a_value_in_another_unit_is_converted(loop, tmp_path):
     assert table["fmus"]["rig"]["initial"]["omega_w"] == pytest.approx(2 * np.pi)
 
 
+MAPPING = """<ssm:ParameterMapping version="1.0"
+    xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">
+  <ssm:MappingEntry source="set.omega_w" target="omega_w">
+    <ssc:LinearTransformation factor="0.5" offset="1.0"/></ssm:MappingEntry>
+  <ssm:MappingEntry source="set.omega_w" target="omega_r"/>
+  <ssm:MappingEntry source="set.not_there" target="theta_w"/>
+</ssm:ParameterMapping>"""
+
+
+@pytest.mark.parametrize("inline", [False, True])
+def test_parameters_go_where_a_mapping_says(loop, tmp_path, inline):
+    """Two targets of one value, a factor and an offset, a prefix, and names of no variable."""
+    inner = f">{MAPPING}</ssd:ParameterMapping>" if inline else ' source="m.ssm"/>'
+    binding = f'<ssd:ParameterBinding source="resources/rig.ssv" prefix="set."><ssd:ParameterMapping{inner}'
+    pattern = r'<ssd:ParameterBinding source="resources/rig.ssv" />'
+    other = edited(loop, tmp_path / "other.ssp", pattern, f"{binding}</ssd:ParameterBinding>")
+    with zipfile.ZipFile(other, "a") as packed:
+        packed.writestr("m.ssm", MAPPING)
+    said = []
+    table = tomllib.loads(import_ssp(other, tmp_path / "back", said.append).read_text(encoding="utf-8"))
+    assert table["fmus"]["rig"]["initial"] == {"omega_w": 7.08, "omega_r": 12.16}
+    left_out = [line for line in said if "is not in its FMU and is left out" in line]
+    assert any("'set.omega_r' of component 'rig'" in line for line in left_out)
+    assert not any("omega_w'" in line for line in left_out)
+
+
 def test_what_hangs_on_the_system_s_own_connectors_is_left_out_and_told(loop, tmp_path):
     outer = '<ssd:Connectors><ssd:Connector name="speed" kind="output"/></ssd:Connectors><ssd:Elements>'
     other = edited(loop, tmp_path / "other.ssp", "<ssd:Elements>", outer)
@@ -427,7 +455,7 @@ def test_a_file_that_was_changed_is_told(loop, tmp_path):
             r'<ssd:ParameterBinding source="resources/rig.ssv" />',
             '<ssd:ParameterBinding source="resources/rig.ssv"><ssd:ParameterMapping source="m.ssm"/>'
             "</ssd:ParameterBinding>",
-            "are mapped",
+            "the mapping of parameters of 'rig' is 'm.ssm', which is missing",
         ),
     ],
 )
@@ -516,3 +544,29 @@ TABLES = st.recursive(
 @given(TABLES)
 def test_toml_that_is_written_is_read_again(table):
     assert tomllib.loads(toml_text(table)) == table
+
+
+def test_a_package_whose_variables_have_brackets_is_imported_and_run(tmp_path):
+    """Names as Modelica's tools give them, in connections, values and expectations."""
+    plain, named = build_python(MODELS["drive"](), tmp_path / "plain"), tmp_path / "named.fmu"
+    for old, new in (("q_dot", "der(body[1].q)"), ("F_ext", "body[1].f[2,1]"), ("M", "body[1].mass of it")):
+        replacement = f'name="{new}"'.encode()
+        with_description(plain, named, f'name="{old}"'.encode(), replacement)
+        plain = named.rename(tmp_path / f"{old}.fmu")
+    fmu = Component("a", "resources/a.fmu", start={"body[1].mass of it": (50.0, "kg"), "F": (1.0, "N")})
+    other = Component("b", "resources/b.fmu")
+    system = System(
+        name="brackets",
+        components=(fmu, other),
+        links=(Link(("a", "der(body[1].q)"), ("b", "body[1].f[2,1]"), gain=100.0),),
+        stop=0.1,
+        step=0.01,
+    )
+    data = {c.source: plain.read_bytes() for c in (fmu, other)}
+    scenario = import_ssp(write_package(system, data, tmp_path / "it.ssp"), tmp_path / "back")
+    result = run(scenario, tmp_path / "out")
+    assert result.ok
+    table = tomllib.loads(scenario.read_text(encoding="utf-8"))
+    assert 'max(abs("a.der(body[1].q)")) < 1e300' in table["expect"][0]["that"]
+    recorded = read_recording(result.folder / next(iter(result.runs.values())).recording).data
+    assert np.abs(recorded["b.q"]).max() > 0  # pushed through the connection

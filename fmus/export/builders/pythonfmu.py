@@ -21,15 +21,18 @@ from jinja2 import Environment, FileSystemLoader
 from pythonfmu.builder import FmuBuilder
 
 from fmus.errors import BadInput
+from fmus.export.builders.portable import equations_files
 from fmus.export.provenance import (
     PLACE,
     Origin,
     common,
     on_page,
     record,
+    rights,
     sealed,
 )
-from fmus.export.table import sizes, unit_table, variable_table
+from fmus.export.table import STOP, sizes, unit_table, variable_table
+from fmus.export.zipped import entry
 from fmus.model import Model, equations
 
 HERE = Path(__file__).parent
@@ -44,7 +47,19 @@ class {name}(Slave):
     def do_step(self, current_time, step_size):
         return Slave.do_step(self, current_time, step_size)
 '''
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+EVALUATED = ("equations", "symbolic")  # modules of the runtime that evaluate the equations
+PACKAGE = '''"""What the entry of the FMU imports; says in one sentence what is missing where something is."""
+
+import sys
+
+if sys.version_info < (3, 11):
+    raise ImportError("{name} needs Python 3.11 or newer, and this is %s" % sys.version.split()[0])
+try:
+    from .{module} import Slave
+except ImportError as error:
+    need = error.name
+    raise ImportError("{name} needs the Python package %s: run 'pip install %s'" % (need, need)) from error
+'''
 
 
 @dataclass(frozen=True)
@@ -70,14 +85,23 @@ def build_python(model: Model, out: Path, origin: Origin | None = None) -> Path:
     card = {
         "description": model.about,
         "step_size": model.step_size,
+        "rights": rights(model),
+        "experiment": {
+            "startTime": 0.0,
+            "stopTime": STOP,
+            "tolerance": model.tolerance,
+            "stepSize": model.step_size,
+        },
         "sizes": sizes(model),
         "units": unit_table(v.unit for v in model.variables.values()),
         "variables": variable_table(model),
     }
-    files = {f"{n}.casadi": f.serialize().encode() for n, f in (("step", made.step), ("outputs", made.h))}
+    files = equations_files({"step": made.step, "outputs": made.h})
     page = documentation(model.name, card, [f"{e.kind}@{location}" for e, location in model.effects])
     about = record(model, "python", 2, origin)
-    return pack(Content(model.name, card, ("solved", "stepping"), files, page, provenance=about), out)
+    return pack(
+        Content(model.name, card, ("solved", "stepping", *EVALUATED), files, page, provenance=about), out
+    )
 
 
 def pack(content: Content, out: Path) -> Path:
@@ -88,14 +112,14 @@ def pack(content: Content, out: Path) -> Path:
     target.parent.mkdir(parents=True, exist_ok=True)
     about = {**common(content.name, "python", 2), **content.provenance}
     with tempfile.TemporaryDirectory(prefix="railfmi_") as folder:
-        entry, package = _write_sources(content, Path(folder))
+        script, package = _write_sources(content, Path(folder))
         documents = Path(folder) / "documentation"
         documents.mkdir()
         (documents / "index.html").write_text(on_page(content.page, about), encoding="utf-8")
         bundled = [f"{package.name}.{f}" for f in ("common", *content.modules)]
-        with _clean_imports(entry.stem, package.name, *bundled):
+        with _clean_imports(script.stem, package.name, *bundled):
             packed = FmuBuilder.build_FMU(
-                entry,
+                script,
                 Path(folder) / "packed.fmu",
                 project_files=[package],
                 documentation_folder=documents,
@@ -113,26 +137,27 @@ def _write_sources(content: Content, folder: Path) -> tuple[Path, Path]:
     """Write the entry file and its package; both are named by a hash of all that they hold."""
     runtime = HERE.parent / "runtime"
     inside = {f"{n}.py": (runtime / f"{n}.py").read_bytes() for n in ("common", *content.modules)}
-    files = {**inside, "__init__.py": f"from .{content.modules[0]} import Slave\n".encode(), **content.files}
+    package = PACKAGE.format(name=content.name, module=content.modules[0])
+    files = {**inside, "__init__.py": package.encode(), **content.files}
     card = {**content.card, "version": version("railfmi"), "pythonfmu": version("pythonfmu")}
     parts = [json.dumps(card, sort_keys=True).encode(), *(files[name] for name in sorted(files))]
     digest = hashlib.sha256(b"\0".join(parts)).hexdigest()
     card["guid"] = str(uuid.UUID(digest[:32]))
     files["model.json"] = json.dumps(card, indent=1, sort_keys=True).encode()
-    package = folder / f"{content.name}_{digest[:12]}"
-    package.mkdir()
+    place = folder / f"{content.name}_{digest[:12]}"
+    place.mkdir()
     for name, data in files.items():
-        (package / name).write_bytes(data)
-    entry = folder / f"{package.name}_entry.py"
-    text = ENTRY.format(name=content.name, package=package.name, description=card["description"])
-    entry.write_text(text, encoding="utf-8")
-    return entry, package
+        (place / name).write_bytes(data)
+    script = folder / f"{place.name}_entry.py"
+    text = ENTRY.format(name=content.name, package=place.name, description=card["description"])
+    script.write_text(text, encoding="utf-8")
+    return script, place
 
 
 def documentation(name: str, card: dict[str, Any], effects: Sequence[str], extra: str = "") -> str:
     """The page that goes into the FMU."""
     page = Environment(loader=FileSystemLoader(HERE), autoescape=True).get_template("documentation.html.j2")
-    return page.render(name=name, card=card, effects=effects, extra=extra, casadi=version("casadi"))
+    return page.render(name=name, card=card, effects=effects, extra=extra)
 
 
 @contextmanager
@@ -154,4 +179,4 @@ def _repack(source: Path, target: Path, about: dict[str, Any]) -> None:
     files[PLACE] = sealed(about, files)
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as new:
         for name in sorted(files):
-            new.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], compress_type=zipfile.ZIP_DEFLATED)
+            new.writestr(entry(name), files[name], compress_type=zipfile.ZIP_DEFLATED)

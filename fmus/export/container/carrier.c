@@ -46,13 +46,13 @@ enum { WARNING = 1, PATH = 4096 };
 #define FUNCTIONS(EACH)                                                                                           \
     EACH(get, GetReal) EACH(set, SetReal) EACH(step, DoStep) EACH(reset, Reset) EACH(setup, SetupExperiment)      \
     EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode) EACH(instantiate, Instantiate)       \
-    EACH(free, FreeInstance)
+    EACH(terminate, Terminate) EACH(free, FreeInstance)
 #else
 #define OF_BASE(name) fmi3##name
 #define FUNCTIONS(EACH)                                                                                           \
     EACH(get, GetFloat64) EACH(set, SetFloat64) EACH(step, DoStep) EACH(reset, Reset)                             \
     EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode)                                      \
-    EACH(instantiate, InstantiateCoSimulation) EACH(free, FreeInstance)
+    EACH(instantiate, InstantiateCoSimulation) EACH(terminate, Terminate) EACH(free, FreeInstance)
 #endif
 
 typedef struct {
@@ -310,8 +310,8 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    (void)c;
-    return fmi2OK;
+    Instance *m = c;
+    return m->running && !m->failed ? answer(m, (int)m->terminate(m->base), __func__) : fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {

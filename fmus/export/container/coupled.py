@@ -12,7 +12,8 @@ from typing import Any
 
 from fmus.effects import EFFECTS
 from fmus.export.around.outside import Laws, laws
-from fmus.export.builders.pythonfmu import Content, documentation, pack
+from fmus.export.builders.portable import equations_files
+from fmus.export.builders.pythonfmu import EVALUATED, Content, documentation, pack
 from fmus.export.provenance import Origin, record_around
 from fmus.export.table import row, unit_table
 from fmus.host.archive import describe
@@ -40,14 +41,13 @@ def build_coupled(
     card = carrying(description, ports, effects, made, starts or {})
     table, names = card["variables"], [f"{kind}@{location}" for kind, location in effects]
     functions = {"push": made.push, "go_on": made.go_on}
-    files = {f"{name}.casadi": f.serialize().encode() for name, f in functions.items()}
-    files["base.fmu"] = base.read_bytes()
+    files = {**equations_files(functions), "base.fmu": base.read_bytes()}
     title = name or f"{description.identifier}WithEffects"
     needs = "It carries another FMU and runs it with the package fmpy, which the importing process needs too."
     page = documentation(title, card, names, needs)
     values = {r["name"]: (r["start"], r["unit"]) for r in table if r["causality"] == "parameter"}
     about = record_around(base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
-    return pack(Content(title, card, ("coupled", "carried"), files, page, False, about), out)
+    return pack(Content(title, card, ("coupled", "carried", *EVALUATED), files, page, False, about), out)
 
 
 def carrying(

@@ -21,6 +21,7 @@ class Carried(ABC):
 
     def __init__(self, **identity: str) -> None:
         self.said = ""  # by the carried FMU, of what did not go well
+        self.used = False  # before, there is nothing to reset, and some FMUs do not bear it
         self.fmu = self.started(identity)
         self.step = self.stepper()
 
@@ -55,11 +56,17 @@ class Carried(ABC):
     def reset(self) -> None:
         """Back to before initialisation."""
         self.said = ""
-        self.fmu.reset()
+        if self.used:
+            self.fmu.reset()
+        self.used = True
 
     def leave(self) -> None:
         """End initialisation."""
         self.fmu.exitInitializationMode()
+
+    def terminate(self) -> None:
+        """End the simulation, after which only a reset brings it back."""
+        self.fmu.terminate()
 
     def check(self, status: int, function: str) -> None:
         """RuntimeError where a call was not done."""

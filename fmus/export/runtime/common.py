@@ -11,6 +11,7 @@ import ctypes
 import json
 import math
 import sys
+import zlib
 from array import array
 from functools import cache, wraps
 from pathlib import Path
@@ -27,6 +28,7 @@ SIZES: list[int] = MODEL["sizes"]  # how many states, inputs, parameters, output
 SETTABLE = sum(SIZES[:3])
 START = array("d", [v["start"] for v in VARIABLES])
 LARGEST = sys.float_info.max
+TOLD: set[str] = set()  # names of the instances whose note is in the log: a reset makes a new slave
 
 
 def limits(key: str, without: float) -> list[float]:
@@ -68,6 +70,7 @@ def let_go_in_time(binaries: Path) -> None:
 class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
     """One instance: values of all variables in the order of the model description."""
 
+    note = ""  # what a user should know of how it runs here, in one sentence
     computed = SETTABLE  # variables from here on are brought up to date when they are asked for
 
     def __init__(self, **kwargs: Any) -> None:
@@ -78,6 +81,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         self.guid, self.version = MODEL["guid"], MODEL["version"]
         self.values = START[:]
         self.failure, self.stale = "", True
+        if self.note and kwargs["instance_name"] not in TOLD:
+            TOLD.add(kwargs["instance_name"])
+            self.log(self.note, Fmi2Status.warning)
 
     def refresh(self) -> None:
         """Compute the outputs from states, inputs and parameters."""
@@ -145,17 +151,33 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
 
     @caught
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if len(state["values"]) != len(self.values):
-            raise ValueError("the saved state is not one of this FMU")
+        if "damage" in state:
+            raise ValueError(state["damage"])
         self.values[:] = array("d", state["values"])
         self.failure, self.stale = state["failure"], True
 
     @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        data = json.dumps(state).encode()
+        return json.dumps({"of": MODEL["guid"], "sum": zlib.crc32(data)}).encode() + b"\n" + data
+
+    @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        """A state from bytes, or what is wrong with them, for the refusal when it is set.
+
+        An exception here would be fmi2Fatal, after which every further call ends the host (PythonFMU 0.7).
+        """
+        head, _, data = state.partition(b"\n")
         try:
-            return dict(json.loads(state.decode("utf-8")))
-        except (ValueError, TypeError):
-            return {"values": []}  # refused when it is set
+            said = json.loads(head)
+            whole = said["sum"] == zlib.crc32(data)
+        except (ValueError, TypeError, KeyError):
+            whole = False
+        if not whole:
+            return {"damage": "the bytes of the saved state are damaged; nothing was restored"}
+        if said["of"] != MODEL["guid"]:
+            return {"damage": "the saved state is not one of this FMU; nothing was restored"}
+        return dict(json.loads(data))
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description, completed by what PythonFMU leaves out."""
@@ -175,7 +197,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         root.set("guid", str(self.guid))
         del root.attrib["generationDateAndTime"]  # the same source gives the same bytes
         root.set("variableNamingConvention", "flat")
+        made_by = f"railfmi {MODEL['version']} with PythonFMU {MODEL['pythonfmu']}"
+        for key, value in {"generationTool": made_by, **MODEL.get("rights", {})}.items():
+            root.set(key, value)
         place = [node.tag for node in root].index("LogCategories")
+        if "experiment" in MODEL:
+            times = {k: repr(float(v)) for k, v in MODEL["experiment"].items()}
+            root.insert(place + 1, Element("DefaultExperiment", times))
         root.insert(place, units_xml())
         for node, v in zip(root.iter("ScalarVariable"), VARIABLES, strict=True):
             complete(node, v)

@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from multiprocessing.util import Finalize
 from typing import Any
 
-import casadi as cs
 import fmpy
 from pythonfmu.enums import Fmi2Status
 
 from . import carried, common
+from .equations import Equations
 
-PUSH, GO_ON = (
-    cs.Function.deserialize((common.HERE / f"{name}.casadi").read_text()) for name in ("push", "go_on")
-)
+EQUATIONS = Equations.of(common.HERE)
 BASE: dict[str, Any] = common.MODEL["base"]
 REFERENCES: list[int] = BASE["references"]  # of the carried FMU, in the order of this one's variables
 TOLD: list[int] = BASE["told"]  # inputs and parameters that the laws set
@@ -39,6 +37,7 @@ IDLE: list[carried.Carried] = []  # carried instances whose slave is gone, for r
 class Slave(common.Slave):
     """One instance of the carried FMU with its laws."""
 
+    note = EQUATIONS.note
     computed = 0  # the states too are read from the carried FMU
 
     def __init__(self, **kwargs: Any) -> None:
@@ -46,26 +45,18 @@ class Slave(common.Slave):
         self.touched = set(BASE["restarted"])  # settable variables whose value the carried FMU must be told
         self.base, self.running = _instance(), False
         self.start_time = 0.0
-        self.before, self.motion = (array("d", bytes(8 * PUSH.numel_in(0))) for _ in range(2))
-        self.told, self.memory = (array("d", bytes(8 * f.numel_out(0))) for f in (PUSH, GO_ON))
+        sizes = [EQUATIONS.sizes(name) for name in ("push", "go_on")]
+        self.before, self.motion = (array("d", bytes(8 * sizes[0][0][0])) for _ in range(2))
+        self.told, self.memory = (array("d", bytes(8 * found[0])) for _, found in sizes)
         self.dt = array("d", [0.0])
         settable = memoryview(self.values)[: common.SETTABLE]
-        self.work_out = self._on_memory(PUSH, (self.motion, settable, self.dt), self.told)
-        self.remember = self._on_memory(GO_ON, (self.before, self.motion, settable, self.dt), self.memory)
+        self.work_out = EQUATIONS.on_memory("push", (self.motion, settable, self.dt), (self.told,))
+        known = (self.before, self.motion, settable, self.dt)
+        self.remember = EQUATIONS.on_memory("go_on", known, (self.memory,))
         self.read = self.base.getter(_references(BASE["motion"]), self.motion)
         self.tell = self.base.setter(_references(TOLD), self.told)
         parts = (range(MEMORY.start), OUTPUTS)
         self.look = [self.base.getter(_references(part), self.values, part.start) for part in parts]
-
-    def _on_memory(self, function: cs.Function, arguments: Sequence[Any], result: array[float]) -> Any:
-        """A call of a function that works on memory, which the instance keeps."""
-        buffer: Any  # its type stubs ask for a size that a memoryview has
-        buffer, call = function.buffer()
-        for i, part in enumerate(arguments):
-            buffer.set_arg(i, memoryview(part))
-        buffer.set_res(0, memoryview(result))
-        self.held = (*getattr(self, "held", ()), buffer)
-        return call
 
     def __del__(self) -> None:
         if hasattr(self, "base"):
@@ -91,6 +82,12 @@ class Slave(common.Slave):
         self._by_the_laws()
         self.base.leave()
         self.running = True
+
+    @common.caught
+    def terminate(self) -> None:
+        """Terminate the carried FMU."""
+        if self.running and not self.failure:
+            self.base.terminate()
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Keep values, and pass them on where the carried FMU runs."""

@@ -1,23 +1,21 @@
-"""A slave that solves a model's equations: compiled CasADi functions on the array of its values."""
+"""A slave that solves a model's equations: its functions on the array of its values."""
 
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable
+from functools import partial
 from itertools import accumulate, pairwise
 from typing import Any
 
-import casadi as cs
 from pythonfmu.enums import Fmi2Status
 
 from . import common
+from .equations import Equations
 from .stepping import Stepper
 
-STEP, OUTPUTS = (
-    cs.Function.deserialize((common.HERE / f"{name}.casadi").read_text()) for name in ("step", "outputs")
-)
-
-
-Engine = tuple["array[float]", Stepper, Any, Any]  # values, their step, the call for the outputs, its buffer
+EQUATIONS = Equations.of(common.HERE)
+Engine = tuple["array[float]", Stepper, Callable[[], None]]  # values, their step, the call for the outputs
 IDLE: list[Engine] = []  # whose slave is gone, for reuse: PythonFMU makes a new slave at every reset
 
 
@@ -26,25 +24,24 @@ def engine() -> Engine:
     values = common.START[:]
     memory = memoryview(values)
     x, u, p, y = (memory[a:b] for a, b in pairwise(accumulate(common.SIZES, initial=0)))
-    buffer: Any  # its type stubs ask for a size that a memoryview has
-    buffer, compute = OUTPUTS.buffer()
-    for i, part in enumerate((x, u, p)):
-        buffer.set_arg(i, part)
-    buffer.set_res(0, y)
-    return values, Stepper(STEP, x, u, p, common.MODEL["step_size"]), compute, buffer
+    step = partial(EQUATIONS.on_memory, "step")
+    stepper = Stepper(step, x, u, p, common.MODEL["step_size"])
+    return values, stepper, EQUATIONS.on_memory("outputs", (x, u, p), (y,))
 
 
 class Slave(common.Slave):
     """One instance of a model."""
 
+    note = EQUATIONS.note
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.values, self.stepper, self.compute, self.buffer = IDLE.pop() if IDLE else engine()
+        self.values, self.stepper, self.compute = IDLE.pop() if IDLE else engine()
         self.values[:] = common.START
 
     def __del__(self) -> None:
-        if hasattr(self, "buffer"):
-            IDLE.append((self.values, self.stepper, self.compute, self.buffer))
+        if hasattr(self, "compute"):
+            IDLE.append((self.values, self.stepper, self.compute))
 
     def refresh(self) -> None:
         """Compute the outputs from states, inputs and parameters."""

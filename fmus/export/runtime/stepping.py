@@ -1,14 +1,20 @@
-"""Advance a compiled step function over a communication step, with shorter steps where it asks for them."""
+"""Advance a step function over a communication step, with shorter steps where it asks for them."""
 
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Any
 
 SHORTEST = 1e-7  # of the communication step; below this a step has failed
 TIME_TOLERANCE = 1e-9  # of the communication step
 SAFETY, GROWTH, CUT, ORDER = 0.9, 4.0, 0.1, 3
+
+
+Bind = Callable[
+    [Sequence[Any], Sequence[Any]], Callable[[], None]
+]  # a call on memory, see Equations.on_memory
 
 
 class Stepper:
@@ -18,15 +24,10 @@ class Stepper:
     restart from the same values repeats a run to the last bit.
     """
 
-    def __init__(self, step: Any, x: memoryview, u: memoryview, p: memoryview, longest: float) -> None:
+    def __init__(self, bind: Bind, x: memoryview, u: memoryview, p: memoryview, longest: float) -> None:
         self.x, self.longest = x, longest
-        self.held = (x, u, p)  # CasADi keeps addresses only: the memory must outlive its buffer
         self.x1, self.error, self.h = array("d", bytes(8 * len(x))), array("d", [0.0]), array("d", [0.0])
-        self.buffer, self.evaluate = step.buffer()
-        for i, part in enumerate((x, u, p, memoryview(self.h))):
-            self.buffer.set_arg(i, part)
-        self.buffer.set_res(0, memoryview(self.x1))
-        self.buffer.set_res(1, memoryview(self.error))
+        self.evaluate = bind((x, u, p, self.h), (self.x1, self.error))
 
     def advance(self, duration: float) -> bool:
         """Advance x by a duration, s; False, with x as it was, where no step is short enough."""

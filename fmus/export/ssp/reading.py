@@ -1,7 +1,7 @@
 """Read an SSP 1.0 package: one level of FMUs, their connections and values."""
 
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -22,15 +22,21 @@ from fmus.export.ssp.system import (
 )
 
 etree: Any = import_module("lxml.etree")  # by name because it comes without types; FMPy brings it
-STARTS = dict[str, tuple[float, str | None]]
-SCHEMAS = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
+Start = tuple[float, str | None]  # a value and its unit
+STARTS = dict[str, Start]
+Target = tuple[str, Callable[[Start], Start]]  # a parameter, and what is done to a value before it is set
+SCHEMAS = {
+    ".ssd": "SystemStructureDescription.xsd",
+    ".ssv": "SystemStructureParameterValues.xsd",
+    ".ssm": "SystemStructureParameterMapping.xsd",
+}
 
 
 def read_package(package: str | Path) -> tuple[System, dict[str, bytes]]:
     """The system in a package, and all of its files but the structure by their path.
 
     BadInput where it is no SSP 1.0 package, or holds what cannot be run here: systems in systems,
-    components that are no FMU, mappings of parameters. What can be left out stands in `ignored`.
+    components that are no FMU. What can be left out stands in `ignored`.
     """
     path = Path(package)
     files = _unzipped(path)
@@ -163,17 +169,49 @@ def _bound(node: Any, files: dict[str, bytes]) -> STARTS:
     found: STARTS = {}
     for binding in _all(node, "ssd:ParameterBindings/ssd:ParameterBinding"):
         source, prefix = binding.get("source"), binding.get("prefix", "")
-        if _one(binding, "ssd:ParameterMapping") is not None:
-            raise BadInput(f"parameters of '{node.get('name')}' are mapped; name them as the FMU does")
         if source is None:
             sets = _all(binding, "ssd:ParameterValues/ssv:ParameterSet")
         elif source in files:
             sets = [_parsed(files[source], source)]
         else:
             raise BadInput(f"parameters of '{node.get('name')}' are in '{source}', which is missing; add it")
+        entries = _mapping(_one(binding, "ssd:ParameterMapping"), node.get("name"), files)
         for values in sets:
-            found |= {f"{prefix}{name}": value for name, value in _parameters(values)}
+            given = {f"{prefix}{name}": value for name, value in _parameters(values)}
+            found |= {name: value for name, value in given.items() if name not in entries}
+            found |= {
+                t: f(given[name]) for name, targets in entries.items() if name in given for t, f in targets
+            }
     return found
+
+
+def _mapping(node: Any, owner: str, files: dict[str, bytes]) -> dict[str, list[Target]]:
+    """Where values of a parameter set go, by their name in the set, each with what is done to the value."""
+    if node is None:
+        return {}
+    source = node.get("source")
+    if source is not None and source not in files:
+        raise BadInput(f"the mapping of parameters of '{owner}' is '{source}', which is missing; add it")
+    entries: dict[str, list[Target]] = {}
+    whole = [_parsed(files[source], source)] if source else _all(node, "ssm:ParameterMapping")
+    for entry in (e for mapping in whole for e in _all(mapping, "ssm:MappingEntry")):
+        name = f"the mapping of parameter '{entry.get('source')}' of '{owner}'"
+        entries.setdefault(entry.get("source"), []).append(
+            (entry.get("target"), _transformation(entry, name))
+        )
+    return entries
+
+
+def _transformation(node: Any, name: str) -> Callable[[Start], Start]:
+    """The change of a value that an entry of a mapping states; its unit is that of the target then."""
+    for other in ("Boolean", "Integer", "Enumeration"):
+        if _one(node, f"ssc:{other}MappingTransformation") is not None:
+            raise BadInput(f"{name} maps values one by one; only factor and offset can be used here")
+    line = _one(node, "ssc:LinearTransformation")
+    if line is None:
+        return lambda start: start
+    factor, offset = (_number(line, key) for key in ("factor", "offset"))
+    return lambda start: (start[0] * (1.0 if factor is None else factor) + (offset or 0.0), None)
 
 
 def _parameters(values: Any) -> Iterator[tuple[str, tuple[float, str | None]]]:

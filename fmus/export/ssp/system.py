@@ -13,6 +13,7 @@ NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "ssm": "http://ssp-standard.org/SSP1/SystemStructureParameterMapping",
     "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
     "railfmi": "https://railfmi.org/ssp",  # a name, not an address
 }

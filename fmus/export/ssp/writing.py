@@ -9,7 +9,6 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from fmus.errors import BadInput
-from fmus.export.builders.pythonfmu import ZIP_DATE
 from fmus.export.ssp.system import (
     NAMESPACES,
     OSP,
@@ -22,6 +21,7 @@ from fmus.export.ssp.system import (
     System,
 )
 from fmus.export.table import unit_table
+from fmus.export.zipped import entry
 
 for _prefix, _address in NAMESPACES.items():
     ElementTree.register_namespace(_prefix, _address)
@@ -35,8 +35,7 @@ def write_package(system: System, files: Mapping[str, bytes], out: Path) -> Path
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as packed:
             for name in sorted(content, key=lambda path: (path != STRUCTURE, path)):
-                entry = zipfile.ZipInfo(name, ZIP_DATE)
-                packed.writestr(entry, content[name], compress_type=zipfile.ZIP_DEFLATED)
+                packed.writestr(entry(name), content[name], compress_type=zipfile.ZIP_DEFLATED)
         part.replace(out)
     finally:
         part.unlink(missing_ok=True)

@@ -23,7 +23,6 @@ from fmus.export.builders.native.description3 import description3
 from fmus.export.builders.native.page import page
 from fmus.export.builders.native.table import Table, table
 from fmus.export.builders.native.universal import universal
-from fmus.export.builders.pythonfmu import ZIP_DATE
 from fmus.export.provenance import (
     PLACE,
     Origin,
@@ -31,6 +30,7 @@ from fmus.export.provenance import (
     record,
     sealed,
 )
+from fmus.export.zipped import entry
 from fmus.model import Equations, Model, equations
 
 HERE = Path(__file__).parent
@@ -111,7 +111,7 @@ def packed(files: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> bytes
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", method) as archive:
         for name in sorted(files):
-            archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), files[name], compress_type=method)
+            archive.writestr(entry(name), files[name], compress_type=method)
     return memory.getvalue()
 
 

@@ -85,7 +85,9 @@ def _derivatives(made: Equations) -> list[cs.Function]:
 
 
 def _header(table: Table, work: Work, fmi: int, token: str, **about: bool) -> str:
-    templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
+    templates = Environment(
+        loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
+    )
     facts = {
         "settable": table.entries[: sum(table.sizes[:3])],
         "nominals": [e.nominal or 1.0 for e in table.entries[: table.sizes[0]]],

@@ -4,13 +4,12 @@ from importlib.metadata import version
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmus.export.builders.native.table import Entry, Table, Unknown
-from fmus.export.table import unit_table
+from fmus.export.table import STOP, unit_table
 
 CATEGORIES = {
     "logStatusError": "calls that were refused",
     "logStatusDiscard": "steps that could not be made",
 }
-STOP = 10.0  # s, of the default experiment
 
 
 def text(root: Element) -> bytes:
@@ -30,6 +29,7 @@ def root(fmi: str, table: Table, **identity: str) -> Element:
         "version": version("railfmi"),
         "generationTool": f"railfmi {version('railfmi')}",
         "variableNamingConvention": "flat",
+        **table.rights,
     }
     return Element("fmiModelDescription", about)
 

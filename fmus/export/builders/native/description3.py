@@ -99,6 +99,7 @@ def _build(table: Table) -> bytes:
         compilerOptions=OPTIONS,
     )
     SubElement(files, "SourceFile", name="fmu.c")
+    SubElement(files, "PreprocessorDefinition", name="FMI3_OVERRIDE_FUNCTION_PREFIX", value="")
     SubElement(configuration, "Library", name="m", external="true", description="C's mathematical functions")
     return text(node)
 

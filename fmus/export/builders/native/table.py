@@ -12,6 +12,7 @@ from typing import Any
 import casadi as cs
 
 from fmus.export.builders.native.dependencies import Dependencies, dependencies
+from fmus.export.provenance import rights
 from fmus.export.table import KINDS, row, unit_table
 from fmus.model import Equations, Model
 from fmus.variables import Rate, State
@@ -86,6 +87,7 @@ class Table:
     display: dict[str, tuple[str, dict[str, str]]]  # unit: its display unit and how that one is defined
     terminals: tuple[Terminal, ...]
     effects: tuple[str, ...]
+    rights: dict[str, str]  # author, copyright, license as the attributes of the model description
 
 
 def table(model: Model, made: Equations) -> Table:
@@ -114,6 +116,7 @@ def table(model: Model, made: Equations) -> Table:
         display={u: (d, _display(u, d)) for u, d in sorted(shown.items())},
         terminals=tuple(_terminals(model)),
         effects=tuple(f"{effect.kind}@{location}" for effect, location in model.effects),
+        rights=rights(model),
     )
 
 
