@@ -63,12 +63,14 @@ class Fmi2Instance(Instance):
 
     def state(self) -> Any:
         """A saved FMU state."""
+        self._initialised()
         self.final = False
         return self._call(self._slave.getFMUstate)
 
     def restore(self, state: Any) -> None:
         """Go back to a saved FMU state."""
         self._call(self._slave.setFMUstate, state)
+        self._initialised_by_restoring()
 
     def serialised(self, state: Any) -> bytes:
         """A saved FMU state as bytes."""

@@ -51,12 +51,14 @@ class Fmi3Instance(Instance):
 
     def state(self) -> Any:
         """A saved FMU state."""
+        self._initialised()
         self.final = False
         return self._call(self._slave.getFMUState)
 
     def restore(self, state: Any) -> None:
         """Go back to a saved FMU state."""
         self._call(self._slave.setFMUState, state)
+        self._initialised_by_restoring()
 
     def serialised(self, state: Any) -> bytes:
         """A saved FMU state as bytes."""

@@ -269,6 +269,10 @@ class Instance(ABC):
         if self._new:
             raise CallFailed("it is not initialised; restart it first")
 
+    def _initialised_by_restoring(self) -> None:
+        """States are saved after initialisation, and an FMU goes on in the mode of the restored one."""
+        self._new, self._running = False, True
+
     def _failed(self, what: str, status: int) -> str:
         self._new = self._running = False
         reason = self._reason(what)
