@@ -1,23 +1,16 @@
 """The contact table: rolling radii, contact angles, roll and patches of a wheelset over its lateral shift."""
 
-from pathlib import Path
-from typing import TypeAlias, TypeVar
-
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from fmus.contact.arguments import (
-    ANY,
-    POSITIVE,
     Array,
     between,
     checked,
 )
 from fmus.contact.cache import Arrays, remembered
-from fmus.contact.geometry.measured import load_profile
 from fmus.contact.geometry.pair import Pair, Sides
-from fmus.contact.geometry.profile import Kind, Profile
 from fmus.contact.geometry.search import (
     FLANGE_ANGLE,
     Contact,
@@ -26,6 +19,7 @@ from fmus.contact.geometry.search import (
     rigid_contact,
     stand,
 )
+from fmus.contact.geometry.sides import Both, Given, number, said, sides_of
 from fmus.contact.normal import hertz, virtual_penetration
 from fmus.errors import BadInput, did_you_mean
 
@@ -43,11 +37,6 @@ COLUMNS = (
     "z", "eta_left", "eta_right", "A_left", "B_left", "A_right", "B_right",
 )
 # fmt: on
-
-
-Given: TypeAlias = str | Path | Profile
-Item = TypeVar("Item")
-Both: TypeAlias = Item | tuple[Item, Item]  # one for both sides, or the left and the right one
 
 
 def contact_table(
@@ -89,64 +78,27 @@ def contact_table(
     for name, value, known in (("search", search, SEARCHES), ("patch", patch, PATCHES)):
         if value not in known:
             raise BadInput(f"{name} = {value!r} is not known; {did_you_mean(str(value), known)}")
-    cant = _number("cant", "1", cant)
-    gauge, back_to_back = _number("gauge", "m", gauge), _number("back_to_back", "m", back_to_back)
-    N, E = _number("N", "N", N, positive=True), _number("E", "Pa", E, positive=True)
+    cant, N, E = (
+        number("cant", "1", cant),
+        number("N", "N", N, positive=True),
+        number("E", "Pa", E, positive=True),
+    )
     nu = float(checked("nu", "1", nu, between(0, 0.5)))
-    wheels, rails = _profiles("wheel", wheel, smoothing), _profiles("rail", rail, smoothing)
-    left, right = _both("r0", r0)
-    radii = _number("r0", "m", left), _number("r0", "m", right)
-    sides = _sides(wheels, rails, radii, cant, gauge, back_to_back)
+    sides = sides_of(wheel, rail, cant, gauge, r0, back_to_back, smoothing)
     given = None if shifts is None else _shifts(shifts)
     settings = (roll, search, patch, N, E, nu)
     content = ("table", pair_content(sides.left), pair_content(sides.right), given, settings)
     made = remembered(content, lambda: _columns(sides, given, *settings))
     table = pd.DataFrame({name: made[name] for name in COLUMNS}, index=pd.Index(made["y"], name="y"))
+    left, right = sides.left, sides.right
     table.attrs = {
-        **{f"{w.kind}{what}": _said(getattr(w, name), getattr(v, name))
-           for w, v in (wheels, rails) for what, name in (("", "name"), ("_found", "found"))},
-        "r0": _said(*radii), "cant": cant, "gauge": gauge, "back_to_back": back_to_back, "roll": roll,
+        "wheel": said(left.wheel.name, right.wheel.name), "rail": said(left.rail.name, right.rail.name),
+        "wheel_found": said(left.wheel.found, right.wheel.found),
+        "rail_found": said(left.rail.found, right.rail.found), "r0": said(left.r0, right.r0),
+        "cant": cant, "gauge": left.gauge, "back_to_back": left.back_to_back, "roll": roll,
         "N": N, "search": search, "patch": patch, "E": E, "nu": nu,
     }  # fmt: skip
     return table
-
-
-def _both(name: str, given: Both[Item]) -> tuple[Item, Item]:
-    """The left and the right one, the same object where one is given for both."""
-    if not isinstance(given, tuple | list):
-        return given, given
-    if len(given) != 2:
-        raise BadInput(f"{name} has {len(given)} entries; give one for both sides, or the left and the right")
-    return given[0], given[1]
-
-
-def _profiles(kind: Kind, given: Both[Given], smoothing: float | None) -> tuple[Profile, Profile]:
-    """The left and the right wheel or rail, read."""
-    both: tuple[Given, Given] = _both(kind, given)
-    left, right = both
-    first = load_profile(left, kind, smoothing)
-    return first, first if right is left else load_profile(right, kind, smoothing)
-
-
-def _said(left: Item, right: Item) -> Both[Item]:
-    """One value where both sides are alike, else both."""
-    return left if left == right else (left, right)
-
-
-def _sides(
-    wheels: tuple[Profile, Profile],
-    rails: tuple[Profile, Profile],
-    radii: tuple[float, float],
-    cant: float,
-    gauge: float,
-    back_to_back: float,
-) -> Sides:
-    """Both sides of a wheelset, one object for both where they are alike."""
-    left, right = (
-        Pair(wheel, rail, cant, gauge, r0, back_to_back)
-        for wheel, rail, r0 in zip(wheels, rails, radii, strict=True)
-    )
-    return Sides(left, left if left == right else right)
 
 
 def pair_content(pair: Pair) -> tuple[object, ...]:
@@ -213,10 +165,3 @@ def _shifts(shifts: ArrayLike) -> Array:
     if y.ndim != 1 or not y.size or not (np.diff(y) > 0).all():
         raise BadInput("shifts must be one row of increasing numbers [m]")
     return y
-
-
-def _number(name: str, unit: str, value: float, positive: bool = False) -> float:
-    number = checked(name, unit, value, POSITIVE if positive else ANY)
-    if number.ndim:
-        raise BadInput(f"{name} must be one number [{unit}], not an array of shape {number.shape}")
-    return float(number)
