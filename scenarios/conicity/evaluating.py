@@ -141,9 +141,8 @@ def conicities(table: pd.DataFrame, amplitudes: Sequence[float]) -> pd.DataFrame
     rows = []
     for a in (float(a) for a in amplitudes):
         found = {name: _value(form, table, a) for name, form in FORMS.items()}
-        low, high = (
-            _value(turning_points, table, a)[0] if np.isfinite(found["conicity"][0]) else (np.nan,) * 2
-        )
+        turns, straight_on = _value(turning_points, table, a)
+        low, high = (np.nan, np.nan) if straight_on else turns
         rows.append(
             {"amplitude": a, **{name: value for name, (value, _) in found.items()}, "low": low, "high": high,
              "why": found["conicity"][1]}

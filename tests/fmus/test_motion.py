@@ -154,7 +154,9 @@ def test_a_motion_that_leaves_the_table_is_refused():
     table = table_of(0.1 * (Y - 0.007))
     assert equivalent_conicity(table, 2.9e-3) == pytest.approx(0.05)
     for form in (equivalent_conicity, linear_conicity):
-        with pytest.raises(ValueError, match=r"amplitude 0.004 m exceeds the table, which ends at 0.01 m"):
+        with pytest.raises(ValueError, match=r"of amplitude 0.004 m leaves the table from -0.01 to 0.01 m"):
             form(table, 4e-3)
+        with pytest.raises(ValueError, match=r"amplitude 0.011 m exceeds the table, which ends at 0.01 m"):
+            form(table, 11e-3)
     with pytest.raises(ValueError, match="not finite"):
         equivalent_conicity(table_of(np.where(Y > 5e-3, np.nan, Y)), 1e-3)

@@ -92,6 +92,16 @@ def test_without_a_motion_the_row_says_why():
     assert "does not steer the wheelset back" in rows.loc[0.003, "why"]
 
 
+def test_a_cylinder_runs_straight_on_and_has_no_turning_points(tmp_path):
+    given = ("--wheel", "EN15302_WheelI", "--rail", RAIL, "--gauge", 1.43516)
+    assert conicity(tmp_path, *given, "--amplitude", "0.001,0.0016,0.003") == 0
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["conicity"][:2] == [0.0, 0.0]
+    assert result["low"][:2] == [None, None]
+    assert result["conicity"][2] > 0.1
+    assert result["why"] == {}
+
+
 @pytest.mark.parametrize(
     ("changed", "words"),
     [

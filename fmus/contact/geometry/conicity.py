@@ -116,6 +116,8 @@ def _fitted(table: pd.DataFrame, amplitude: ArrayLike, share: Array) -> Number:
 
 
 def _beyond(steering: Steering, amplitude: float) -> str:
-    end = float(np.abs(steering.y[[0, -1]]).max())
-    exceeds = f"amplitude {amplitude:g} m exceeds the table, which ends at {end:g} m"
+    first, last = float(steering.y[0]), float(steering.y[-1])
+    exceeds = f"amplitude {amplitude:g} m exceeds the table, which ends at {max(-first, last):g} m"
+    if 2 * amplitude <= last - first:
+        exceeds = f"the motion of amplitude {amplitude:g} m leaves the table from {first:g} to {last:g} m"
     return f"{exceeds}; give contact_table wider shifts"
