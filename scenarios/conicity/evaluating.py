@@ -18,12 +18,14 @@ from fmus.contact.geometry.conicity import (
     turning_points,
 )
 from fmus.contact.geometry.pair import Sides
+from fmus.contact.geometry.search import stand
 from fmus.contact.geometry.sides import Both, Given, sides_of
 from fmus.contact.geometry.table import contact_table, default_shifts
 from fmus.errors import BadInput
 
 STEP = 2e-5  # m between shifts; the norm's own tables have 0.1 mm
 AMPLITUDES = tuple(round(1e-4 * i, 6) for i in range(10, 76))  # m, those of the norm
+FURTHER = 0.004  # m
 LARGEST = 0.05  # m, no gauge leaves a wheelset more; greater numbers are mm
 FORMS: dict[str, Callable[..., Any]] = {
     "conicity": equivalent_conicity, "linear": linear_conicity, "harmonic": harmonic_conicity,
@@ -126,7 +128,7 @@ def evaluated(request: Request, amplitudes: Sequence[float] | None = None) -> Ev
     """The contact of a pair over all shifts, and its conicities at amplitudes, m, by default 1 to 7.5 mm."""
     wanted = AMPLITUDES if amplitudes is None else _amplitudes(amplitudes)
     sides = request.sides
-    reach = float(default_shifts(sides, request.roll)[-1])
+    reach = _reach(sides, request.roll)
     if amplitudes is not None and max(wanted) > reach:
         raise BadInput(
             f"--amplitude {max(wanted):g}: the contact can be followed to {reach:g} m; take a smaller one"
@@ -134,6 +136,13 @@ def evaluated(request: Request, amplitudes: Sequence[float] | None = None) -> Ev
     steps = int(reach / STEP)
     table = request.table(sides, np.asarray(STEP * np.arange(-steps, steps + 1)))
     return Evaluation(sides, table, conicities(table, wanted))
+
+
+def _reach(sides: Sides, roll: bool) -> float:
+    """Largest shift, m, of the table: of the default one, and further for motions that are not symmetric."""
+    usual = float(default_shifts(sides, roll)[-1])
+    further = usual + FURTHER
+    return further if stand(sides, np.array([-further, further]), roll).rests.all() else usual
 
 
 def conicities(table: pd.DataFrame, amplitudes: Sequence[float]) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from fmus.contact import (
+    contact_table,
     equivalent_conicity,
     harmonic_conicity,
     linear_conicity,
@@ -160,3 +161,17 @@ def test_a_motion_that_leaves_the_table_is_refused():
             form(table, 11e-3)
     with pytest.raises(ValueError, match="not finite"):
         equivalent_conicity(table_of(np.where(Y > 5e-3, np.nan, Y)), 1e-3)
+
+
+@pytest.mark.parametrize(("left", "right", "r0"), [("C", "C", 0.46), ("H", "H", 0.459), ("I", "A", 0.46)])
+@pytest.mark.parametrize("amplitude", [2.3e-3, 5.2e-3])
+def test_pairs_of_the_norm_have_the_wave_of_their_integrated_motion(left, right, r0, amplitude):
+    wheels = f"EN15302_Wheel{left}", f"EN15302_Wheel{right}"
+    table = contact_table(
+        wheels, "EN15302_RailA", 0.0, 1.43516, (r0, 0.46), search="rigid", roll=False,
+        shifts=5e-5 * np.arange(-180, 181),
+    )  # fmt: skip
+    low, high = turning_points(table, amplitude)
+    half, turned = released(table, high)
+    assert_allclose(turned, low, atol=2e-7)
+    assert_allclose(equivalent_conicity(table, amplitude), (np.pi / half) ** 2 * S * R0, rtol=1e-3)

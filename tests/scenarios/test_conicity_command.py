@@ -102,11 +102,20 @@ def test_a_cylinder_runs_straight_on_and_has_no_turning_points(tmp_path):
     assert result["why"] == {}
 
 
+def test_a_motion_far_to_one_side_is_followed(tmp_path):
+    """Its one turning point is more than 10 mm from the middle, beyond the shifts of a default table."""
+    given = ("--wheel", "EN15302_WheelC,EN15302_WheelI", "--rail", RAIL, "--r0", "0.459,0.46")
+    assert conicity(tmp_path, *given, "--gauge", 1.43516, "--amplitude", 0.0071) == 0
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["why"] == {}
+    assert max(abs(result["low"][0]), result["high"][0]) > 0.0100
+
+
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
         ({"--amplitude": "3"}, "--amplitude 3: give amplitudes in m, above 0 and up to 0.05"),
-        ({"--amplitude": "0.02"}, "--amplitude 0.02: the contact can be followed to 0.01 m"),
+        ({"--amplitude": "0.02"}, "--amplitude 0.02: the contact can be followed to 0.014 m"),
         ({"--amplitude": "3mm"}, "--amplitude '3mm' is no number"),
         ({"--wheel": f"{A},{A},{B}"}, "--wheel is given 3 times"),
         ({"--wheel": "EN15302_WheelD"}, "is neither a file nor an exact profile; did you mean"),
