@@ -20,9 +20,9 @@ SIDES = "; given twice (or as LEFT,RIGHT), first the left, then the right one"
 def conicity(
     wheel: Annotated[list[str], typer.Option(help=f"profile of the wheels, by name or point file{SIDES}")],
     rail: Annotated[list[str], typer.Option(help=f"profile of the rails, by name or point file{SIDES}")],
-    r0: Annotated[list[str] | None, typer.Option(help=f"wheel radius at the tape circle [m]{SIDES}")] = None,
-    gauge: Annotated[float, typer.Option(help="gauge [m], 14 mm below the crown")] = 1.435,
-    back_to_back: Annotated[float, typer.Option(help="distance of the flange backs [m]")] = 1.36,
+    r0: Annotated[list[str] | None, typer.Option(help=f"wheel radius at the tape circle, m{SIDES}")] = None,
+    gauge: Annotated[float, typer.Option(help="gauge, m, 14 mm below the crown")] = 1.435,
+    back_to_back: Annotated[float, typer.Option(help="distance of the flange backs, m")] = 1.36,
     cant: Annotated[
         str | None,
         typer.Option(
@@ -32,7 +32,7 @@ def conicity(
     ] = None,
     amplitude: Annotated[
         list[str] | None,
-        typer.Option(help="amplitude [m], may be repeated; by default 0.001 to 0.0075 in steps of 0.0001"),
+        typer.Option(help="amplitude, m, may be repeated; by default 0.001 to 0.0075 in steps of 0.0001"),
     ] = None,
     roll: Annotated[
         bool,
@@ -42,7 +42,7 @@ def conicity(
     ] = False,
     search: Annotated[str, typer.Option(help="rigid, as EN 15302 has it, or quasi_elastic")] = "rigid",
     smoothing: Annotated[
-        float | None, typer.Option(help="noise of point files [m rms], by default found from the data")
+        float | None, typer.Option(help="noise of point files, m rms, by default found from the data")
     ] = None,
     out: Out = Path("out"),
 ) -> None:

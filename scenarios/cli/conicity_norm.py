@@ -22,11 +22,11 @@ def conicity_norm(
         list[str] | None, typer.Option(help="reference pair, such as A, Amod or AB; by default all")
     ] = None,
     draws: Annotated[int, typer.Option(min=0, help="measurements in step 2; 0 leaves step 2 out")] = 20,
-    random: Annotated[float, typer.Option(help="random error of points [m rms]")] = 1e-5,
-    grid: Annotated[float, typer.Option(help="grid that points are rounded to [m]")] = 2e-5,
-    spacing: Annotated[float, typer.Option(help="distance of points along the profile [m]")] = 2e-4,
+    random: Annotated[float, typer.Option(help="random error of points, m rms")] = 1e-5,
+    grid: Annotated[float, typer.Option(help="grid that points are rounded to, m")] = 2e-5,
+    spacing: Annotated[float, typer.Option(help="distance of points along the profile, m")] = 2e-4,
     smoothing: Annotated[
-        float | None, typer.Option(help="noise of the points [m rms], by default found from the data")
+        float | None, typer.Option(help="noise of the points, m rms, by default found from the data")
     ] = None,
     reader: Annotated[
         str | None,
