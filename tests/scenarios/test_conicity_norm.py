@@ -111,6 +111,18 @@ def test_a_perfect_reader_passes_and_a_wrong_one_does_not(tmp_path, capsys):
     assert "<b>0 of 1</b>" in (tmp_path / "bad" / "norm.html").read_text()
 
 
+def test_a_reader_that_cannot_be_used_is_named(tmp_path):
+    file = tmp_path / "broken.py"
+    file.write_text("import nothing_of_that_name\n")
+    with pytest.raises(BadInput, match=r"cannot be loaded \(No module named 'nothing_of_that_name'\)"):
+        reader_of(f"{file}:read", None)
+    file.write_text("def other(path, kind): ...\n")
+    with pytest.raises(BadInput, match="has no function 'read'"):
+        reader_of(f"{file}:read", None)
+    with pytest.raises(BadInput, match="gave a NoneType for EN15302_WheelB; return a Profile"):
+        Instrument(reader_of(f"{file}:other", None)).profile(WHEEL, "grid", 0, 0)
+
+
 def test_our_own_reader_measures_a_profile():
     found = Instrument(reader_of(None, None)).profile(WHEEL, "random", 0, 0)
     tread = np.linspace(-0.02, 0.025, 200)

@@ -33,7 +33,10 @@ def reader_of(given: str | None, smoothing: float | None) -> Reader:
     if spec is None or spec.loader is None or not Path(file).is_file():
         raise BadInput(f"--reader {given}: give FILE.py:FUNCTION, a function of a path and a kind")
     module = module_from_spec(spec)
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's file raises
+        raise BadInput(f"--reader {given}: {file} cannot be loaded ({error}); correct the file") from error
     found = getattr(module, name, None)
     if not callable(found):
         raise BadInput(f"--reader {given}: {file} has no function '{name}'")
@@ -93,4 +96,7 @@ class Instrument:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{name}.txt"
             np.savetxt(file, points * 1e3, fmt="%.7f")
-            return self.read(file, exact_profile(name).kind)
+            found = self.read(file, exact_profile(name).kind)
+        if not isinstance(found, Profile):
+            raise BadInput(f"--reader: gave a {type(found).__name__} for {name}; return a Profile")
+        return found
