@@ -10,9 +10,12 @@ PUBLIC = {  # name: module
     "contact_table": "geometry.table",
     "creep_forces": "forces.creep",
     "equivalent_conicity": "geometry.conicity",
+    "harmonic_conicity": "geometry.conicity",
     "hertz": "normal",
     "kalker": "forces.coefficients",
     "klingel_wavelength": "geometry.conicity",
+    "linear_conicity": "geometry.conicity",
+    "nonlinearity_parameter": "geometry.conicity",
     "virtual_penetration": "normal",
 }
 

@@ -12,7 +12,13 @@ from fmus.models import MODELS
 from tests.helpers.paths import ROOT
 
 # the models themselves, the contact that they share, and what is about single models by its subject
-OWN = (*(f"fmus/{name}/" for name in MODELS), "fmus/contact/", "scenarios/literature/", "scenarios/shipped/")
+OWN = (
+    *(f"fmus/{name}/" for name in MODELS),
+    "fmus/contact/",
+    "scenarios/literature/",
+    "scenarios/shipped/",
+    "scenarios/conicity/",
+)
 GENERIC = {
     path: file
     for package in ("fmus", "estimator", "scenarios")

@@ -1,4 +1,4 @@
-"""Equivalent conicity of a contact table (EN 15302) and Klingel's wavelength."""
+"""Equivalent conicity (EN 15302), linearised forms, the nonlinearity parameter, and Klingel's wavelength."""
 
 import numpy as np
 import pandas as pd
@@ -12,28 +12,59 @@ from fmus.contact.arguments import (
     checked,
     plain,
 )
+from fmus.contact.geometry.motion import Steering, Swing
 
-ANGLES = 2000  # of the motion's quarter wave; the integral changes by less than 1e-5 beyond
-FINE = 4000  # pieces of the half width over which the radius difference is summed up
+PLACES = 4000  # of an interval over which a linearised form averages
+NONLINEAR = 0.002, 0.004  # m, amplitudes between which the nonlinearity parameter is taken
 
 
 def equivalent_conicity(table: pd.DataFrame, amplitude: ArrayLike) -> Number:
     """Equivalent conicity, dimensionless, of the wheelset's free motion of an amplitude, m.
 
     table: of contact_table, or any with `r_left` and `r_right`, m, over the shift, m; amplitude: > 0,
-    a number or an array. EN 15302: the cone whose wave is as long as that of y'' = -dr(y)/(2 s r0), found
-    from the integral of energy; dr is taken as odd in y. ValueError where the amplitude exceeds the table
-    or the wheelset is not steered back from it.
+    a number or an array, half the distance of the turning points. EN 15302: the cone whose wave is as long
+    as that of y'' = -dr(y)/(2 s r0), found from the integral of energy between both turning points, which
+    lie where the motion turns and not at +- the amplitude. It is 0 where dr vanishes all the way. ValueError
+    where the motion leaves the table, or where dr falls so that the wheelset is not steered back.
     """
     amplitudes = checked("amplitude", "m", amplitude, POSITIVE)
-    y, difference = _odd_difference(table)
-    if amplitudes.size and amplitudes.max() > y[-1] * (1 + 1e-12):
-        raise ValueError(
-            f"amplitude {amplitudes.max():g} m exceeds the table, which ends at {y[-1]:g} m; give "
-            "contact_table wider shifts"
-        )
-    found = [_conicity(y, difference, float(a)) for a in amplitudes.flat]
+    steering = Steering.of(table)
+    found = [_conicity(steering, float(a)) for a in amplitudes.flat]
     return plain(np.array(found).reshape(amplitudes.shape))
+
+
+def turning_points(table: pd.DataFrame, amplitude: float) -> tuple[float, float]:
+    """Shifts, m, between which the wheelset's free motion of an amplitude, m, swings; errors as above."""
+    swing = _swing(Steering.of(table), float(checked("amplitude", "m", amplitude, POSITIVE)))
+    return swing.low, swing.high
+
+
+def linear_conicity(table: pd.DataFrame, amplitude: ArrayLike) -> Number:
+    """Half the slope of the straight line fitted to dr between the turning points (EN 15302, Annex F).
+
+    table, amplitude: see equivalent_conicity. Where there is no motion of that amplitude, the line is fitted
+    about the shift 0, so that a dr that falls with the shift has a negative value. ValueError beyond the
+    table.
+    """
+    return _fitted(table, amplitude, (np.arange(PLACES) + 0.5) / PLACES * 2 - 1)
+
+
+def harmonic_conicity(table: pd.DataFrame, amplitude: ArrayLike) -> Number:
+    """Half the first harmonic of dr over a sinusoidal motion per its amplitude (EN 15302, Annex G).
+
+    table, amplitude and errors: see linear_conicity, which weighs all shifts alike; a sinusoidal motion stays
+    longer near its turning points.
+    """
+    return _fitted(table, amplitude, np.sin(((np.arange(PLACES) + 0.5) / PLACES - 0.5) * np.pi))
+
+
+def nonlinearity_parameter(table: pd.DataFrame) -> float:
+    """Mean growth of the equivalent conicity from 2 to 4 mm of amplitude, 1/m (Polach 2010; EN 15302, 9.3).
+
+    table and errors: see equivalent_conicity.
+    """
+    low, high = np.asarray(equivalent_conicity(table, NONLINEAR))
+    return float((high - low) / (NONLINEAR[1] - NONLINEAR[0]))
 
 
 def klingel_wavelength(conicity: ArrayLike, r0: ArrayLike, s: ArrayLike) -> Number:
@@ -50,30 +81,43 @@ def klingel_wavelength(conicity: ArrayLike, r0: ArrayLike, s: ArrayLike) -> Numb
     return plain(np.asarray(2 * np.pi * np.sqrt(given["r0"] * given["s"] / given["conicity"])))
 
 
-def _odd_difference(table: pd.DataFrame) -> tuple[Array, Array]:
-    """Shifts from zero on (n,), m, and the odd part of r_left - r_right there, m."""
-    y = table.index.to_numpy(dtype=float)
-    difference = (table["r_left"] - table["r_right"]).to_numpy(dtype=float)
-    if len(y) < 2 or not (np.diff(y) > 0).all() or not y[0] < 0 < y[-1]:
-        raise ValueError("table must be indexed by increasing shifts on both sides of 0 m")
-    reach = min(-y[0], y[-1])
-    half = np.unique(np.concatenate([[0.0, reach], np.abs(y)]))
-    half = half[half <= reach]
-    return half, (np.interp(half, y, difference) - np.interp(-half, y, difference)) / 2
+def _conicity(steering: Steering, amplitude: float) -> float:
+    if steering.rests(amplitude):
+        return 0.0
+    return _swing(steering, amplitude).conicity
 
 
-def _conicity(y: Array, difference: Array, amplitude: float) -> float:
-    """From the quarter wave: its length over sqrt(2 s r0) is the integral of dy / sqrt(2 W(y))."""
-    fine = np.linspace(0.0, amplitude, FINE + 1)
-    steps = np.interp(fine, y, difference)
-    # W(y): the integral of the difference from y to the amplitude
-    work = np.concatenate([np.cumsum(((steps[1:] + steps[:-1]) / 2 * np.diff(fine))[::-1])[::-1], [0.0]])
-    angle = (np.arange(ANGLES) + 0.5) / ANGLES * np.pi / 2
-    at = np.interp(amplitude * np.sin(angle), fine, work)
-    if not (at > 0).all():
-        raise ValueError(
-            f"amplitude {amplitude:g} m has no equivalent conicity: the difference of radii does not steer "
-            "the wheelset back from there"
-        )
-    quarter = float(np.mean(amplitude * np.cos(angle) / np.sqrt(2 * at)) * np.pi / 2)
-    return float((np.pi / (4 * quarter)) ** 2 * 2)
+def _swing(steering: Steering, amplitude: float) -> Swing:
+    """The motion of an amplitude, m; ValueError where there is none."""
+    found = steering.swing(amplitude)
+    if found is not None:
+        return found
+    if not steering.reaches(amplitude):
+        raise ValueError(_beyond(steering, amplitude))
+    raise ValueError(
+        f"amplitude {amplitude:g} m has no equivalent conicity: the difference of radii does not steer "
+        "the wheelset back from there"
+    )
+
+
+def _fitted(table: pd.DataFrame, amplitude: ArrayLike, share: Array) -> Number:
+    """Half the slope of the line through dr at these shares of the amplitude, -1 to 1, about the middle."""
+    amplitudes = checked("amplitude", "m", amplitude, POSITIVE)
+    steering = Steering.of(table)
+    found = []
+    for a in amplitudes.flat:
+        swing = steering.swing(float(a))
+        places = (0.0 if swing is None else (swing.low + swing.high) / 2) + a * share
+        inside = steering.y[0] <= places[0] < places[-1] <= steering.y[-1]
+        if not inside or (swing is None and not steering.reaches(float(a))):
+            raise ValueError(_beyond(steering, float(a)))
+        found.append(float(share @ steering.difference(places) / (2 * a * (share @ share))))
+    return plain(np.array(found).reshape(amplitudes.shape))
+
+
+def _beyond(steering: Steering, amplitude: float) -> str:
+    first, last = float(steering.y[0]), float(steering.y[-1])
+    exceeds = f"amplitude {amplitude:g} m exceeds the table, which ends at {max(-first, last):g} m"
+    if 2 * amplitude <= last - first:
+        exceeds = f"the motion of amplitude {amplitude:g} m leaves the table from {first:g} to {last:g} m"
+    return f"{exceeds}; give contact_table wider shifts"

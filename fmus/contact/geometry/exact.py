@@ -58,7 +58,9 @@ def _profile(name: str, declared: dict[str, Any]) -> Profile:
     sections = [_section(entry, length, up) for entry in declared["section"]]
     if declared.get("symmetric"):
         sections = [mirrored(s) for s in reversed(sections)] + sections
-    return Profile(name, declared["kind"], tuple(sections), "exact sections")
+    face = declared.get("gauge_face")
+    stated = None if face is None else float(face) * length
+    return Profile(name, declared["kind"], tuple(sections), "exact sections", stated)
 
 
 def _section(entry: dict[str, Any], length: float, up: int) -> Section:

@@ -1,8 +1,9 @@
-"""A wheelset on a track: two like wheels, two like rails with their cant, and the distances between them.
+"""A wheel on its rail, and both sides of a wheelset on a track with the distances between them.
 
 Track frame: y to the left from the track's centre, z up from the crown of the canted rail. The left wheel
 and rail are at +y, where the track's y and the profiles' y point the same way; the right ones are their
 mirror image, so all that is said here of the left holds for the right with shift and roll reversed.
+A pair stands for both sides where these are alike; `Sides` holds the pairs where they differ.
 """
 
 from dataclasses import dataclass
@@ -71,7 +72,8 @@ def canted_rail(profile: Profile, cant: float, gauge: float) -> Rail:
     z = profile.height(y)
     across, up = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
     crown = int(np.argmax(up))
-    reach = _gauge_reach(profile, angle, float(y[crown]), float(up[crown]))
+    stated = profile.gauge_face
+    reach = stated if stated is not None else _gauge_reach(profile, angle, float(y[crown]), float(up[crown]))
     axis_y, axis_z = gauge / 2 - reach, -float(up[crown])
     steep = np.tan(np.arctan(slope) + angle)
     seen = _seen_from_above(across, steep, crown)
@@ -133,6 +135,11 @@ class Pair:
             profile: Profile = getattr(self, role)
             if profile.kind != role:
                 raise BadInput(f"{role} = {profile.name} is a {profile.kind}; give the profile of a {role}")
+        if self.rail.gauge_face is not None and self.cant != 0:
+            raise BadInput(
+                f"cant = {self.cant:g}: rail {self.rail.name} is given as it lies in the track, already "
+                "inclined; give cant = 0"
+            )
         # limits of what railways are built to, so that mm and degrees are not taken for m and a slope
         for name, low, high in LIMITS:
             if not low <= getattr(self, name) <= high:
@@ -148,6 +155,37 @@ class Pair:
     def left_rail(self) -> Rail:
         """The left rail as it lies in the track."""
         return canted_rail(self.rail, self.cant, self.gauge)
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Both sides of a wheelset on its track; the right pair is mirrored, seen as a left one.
+
+    Where both sides are alike, `right` is `left`. Cant, gauge and back_to_back are those of both.
+    """
+
+    left: Pair
+    right: Pair
+
+    @staticmethod
+    def of(pair: "Pair | Sides") -> "Sides":
+        """Both sides of what may be one pair for both."""
+        return pair if isinstance(pair, Sides) else Sides(pair, pair)
+
+    @property
+    def alike(self) -> bool:
+        """Whether the left and the right side are the same."""
+        return self.left is self.right
+
+    @property
+    def taller(self) -> float:
+        """Left less right wheel radius at the tape circle, m."""
+        return self.left.r0 - self.right.r0
+
+    @property
+    def named(self) -> "dict[str, tuple[Pair, int]]":
+        """Pair of each side by its name, with the sign of shift and roll as this side sees them."""
+        return {"left": (self.left, 1), "right": (self.right, -1)}
 
 
 LIMITS = (

@@ -84,12 +84,17 @@ class Spline(Section):
 
 @dataclass(frozen=True)
 class Profile:
-    """Sections from the flange or gauge side to the field side, without gaps; `found`: how it was made."""
+    """Sections from the flange or gauge side to the field side, without gaps; `found`: how it was made.
+
+    gauge_face: only of a rail that is given as it lies in the track, already inclined: the stated lateral
+    place of its gauge face, m.
+    """
 
     name: str
     kind: Kind
     sections: tuple[Section, ...]
     found: str = ""
+    gauge_face: float | None = None
 
     @property
     def begin(self) -> float:

@@ -1,7 +1,7 @@
 """Where wheels and rails touch: roll by the semi-analytical method, rigid and quasi-elastic contact search.
 
-All is said of the left wheel; the right one is the left one with shift and roll reversed (see pair.py).
-Equations and sources: GEOMETRY.md.
+All is said of the left wheel; the right one is a left one with shift and roll reversed (see pair.py).
+Equations and sources: README.md.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fmus.contact.arguments import Array
 from fmus.contact.geometry.nearest import Touch, WheelGrid
-from fmus.contact.geometry.pair import Pair
+from fmus.contact.geometry.pair import Pair, Sides
 from fmus.errors import BadInput
 
 SAME = 1e-10  # m, the gaps of both wheels agree to ten times better than the 1e-9 that is promised
@@ -28,7 +28,8 @@ WEIGHTLESS = 30.0  # in gaps of QUASI_ELASTIC; exp(-30) is 1e-13
 class Stand:
     """A wheelset at lateral shifts y (n,), m, resting on both rails.
 
-    phi: roll, rad; lift: height of its centre above r0 over the crowns, m; left, right: where it touches.
+    phi: roll, rad; lift: height of its centre above the mean r0 over the crowns, m; left, right: where it
+    touches; level: whether both gaps agree within the precision of the roll (n,).
     """
 
     y: Array
@@ -36,12 +37,12 @@ class Stand:
     lift: Array
     left: Touch
     right: Touch
+    level: NDArray[np.bool_]
 
     @property
     def rests(self) -> NDArray[np.bool_]:
         """Whether both wheels stand on their rails, not on an end of a profile (n,)."""
-        agreed = np.abs(_gap_difference(self.left, self.right)) <= 10 * SAME
-        return np.asarray(agreed & self.left.inside & self.right.inside)
+        return np.asarray(self.level & self.left.inside & self.right.inside)
 
 
 @dataclass(frozen=True)
@@ -57,20 +58,24 @@ class Contact:
     kappa_rail: Array
 
 
-def stand(pair: Pair, y: Array) -> Stand:
-    """Roll and lift at which both wheels touch, for shifts y (n,), m.
+def stand(pair: Pair | Sides, y: Array, roll: bool = True) -> Stand:
+    """Roll and lift at which both wheels touch, for shifts y (n,), m; a pair stands for both sides.
 
     The roll is turned by the difference of both gaps over its lever until they agree (Li 2002, eq. 3.5
     to 3.7, with the lever's exact value); where the next roll would leave what is known to hold the
-    answer, that is halved instead. Shifts without an answer do not `rest`.
+    answer, that is halved instead. Shifts without an answer do not `rest`. Without roll, each wheel is
+    lowered upright onto its own rail (EN 15302), and the lift is the mean of both.
     """
-    grid = WheelGrid.of(pair)
+    sides = Sides.of(pair)
     phi = np.zeros_like(y)
+    if not roll:
+        left, right = _touches(sides, y, phi)
+        return Stand(y, phi, -(left.gap + right.gap) / 2, left, right, np.isfinite(left.gap + right.gap))
     low, high = np.full_like(y, -np.inf), np.full_like(y, np.inf)
     open_ = np.arange(len(y))
     for _ in range(ITERATIONS):
-        left, right = _touches(grid, y[open_], phi[open_])
-        more, lever = _gap_difference(left, right), left.lever + right.lever
+        left, right = _touches(sides, y[open_], phi[open_])
+        more, lever = _gap_difference(sides, left, right), left.lever + right.lever
         low[open_] = np.where(more < 0, phi[open_], low[open_])
         high[open_] = np.where(more > 0, phi[open_], high[open_])
         wrong = np.abs(more) > SAME
@@ -78,22 +83,27 @@ def stand(pair: Pair, y: Array) -> Stand:
         if not open_.size:
             break
         phi[open_] = _next(phi[open_], more, lever, low[open_], high[open_])
-    left, right = _touches(grid, y, phi)
-    return Stand(y, phi, -left.gap, left, right)
+    left, right = _touches(sides, y, phi)
+    level = np.abs(_gap_difference(sides, left, right)) <= 10 * SAME
+    return Stand(y, phi, sides.taller / 2 - left.gap, left, right, level)
 
 
-def _touches(grid: WheelGrid, y: Array, phi: Array) -> tuple[Touch, Touch]:
+def _touches(sides: Sides, y: Array, phi: Array) -> tuple[Touch, Touch]:
     """Nearest places of the left and the right wheel."""
-    both = grid.nearest(np.concatenate([y, -y]), np.concatenate([phi, -phi]))
+    if not sides.alike:
+        return WheelGrid.of(sides.left).nearest(y, phi), WheelGrid.of(sides.right).nearest(-y, -phi)
+    both = WheelGrid.of(sides.left).nearest(np.concatenate([y, -y]), np.concatenate([phi, -phi]))
     return both.part(slice(None, len(y))), both.part(slice(len(y), None))
 
 
-def _gap_difference(left: Touch, right: Touch) -> Array:
-    """Left less right gap (n,), m; infinite where one wheel is beside its rail, nan where both are."""
+def _gap_difference(sides: Sides, left: Touch, right: Touch) -> Array:
+    """Left less right gap (n,), m, under one centre of the wheelset; each gap is told for its own r0.
+
+    Infinite where one wheel is beside its rail, nan where both are.
+    """
     beside_both = np.isinf(left.gap) & np.isinf(right.gap)
-    return np.asarray(
-        np.subtract(left.gap, right.gap, out=np.full_like(left.gap, np.nan), where=~beside_both)
-    )
+    more = np.subtract(left.gap, right.gap, out=np.full_like(left.gap, np.nan), where=~beside_both)
+    return np.asarray(more - sides.taller)
 
 
 def _next(phi: Array, more: Array, lever: Array, low: Array, high: Array) -> Array:
@@ -133,20 +143,28 @@ def quasi_elastic_contact(
     return Contact(mean(eta), mean(grid.curvature[column]), mean(kappa_rail))
 
 
-def check_touches(pair: Pair) -> None:
+def check_touches(pair: Pair | Sides, roll: bool = True) -> None:
     """BadInput where the wheelset does not sit on its treads, between its flanges, when it is centred."""
-    centred = stand(pair, np.zeros(1))
+    sides = Sides.of(pair)
+    centred = stand(sides, np.zeros(1), roll)
+    rests = bool(centred.rests[0])
+    _check_side(sides.left, rests, centred.left)
+    if not sides.alike:
+        _check_side(sides.right, rests, centred.right)
+
+
+def _check_side(pair: Pair, rests: bool, touch: Touch) -> None:
     names = f"wheel {pair.wheel.name} on rail {pair.rail.name}"
     stands = f"gauge {pair.gauge:g} m and back_to_back {pair.back_to_back:g} m"
-    if not centred.rests[0]:
+    if not rests:
         raise BadInput(
             f"{names}: never touch on their running surfaces with {stands}; correct these, or give profiles "
             "wide enough"
         )
     tip = WheelGrid.of(pair).tip
-    if centred.left.eta[0] <= tip:
+    if touch.eta[0] <= tip:
         raise BadInput(f"{names}: the flange stands on the rail with {stands}; correct these")
-    eta = float(centred.left.eta[0])
+    eta = float(touch.eta[0])
     steepest = np.abs(pair.wheel.slope(np.linspace(min(eta, 0.0), max(eta, 0.0), PLACES))).max()
     if np.arctan(steepest) > FLANGE_ANGLE:
         raise BadInput(

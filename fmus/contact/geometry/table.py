@@ -1,22 +1,16 @@
 """The contact table: rolling radii, contact angles, roll and patches of a wheelset over its lateral shift."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from fmus.contact.arguments import (
-    ANY,
-    POSITIVE,
     Array,
     between,
     checked,
 )
 from fmus.contact.cache import Arrays, remembered
-from fmus.contact.geometry.measured import load_profile
-from fmus.contact.geometry.pair import Pair
-from fmus.contact.geometry.profile import Profile
+from fmus.contact.geometry.pair import Pair, Sides
 from fmus.contact.geometry.search import (
     FLANGE_ANGLE,
     Contact,
@@ -25,6 +19,7 @@ from fmus.contact.geometry.search import (
     rigid_contact,
     stand,
 )
+from fmus.contact.geometry.sides import Both, Given, number, said, sides_of
 from fmus.contact.normal import hertz, virtual_penetration
 from fmus.errors import BadInput, did_you_mean
 
@@ -45,11 +40,11 @@ COLUMNS = (
 
 
 def contact_table(
-    wheel: str | Path | Profile = "S1002",
-    rail: str | Path | Profile = "60E1",
+    wheel: Both[Given] = "S1002",
+    rail: Both[Given] = "60E1",
     cant: float = 1 / 40,
     gauge: float = 1.435,
-    r0: float = 0.46,
+    r0: Both[float] = 0.46,
     N: float = 55e3,
     search: str = "quasi_elastic",
     patch: str = "hertz",
@@ -59,42 +54,49 @@ def contact_table(
     E: float = YOUNG,
     nu: float = NU,
     smoothing: float | None = None,
+    roll: bool = True,
 ) -> pd.DataFrame:
     """Contact of both wheels over the wheelset's lateral shift, indexed by `y`, m, positive to the left.
 
     wheel, rail: names of exact profiles, paths of point files (see measured.py), or profiles; cant: inward
     inclination of the rails as a slope; gauge: m, 14 mm below the crown; r0: wheel radius at the tape
-    circle, m; N: normal force in each contact, N; search: "rigid" or "quasi_elastic"; patch: "hertz" or
-    "virtual_penetration"; back_to_back: m between the flange backs; shifts: (n,) m, increasing, by default
-    401 over 10 mm to both sides or 3 mm beyond flange contact; E, Pa, and nu of both bodies; smoothing:
-    rms, m, that is taken for noise in point files, by default found from the data.
+    circle, m; wheel, rail and r0 may each be a pair (left, right). N: normal force in each contact, N;
+    search: "rigid" or "quasi_elastic"; patch: "hertz" or "virtual_penetration"; back_to_back: m between
+    the flange backs; shifts: (n,) m, increasing, by default 401 over 10 mm to both sides or 3 mm beyond
+    flange contact; E, Pa, and nu of both bodies; smoothing: rms, m, that is taken for noise in point files,
+    by default found from the data; roll: whether the wheelset rolls until both wheels touch, or each wheel
+    is lowered upright onto its own rail, as EN 15302 does.
 
     Columns, per wheel `_left` and `_right`: r rolling radius, m; delta contact angle, rad, positive where
     the radius grows towards the flange; phi roll, rad, positive with the left wheel up; a, b semi-axes
-    along and across rolling, m; then z lift of the wheelset's centre, m, 0 when centred; eta place on the
-    wheel from the tape circle, m, positive to the field side; A, B curvature sums of the patch, 1/m, where
-    the surfaces part by A x² + B y²; B is at least 0.05. `attrs` tells what the table was made with.
+    along and across rolling, m; then z lift of the wheelset's centre, m, 0 when centred (without roll the
+    mean lift of both wheels); eta place on the wheel from the tape circle, m, positive to the field side; A,
+    B curvature sums of the patch, 1/m, where the surfaces part by A x² + B y²; B is at least 0.05. `attrs`
+    tells what the table was made with.
     BadInput, a ValueError, names an argument that is wrong, or a file and its line.
     """
     for name, value, known in (("search", search, SEARCHES), ("patch", patch, PATCHES)):
         if value not in known:
             raise BadInput(f"{name} = {value!r} is not known; {did_you_mean(str(value), known)}")
-    cant = _number("cant", "1", cant)
-    sizes = {"gauge": gauge, "r0": r0, "back_to_back": back_to_back}
-    sizes = {name: _number(name, "m", value) for name, value in sizes.items()}
-    N, E = _number("N", "N", N, positive=True), _number("E", "Pa", E, positive=True)
-    nu = float(checked("nu", "1", nu, between(0, 0.5)))
-    wheel, rail = load_profile(wheel, "wheel", smoothing), load_profile(rail, "rail", smoothing)
-    pair = Pair(wheel, rail, cant, **sizes)
-    given = None if shifts is None else _shifts(shifts)
-    settings = (search, patch, N, E, nu)
-    made = remembered(
-        ("table", pair_content(pair), given, settings), lambda: _columns(pair, given, *settings)
+    cant, N, E = (
+        number("cant", "1", cant),
+        number("N", "N", N, positive=True),
+        number("E", "Pa", E, positive=True),
     )
+    nu = float(checked("nu", "1", nu, between(0, 0.5)))
+    sides = sides_of(wheel, rail, cant, gauge, r0, back_to_back, smoothing)
+    given = None if shifts is None else _shifts(shifts)
+    settings = (roll, search, patch, N, E, nu)
+    content = ("table", pair_content(sides.left), pair_content(sides.right), given, settings)
+    made = remembered(content, lambda: _columns(sides, given, *settings))
     table = pd.DataFrame({name: made[name] for name in COLUMNS}, index=pd.Index(made["y"], name="y"))
-    table.attrs = sizes | {
-        "wheel": wheel.name, "rail": rail.name, "wheel_found": wheel.found, "rail_found": rail.found,
-        "cant": cant, "N": N, "search": search, "patch": patch, "E": E, "nu": nu,
+    left, right = sides.left, sides.right
+    table.attrs = {
+        "wheel": said(left.wheel.name, right.wheel.name), "rail": said(left.rail.name, right.rail.name),
+        "wheel_found": said(left.wheel.found, right.wheel.found),
+        "rail_found": said(left.rail.found, right.rail.found), "r0": said(left.r0, right.r0),
+        "cant": cant, "gauge": left.gauge, "back_to_back": left.back_to_back, "roll": roll,
+        "N": N, "search": search, "patch": patch, "E": E, "nu": nu,
     }  # fmt: skip
     return table
 
@@ -104,31 +106,37 @@ def pair_content(pair: Pair) -> tuple[object, ...]:
     return pair.wheel, pair.rail, pair.cant, pair.gauge, pair.r0, pair.back_to_back
 
 
-def default_shifts(pair: Pair) -> Array:
+def default_shifts(pair: Pair | Sides, roll: bool = True) -> Array:
     """401 shifts, m: 10 mm to both sides, or 3 mm beyond flange contact where that is further away."""
+    sides = Sides.of(pair)
     probe = np.arange(0.0, 2.5 * REACH, REACH / 20)
-    standing = stand(pair, probe)
-    angle = np.arctan(pair.wheel.slope(standing.left.eta))
-    touches = np.flatnonzero(standing.rests & (angle > FLANGE_ANGLE))
-    reach = max(REACH, probe[touches[0]] + BEYOND_FLANGE) if touches.size else REACH
-    if not standing.rests[probe <= reach].all():
-        reach = probe[np.argmin(standing.rests)] - REACH / 20
+    reach, end = REACH, np.inf
+    for side, (one, sign) in list(sides.named.items())[: 1 if sides.alike else 2]:
+        standing = stand(sides, sign * probe, roll)
+        angle = np.arctan(one.wheel.slope(getattr(standing, side).eta))
+        touches = np.flatnonzero(standing.rests & (angle > FLANGE_ANGLE))
+        if touches.size:
+            reach = max(reach, float(probe[touches[0]]) + BEYOND_FLANGE)
+        if not standing.rests.all():
+            end = min(end, float(probe[np.argmin(standing.rests)]))
+    if end <= reach:
+        reach = end - REACH / 20
     return np.linspace(-reach, reach, SHIFTS)
 
 
-def _columns(pair: Pair, given: Array | None, search: str, patch: str, *load: float) -> Arrays:
+def _columns(sides: Sides, given: Array | None, roll: bool, search: str, patch: str, *load: float) -> Arrays:
     """The columns of the table by name, with the shifts `y`."""
-    check_touches(pair)
-    y = default_shifts(pair) if given is None else given
+    check_touches(sides, roll)
+    y = default_shifts(sides, roll) if given is None else given
     # the shift 0 rides along for the lift that counts as none
-    standing = stand(pair, np.append(y, 0.0))
+    standing = stand(sides, np.append(y, 0.0), roll)
     if not standing.rests.all():
         far = standing.y[np.argmin(standing.rests)]
         raise BadInput(
             f"shifts: at {far:g} m a wheel is at the end of its profile or rail; take smaller ones"
         )
     made = {"y": y, "phi": standing.phi[:-1], "z": (standing.lift - standing.lift[-1])[:-1]}
-    for side, sign in (("left", 1), ("right", -1)):
+    for side, (pair, sign) in sides.named.items():
         touch = getattr(standing, side)
         if search == "rigid":
             contact = rigid_contact(pair, touch)
@@ -157,10 +165,3 @@ def _shifts(shifts: ArrayLike) -> Array:
     if y.ndim != 1 or not y.size or not (np.diff(y) > 0).all():
         raise BadInput("shifts must be one row of increasing numbers [m]")
     return y
-
-
-def _number(name: str, unit: str, value: float, positive: bool = False) -> float:
-    number = checked(name, unit, value, POSITIVE if positive else ANY)
-    if number.ndim:
-        raise BadInput(f"{name} must be one number [{unit}], not an array of shape {number.shape}")
-    return float(number)

@@ -1,0 +1,58 @@
+"""`railfmi conicity-norm`: the test of EN 15302 with exact profiles and measured points of its pairs."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app, said
+
+
+@app.command("conicity-norm")
+def conicity_norm(
+    reference: Annotated[
+        Path | None,
+        typer.Option(
+            help="folder with the norm's tables, such as WheelARailA_conicity.csv and WheelARailA_dr.csv"
+        ),
+    ] = None,
+    pair: Annotated[
+        list[str] | None, typer.Option(help="reference pair, such as A, Amod or AB; by default all")
+    ] = None,
+    draws: Annotated[int, typer.Option(min=0, help="measurements in step 2; 0 leaves step 2 out")] = 20,
+    random: Annotated[float, typer.Option(help="random error of points, m rms")] = 1e-5,
+    grid: Annotated[float, typer.Option(help="grid that points are rounded to, m")] = 2e-5,
+    spacing: Annotated[float, typer.Option(help="distance of points along the profile, m")] = 2e-4,
+    smoothing: Annotated[
+        float | None, typer.Option(help="noise of the points, m rms, by default found from the data")
+    ] = None,
+    reader: Annotated[
+        str | None,
+        typer.Option(help="FILE.py:FUNCTION that makes a profile of a path and a kind, by default our own"),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="of the errors")] = 1,
+    out: Out = Path("out"),
+) -> None:
+    """Test the calculation, and the reading of points, by EN 15302; exit 1 if a conicity is outside."""
+    from scenarios.conicity.norm.measuring import Instrument, reader_of
+    from scenarios.conicity.norm.pairs import references
+    from scenarios.conicity.norm.report import NormReport
+    from scenarios.conicity.norm.steps import step_1, step_2
+    from scenarios.output import writable
+
+    pairs = references(pair)
+    instrument = Instrument(reader_of(reader, smoothing), random, grid, spacing, seed)
+    folder = writable(out)
+    with said.status("step 1") as status:
+        exact = [step_1(one, reference) for one in pairs]
+        measured = list(step_2(pairs, instrument, draws, status.update)) if draws else []
+    how = "found from the data" if smoothing is None else f"{smoothing:g} m rms"
+    report = NormReport(exact, measured, instrument, reader or f"our own, smoothing {how}")
+    report.write(folder, shlex.join(["railfmi", *sys.argv[1:]]))
+    for line in report.lines():
+        typer.echo(line)
+    typer.echo(f"page: {folder / 'norm.html'}")
+    if not report.ok:
+        raise typer.Exit(1)
