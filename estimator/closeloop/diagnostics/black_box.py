@@ -129,7 +129,8 @@ def _left(t: Array, residual: Array, at: Array, e: Array) -> Array:
     """A residual (N, n_y) at times t (N,) minus values e (n, n_y) at times `at` (n,), linear between them."""
 
     def part(rows: slice) -> Array:
-        return np.subtract(residual[rows], np.column_stack([np.interp(t[rows], at, x) for x in e.T]))
+        found: Array = residual[rows] - np.column_stack([np.interp(t[rows], at, x) for x in e.T])
+        return found
 
     return by_rows(residual.shape, part)
 
