@@ -7,6 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from fmus.aside import blocks
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
@@ -72,20 +73,27 @@ class Fmu:
         return values
 
     def simulate(
-        self, t: Array, inputs: Mapping[str, Array], outputs: Sequence[str], start: Mapping[str, float]
-    ) -> Array:
+        self, t: Array, inputs: Mapping[str, Array], outputs: Sequence[str], start: Mapping[str, float],
+        every: int = 1,
+    ) -> Array:  # fmt: skip
         """Restart at t[0] and run freely through t; outputs (N, n_y), the first row at t[0].
 
         t: (N,) s, increasing. inputs: (N,) samples each: over a step the mean of both ends acts, which is
         exact to second order for signals sampled from continuous ones, and outputs are read with the
-        sample of their time; or (N-1,), the value held over each step.
+        sample of their time; or (N-1,), the value held over each step. every: of the rows, only each so
+        manyth is returned, ((N - 1) // every + 1, n_y).
         """
         first, u = _driving(t, inputs)
         self.restart(float(t[0]), **{**start, **first})
-        y0 = self.read(outputs)
-        y = self._safely(self._instance.run, t, u, self.references(inputs), self.references(outputs))
+        found = np.empty(((len(t) - 1) // every + 1, len(outputs)))
+        found[0] = self.read(outputs)
+        put, get, more = self.references(inputs), self.references(outputs), len(u) - len(t) + 1
+        for rows in blocks(len(t) - 1, 8 * (len(outputs) + u.shape[1]), every):
+            given = t[rows.start : rows.stop + 1], u[rows.start : rows.stop + more]
+            y = self._safely(self._instance.run, *given, put, get)[every - 1 :: every]
+            found[rows.start // every + 1 :][: len(y)] = y
         self.time = float(t[-1])
-        return np.vstack([y0, y])
+        return found
 
     @property
     def at_once(self) -> int:
@@ -106,7 +114,7 @@ class Fmu:
         if not offers_rows(self._instance):
             return None
         first, u = _driving(t, inputs)
-        acting, ends = ((u[1:] + u[:-1]) / 2, u[1:]) if len(u) == len(t) else (u, None)
+        acting, ends = (_means(u), u[1:]) if len(u) == len(t) else (u, None)
         names = [name for name in starts[0] if name not in first]
         put, get, driven = (np.array(self.references(n), dtype=np.uint32) for n in (names, outputs, inputs))
         rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
@@ -167,6 +175,13 @@ class Fmu:
             return call(*args)
         except CallFailed as error:
             raise FmuError(f"{self.name}: {error}") from error
+
+
+def _means(u: Array) -> Array:
+    """Means (N-1, n_u) of the values at both ends of each step; u: (N, n_u)."""
+    means: Array = u[1:] + u[:-1]
+    means /= 2
+    return means
 
 
 def _driving(t: Array, inputs: Mapping[str, Array]) -> tuple[dict[str, float], Array]:

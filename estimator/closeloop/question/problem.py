@@ -15,6 +15,7 @@ from estimator.closeloop.question.input_noise import InputNoise
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
 from estimator.sensor_faults import faulty
+from fmus.aside import set_aside
 from fmus.export.around.outside import Outside
 from fmus.host.description import PortNames
 
@@ -109,7 +110,7 @@ class Problem:
 
     def residuals(self, theta: Mapping[str, float]) -> list[Array]:
         """Measured minus simulated outputs of each run, (N, n_y)."""
-        return [run.y - self._run(run, theta, ()) for run in self.record.runs]
+        return [set_aside(self._residual(run, theta)) for run in self.record.runs]
 
     def several_residuals(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
         """As `residuals` for each of several unknowns with the same names, some of them simulated at once."""
@@ -117,12 +118,12 @@ class Problem:
             some = thetas[first : first + self.at_once]
             by_run = [self._rows(run, some) for run in self.record.runs]
             for i, theta in enumerate(some):
-                found = [rows[i] for rows in by_run if rows is not None]
+                found = [set_aside(rows[i]) for rows in by_run if rows is not None]
                 yield found if len(found) == len(by_run) else self.residuals(theta)
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the part to identify, (m, n_y)."""
-        return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in self._identified])
+        return np.concatenate([self._residual(run, theta)[run.fit] for run in self._identified])
 
     def identify_residuals(self, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """As `identify_residual` for several unknowns with the same names; None if not all at once."""
@@ -171,13 +172,17 @@ class Problem:
         y = self.plant.simulate(run, self._start(run, theta), more, finer=self.finer)
         return faulty(y, run.t, self.record.outputs, theta)
 
+    def _residual(self, run: Run, theta: Mapping[str, float]) -> Array:
+        """Measured minus simulated outputs of a run, (N, n_y)."""
+        return _missed(run, self._run(run, theta, ()))
+
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """Measured minus simulated outputs of a run for each of several unknowns; None if not all at once."""
         rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas], self.finer)
         if rows is None:
             return None
         outputs = self.record.outputs
-        return [run.y - faulty(y, run.t, outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
+        return [_missed(run, faulty(y, run.t, outputs, theta)) for y, theta in zip(rows, thetas, strict=True)]
 
     def _start(self, run: Run, theta: Mapping[str, float]) -> dict[str, float]:
         """Start values of the FMU for a run; free states of a run that is not fitted are guessed from it."""
@@ -204,6 +209,11 @@ def smooth_start(t: Array, y: Array) -> np.polynomial.Polynomial:
         left = float(np.sum((y - curve(t)) ** 2)) + np.finfo(float).tiny
         tried[degree] = n * np.log(left / n) + 2 * free * n / max(n - free - 1, 1), curve
     return min(tried.values(), key=lambda found: found[0])[1]
+
+
+def _missed(run: Run, y: Array) -> Array:
+    """Measured minus simulated outputs y (N, n_y), in their place if they are no part of other samples."""
+    return np.subtract(run.y, y, out=y) if y.flags.c_contiguous else run.y - y
 
 
 def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:
