@@ -59,14 +59,14 @@ def contact_table(
 ) -> pd.DataFrame:
     """Contact of both wheels over the wheelset's lateral shift, indexed by `y`, m, positive to the left.
 
-    wheel, rail: names of exact profiles, paths of point files (see measured.py), or profiles; cant: inward
-    inclination of the rails as a slope; gauge: m, 14 mm below the crown; r0: wheel radius at the tape
-    circle, m; wheel, rail and r0 may each be a pair (left, right). N: normal force in each contact, N;
-    search: "rigid" or "quasi_elastic"; patch: "hertz" or "virtual_penetration"; back_to_back: m between
-    the flange backs; shifts: (n,) m, increasing, by default 401 (without roll 1001) over 10 mm to both
-    sides or 3 mm beyond flange contact; E, Pa, and nu of both bodies; smoothing: rms, m, that is taken for
-    noise in point files, by default found from the data; roll: whether the wheelset rolls until both wheels touch, or each wheel
-    is lowered upright onto its own rail, as EN 15302 does.
+    wheel, rail: names of exact profiles, paths of point files (see measured.py), or profiles; cant:
+    inward inclination of the rails as a slope; gauge: m, 14 mm below the crown; r0: wheel radius at the
+    tape circle, m; wheel, rail and r0 may each be a pair (left, right). N: normal force in each contact,
+    N; search: "rigid" or "quasi_elastic"; patch: "hertz" or "virtual_penetration"; back_to_back: m
+    between the flange backs; shifts: (n,) m, increasing, by default 401 (without roll 1001) over 10 mm to
+    both sides or 3 mm beyond flange contact; E, Pa, and nu of both bodies; smoothing: rms, m, that is
+    taken for noise in point files, by default found from the data; roll: whether the wheelset rolls until
+    both wheels touch, or each wheel is lowered upright onto its own rail, as EN 15302 does.
 
     Columns, per wheel `_left` and `_right`: r rolling radius, m; delta contact angle, rad, positive where
     the radius grows towards the flange; phi roll, rad, positive with the left wheel up; a, b semi-axes
