@@ -3,26 +3,34 @@
 import shutil
 import tempfile
 import zipfile
+from collections.abc import Callable
 from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import fmpy
 from fmpy.model_description import read_model_description
 from fmpy.validation import validate_fmu
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import Isolation
+from fmus.host.apart.room import Room, room_of
 from fmus.host.description import FmuDescription, FmuVariable
+
+Made = TypeVar("Made")
 
 FMI_VERSIONS = ("2.0", "3.0")
 
 
 class Archive:
-    """An unpacked FMU; several instances can run from one. BadInput where it cannot be used here."""
+    """An unpacked FMU; several instances can run from one. BadInput where it cannot be used here.
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+    isolation: limits of the process of its own in which its instances run; None: they run in this process.
+    """
+
+    def __init__(self, path: str | Path, isolation: Isolation | None = None) -> None:
+        self.path, self.isolation = Path(path), isolation
         names = _checked_names(self.path)
         self.folder = Path(tempfile.mkdtemp(prefix="railfmi_fmu_"))
         # goes with the object or the process, worker processes included, which skip atexit
@@ -35,9 +43,26 @@ class Archive:
             self.close()
             raise
 
+    @property
+    def room(self) -> Room | None:
+        """The process in which its instances run, if that is not this one."""
+        return None if self.isolation is None else room_of(self.isolation)
+
+    def made(self, kind: Callable[..., Made], *args: Any) -> Made:
+        """kind(archive, *args), made where the instances run."""
+        return kind(self, *args) if self.room is None else self.room.make(kind, self, *args)
+
+    def called(self, function: Callable[..., Made], *args: Any) -> Made:
+        """function(archive, *args), called where the instances run."""
+        return function(self, *args) if self.room is None else self.room.call(function, self, *args)
+
     def close(self) -> None:
         """Delete the folder."""
         self._delete()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """In another process it stands for the same folder, which stays this one's, and runs there."""
+        return _unpacked, (self.path, self.folder, self.description)
 
     def __enter__(self) -> Self:
         return self
@@ -46,6 +71,12 @@ class Archive:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _unpacked(path: Path, folder: Path, description: FmuDescription) -> Archive:
+    archive = Archive.__new__(Archive)
+    archive.path, archive.folder, archive.description, archive.isolation = path, folder, description, None
+    return archive
 
 
 def describe(path: str | Path) -> FmuDescription:

@@ -13,10 +13,10 @@ import typer
 
 from fmus.errors import BadInput
 from scenarios.cli.console import app, said
-from scenarios.finished import finished_or_said
+from scenarios.cli.supervision import INTERRUPTED, supervised
 
 FOLDER = Path(__file__).parent
-NO_COMMANDS = ("__main__", "app", "console", "build_options")
+NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision")
 COMMANDS = {  # module by the name of its command
     module.name.replace("_", "-"): module.name
     for module in iter_modules([str(FOLDER)])
@@ -31,9 +31,7 @@ def main() -> None:
     """Entry of the console command."""
     for name in THREADS:
         os.environ.setdefault(name, "1")
-    with finished_or_said():
-        code = run_safely(sys.argv[1:])
-    sys.exit(code)
+    sys.exit(supervised(run_safely, sys.argv[1:]))
 
 
 def loaded(arguments: Sequence[str] = tuple(COMMANDS)) -> typer.Typer:
@@ -70,6 +68,8 @@ def run_safely(arguments: Sequence[str]) -> int:
         code = loaded(arguments)(list(arguments), standalone_mode=False)
         return code if isinstance(code, int) else 0
     except BadInput as error:
+        if INTERRUPTED.came:  # and was taken for a fault of what was being read
+            return _interrupted()
         said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
         return 2
     except BrokenProcessPool:
@@ -84,8 +84,9 @@ def run_safely(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return _interrupted()
     except Exception as error:
-        host = sys.modules.get("fmus.host.fmu")  # loads NumPy, which help does without
-        if host and isinstance(error, host.FmuError):
+        if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
+            return _interrupted()
+        if _is_of_fmu(error):
             said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
             return 2
         shown = getattr(error, "format_message", None)  # click's own errors of usage
@@ -94,6 +95,16 @@ def run_safely(arguments: Sequence[str]) -> int:
         if shown():  # empty if the help was shown
             said.print(f"railfmi: {' '.join(shown().split())}", markup=False, soft_wrap=True)
         return 2
+
+
+def _is_of_fmu(error: Exception) -> bool:
+    """Whether an FMU refused a call or ended its process; the modules load NumPy, which help does without."""
+    kinds = {"fmus.host.fmu": "FmuError", "fmus.host.apart.isolation": "FmuEnded"}
+    return any(
+        isinstance(error, getattr(sys.modules[module], kind))
+        for module, kind in kinds.items()
+        if module in sys.modules
+    )
 
 
 def _interrupted() -> int:

@@ -31,4 +31,13 @@ def railfmi(
 said = Console(stderr=True, highlight=False)
 
 
+Trust = Annotated[
+    bool,
+    typer.Option("--trust-fmu", help="run foreign FMUs in the process of the command, without any limit"),
+]
+CallLimit = Annotated[float, typer.Option(min=0.1, help="s, that one call of a foreign FMU may take")]
+RunLimit = Annotated[float, typer.Option(min=0.1, help="s, that one simulation of a foreign FMU may take")]
+MemoryLimit = Annotated[float, typer.Option(min=0.1, help="GB of memory that foreign FMUs may use")]
+
+
 Out = Annotated[Path, typer.Option("--out", help="folder to write to", file_okay=False)]

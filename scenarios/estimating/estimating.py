@@ -11,6 +11,8 @@ from estimator.filters.consistency import checks
 from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import build_quick
+from fmus.export.provenance import isolation_of
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import Archive
 from fmus.models import model_class
 from scenarios.estimating.findings import (
@@ -45,6 +47,7 @@ def estimate(
     tell: Tell = lambda _: None,
     options: Options | None = None,
     truth: Mapping[str, tuple[Array, Array]] | None = None,
+    isolation: Isolation | None = ISOLATED,
 ) -> EstimateResult:
     """Run `railfmi estimate` and return the result that is written as result.json.
 
@@ -53,8 +56,9 @@ def estimate(
     data_dir: folder of the data files, by default the folder of the experiment.
     options: replace the options of the experiment.
     truth: true values by name as (times, values), for errors and figures.
-    Raises BadInput if the experiment is wrong. If the filter diverges, the result contains the estimates up
-    to that time, and `diverged` and `reason` are set.
+    isolation: limits of the process in which a foreign FMU runs; None runs it in this process.
+    Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit. If the
+    filter diverges, the result contains the estimates up to that time, and `diverged` and `reason` are set.
     """
     begun = time.monotonic()
     path = Path(experiment)
@@ -65,7 +69,8 @@ def estimate(
     folder = None if out is None else writable(Path(out))
     with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work:
         tell("opening the FMU and the record")
-        with Archive(fmu_of(e, Path(work))) as archive:
+        fmu = fmu_of(e, Path(work))
+        with Archive(fmu, isolation_of(fmu, isolation) if e.model is None else None) as archive:
             record = load_record(e, archive.description, missing=True)
             setup = set_up(e, chosen, record, archive)
             found = find(setup, archive, tell)
