@@ -9,6 +9,7 @@ from contextlib import suppress
 from ctypes import c_double, c_uint, c_void_p, cast
 from functools import cache
 from itertools import count
+from math import nan
 from pathlib import Path
 from threading import Lock
 from typing import Any, ClassVar
@@ -280,7 +281,8 @@ class Instance(ABC):
 
     def _call(self, function: Any, *args: Any, **kwargs: Any) -> Any:
         self._refuse_after_fatal()
-        PAGE.calling(self.who, self._named(function.__name__))
+        name = function.__name__
+        PAGE.calling(self.who, self._named(name), float(args[0]) if name == "doStep" else nan)
         try:
             return function(*args, **kwargs)
         except FMICallException as error:

@@ -50,7 +50,6 @@ class Page:
         self.time = self._memory[REALS : REALS + 8].cast("d")
         self.told = np.frombuffer(memory, np.int64, PARTS, CELLS + 8 * TOLD)
         self.now = np.frombuffer(memory, np.float64, 1, REALS)
-        self.time[0] = nan
 
     def enrolled(self, name: str, fmi3: bool) -> int:
         """The number of an FMU by its name; times KINDS, plus what is done, it is what a cell holds."""
@@ -61,9 +60,10 @@ class Page:
             self._write(NAMES + LONGEST_NAME * number, LONGEST_NAME, said)
         return self._known[said] * KINDS
 
-    def calling(self, who: int, call: str) -> None:
-        """A call is made that has a name of its own."""
+    def calling(self, who: int, call: str, t: float = nan) -> None:
+        """A call is made that has a name of its own; t: its time, s, if it has one."""
         self._write(CALL, LONGEST_CALL, call)
+        self.time[0] = t
         self.cells[WHAT] = who + CALLING
         self.cells[TOLD + 4] += 1
 
@@ -118,3 +118,4 @@ class Page:
 
 
 PAGE = Page(shared.page)
+PAGE.idle()

@@ -64,8 +64,11 @@ def _listed() -> None:
 
 def run_safely(arguments: Sequence[str]) -> int:
     """Run a command line; errors in the input become one line and exit code 2."""
+    INTERRUPTED.told = False
     try:
         code = loaded(arguments)(list(arguments), standalone_mode=False)
+        if code == 130 and not INTERRUPTED.told:  # typer made an exit code of the exception
+            return _interrupted()
         return code if isinstance(code, int) else 0
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read
@@ -108,5 +111,5 @@ def _is_of_fmu(error: Exception) -> bool:
 
 
 def _interrupted() -> int:
-    said.print("railfmi: interrupted; nothing was written")
+    said.print("railfmi: interrupted; files that were finished before are kept")
     return 130

@@ -6,8 +6,10 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, said
+from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, interrupted, said
 from scenarios.cli.supervision import INTERRUPTED
+
+RESUME = "run the same command with --resume to continue from here"
 
 
 @app.command("close-loop")
@@ -44,13 +46,11 @@ def close_loop(
             with said.status("reading the experiment") as status:
                 result = run(experiments[0], out, data, status.update, jobs, seed, resume, isolation)
         except KeyboardInterrupt:
-            said.print("railfmi: interrupted; run the same command with --resume to continue from here")
-            raise typer.Exit(130) from None
+            raise interrupted(RESUME) from None
         except FmuError as error:
             if not INTERRUPTED.came:  # an FMU in Python takes the exception for a failure of its own
                 raise
-            said.print("railfmi: interrupted; run the same command with --resume to continue from here")
-            raise typer.Exit(130) from error
+            raise interrupted(RESUME) from error
         except FmuEnded as error:
             kept = "; --resume continues from the checkpoints" if (out / STAGES).is_dir() else ""
             raise FmuEnded(f"{error}{kept}") from error
@@ -77,8 +77,7 @@ def close_loop(
             typer.echo(line)
         typer.echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
     if found.interrupted:
-        said.print(
-            f"railfmi: interrupted; {len(found.results)} of {len(experiments)} experiments are finished; "
+        raise interrupted(
+            f"{len(found.results)} of {len(experiments)} experiments are finished; "
             "the same command with --resume goes on from here"
         )
-        raise typer.Exit(130)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, said
+from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, interrupted, said
 
 
 @app.command("run")
@@ -40,6 +40,6 @@ def run_scenarios(
         results = run_all(scenarios, out, status.update if watch else (lambda _: None), done, isolation)
     typer.echo(f"results: {out}")
     if any(r.interrupted_at is not None for r in results):
-        raise typer.Exit(130)
+        raise interrupted("the recording up to then is kept")
     if not all(r.ok for r in results):
         raise typer.Exit(1)

@@ -34,6 +34,7 @@ class Interrupts:
 
     def __init__(self) -> None:
         self.came = False
+        self.told = False  # whether the command has said so
 
     def __call__(self, _number: int, _frame: FrameType | None) -> None:
         self.came = True

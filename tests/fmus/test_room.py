@@ -270,6 +270,7 @@ def test_a_process_that_is_damaged_is_ended(monkeypatch):
 
 def test_the_page_says_what_is_done():
     page = Page()
+    page.idle()
     assert page.doing() is None
     who = page.enrolled("one.fmu", fmi3=True)
     page.stepping(who, 0.25)

@@ -144,6 +144,12 @@ def bad_fmu(folder: Path, fault: Fault, compiled: Path) -> Path:
         packed.write(built, f"binaries/{fmpy.platform}/bad{fmpy.sharedLibraryExtension}")
     (folder / "scenario.toml").write_text(SCENARIO)
     (folder / "experiment.toml").write_text(EXPERIMENT)
+    write_data(folder)
+    return folder / "bad.fmu"
+
+
+def write_data(folder: Path) -> None:
+    """The data of EXPERIMENT: the motion that it declares, with another k, and noise."""
     t = np.arange(0.0, 2.0, 0.005)
     u = np.sin(5 * t) + 0.5 * np.sin(17 * t)
     x = [1.0]
@@ -152,7 +158,6 @@ def bad_fmu(folder: Path, fault: Fault, compiled: Path) -> Path:
     noisy = np.array(x) + 0.002 * np.random.default_rng(1).standard_normal(t.size)
     rows = [f"{a:.9g},{b:.9g},{c:.9g}" for a, b, c in zip(t, u, noisy, strict=True)]
     (folder / "data.csv").write_text("\n".join(["t,u,x", *rows]) + "\n")
-    return folder / "bad.fmu"
 
 
 # what an FMU may do to its process that is nobody else's concern

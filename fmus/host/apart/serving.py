@@ -28,6 +28,7 @@ CHANNELS: list[Channel] = []  # the one of this process
 def serve(connection: int, block: str, page: str, memory: float) -> None:
     """Answer until the other end closes."""
     PAGE.move(Memory(name=page).map)
+    PAGE.idle()
     _limited(memory)
     channel = Channel(socket.socket(fileno=connection), Memory(name=block), trusted=True)
     CHANNELS.append(channel)
