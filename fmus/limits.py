@@ -6,6 +6,10 @@ RUN = 6 * 3600.0  # s, that one simulation may take
 MEMORY = 8.0  # GB, that the process of the FMUs may use
 LAST_WORDS = 3  # lines that an FMU logged or printed, told when it ended its process
 
+# the trials of an FMU before it is estimated, see fmus/host/grading/honest.py
+RESTARTS = 1e-4  # of an output's size: what a solver with steps of its own may change by a restart
+PROBED = 200  # outcomes that are kept
+
 # an interrupt, all of which is over within 5 s
 GRACE = 1.5  # s, after which an FMU that does not stop is ended
 INTERRUPT = 4  # s, after which a command that does not stop is ended

@@ -25,6 +25,7 @@ from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
+from fmus.host.grading.honest import check_honest
 from scenarios.closing.result import Result, result_of
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
@@ -83,6 +84,8 @@ class Posed:
     def of(cls, declared: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> "Posed":
         """The question of an experiment; work: folder for the builds of its FMU."""
         builder = builder_for(declared, work, isolation)
+        if declared.fmu_path:
+            check_honest(declared.fmu_path, isolation or ISOLATED)
         return cls(declared, builder, pose(declared, builder))
 
 

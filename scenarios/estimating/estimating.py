@@ -14,6 +14,7 @@ from fmus.export.builders.hypotheses import build_quick
 from fmus.export.provenance import isolation_of
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import Archive
+from fmus.host.grading.honest import check_honest
 from fmus.models import model_class
 from scenarios.estimating.findings import (
     Findings,
@@ -70,6 +71,8 @@ def estimate(
     with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work:
         tell("opening the FMU and the record")
         fmu = fmu_of(e, Path(work))
+        if e.model is None:
+            check_honest(fmu, isolation or ISOLATED)
         with Archive(fmu, isolation_of(fmu, isolation) if e.model is None else None) as archive:
             record = load_record(e, archive.description, missing=True)
             setup = set_up(e, chosen, record, archive)

@@ -67,14 +67,14 @@ u = "u"
 column = "x"
 unit = "m"
 noise_std = 0.002
+[estimate]
+states = ["x"]
+parameters.k = {start = 2.2, std = 0.5, bounds = [0.5, 5.0]}
 [[ports]]
 name = "point"
 force = "u"
 velocity = "x"
 displacement = "y"
-[estimate]
-states = ["x"]
-parameters.k = {start = 2.2, std = 0.5, bounds = [0.5, 5.0]}
 """
 
 
