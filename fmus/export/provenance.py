@@ -134,8 +134,8 @@ def isolation_of(fmu: Path, isolation: Isolation | None) -> Isolation | None:
 
     A record of provenance is no signature: who forges one can have an FMU run in the process of the command.
     """
-    if isolation is None:
-        return None
+    if isolation is None or not fmu.is_file():
+        return isolation  # who opens it says what is wrong with it
     try:
         own = "base" not in provenance(fmu) and not altered(fmu)
     except BadInput:

@@ -4,6 +4,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Callable
+from math import inf
 from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 from types import TracebackType
@@ -17,6 +18,7 @@ from fmus.errors import BadInput
 from fmus.host.apart.isolation import Isolation
 from fmus.host.apart.room import Room, room_of
 from fmus.host.description import FmuDescription, FmuVariable
+from fmus.taken import check_packed
 
 Made = TypeVar("Made")
 
@@ -95,8 +97,11 @@ def _checked_names(path: Path) -> list[str]:
         raise BadInput(f"{path}: no such FMU file; build one with 'railfmi build' or mend the path")
     try:
         with zipfile.ZipFile(path) as packed:
+            check_packed(packed, path)
             names = packed.namelist()
             broken = packed.testzip()
+    except BadInput:
+        raise
     except Exception as error:  # damage shows as errors of zipfile, zlib, struct, codecs and others
         raise BadInput(f"{path}: not a readable zip file, so no FMU ({error}); get it again") from error
     if broken:
@@ -130,16 +135,25 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         raise BadInput(f"{path}: is FMI {model.fmiVersion}; FMI {' and '.join(FMI_VERSIONS)} are read here")
     if model.coSimulation is None:
         raise BadInput(f"{path}: is not for co-simulation; export it again as a co-simulation FMU")
+    try:
+        return _reduced(model)
+    except ValueError as error:
+        raise BadInput(f"{path}: its modelDescription.xml cannot be read ({error})") from error
+
+
+def _reduced(model: Any) -> FmuDescription:
+    """What is used of FMPy's description; ValueError for a number that is none."""
     unused = {v.name: kind for v in model.modelVariables if (kind := _unused(v))}
     variables = {v.name: _variable(v) for v in model.modelVariables if v.name not in unused}
     kind, usual = model.coSimulation, model.defaultExperiment
+    step = _number(usual.stepSize) if usual else None
     return FmuDescription(
         name=model.modelName,
         fmi_version=model.fmiVersion,
         identifier=kind.modelIdentifier,
         guid=model.guid or model.instantiationToken,
         variables=variables,
-        step_size=_number(usual.stepSize) if usual else None,
+        step_size=step if step is not None and 0 < step < inf else None,
         saves_state=kind.canGetAndSetFMUstate,
         serialises_state=kind.canSerializeFMUstate,
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,

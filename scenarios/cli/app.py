@@ -1,6 +1,7 @@
 """The command `railfmi`; exit codes: 0 done, 1 a check failed, 2 wrong input, with one error line."""
 
 import ast
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -22,6 +23,10 @@ COMMANDS = {  # module by the name of its command
     for module in iter_modules([str(FOLDER)])
     if module.name not in NO_COMMANDS
 }
+
+UNWRITABLE = (  # errors of a disk or a folder
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM,
+)  # fmt: skip
 
 # libraries' worker processes would each use every core for small matrices
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -86,6 +91,15 @@ def run_safely(arguments: Sequence[str]) -> int:
         return _interrupted()
     except KeyboardInterrupt:
         return _interrupted()
+    except OSError as error:
+        if error.errno not in UNWRITABLE:
+            raise
+        where = error.filename or "a file"
+        said.print(
+            f"railfmi: {where}: cannot be written ({error.strerror}); free space, or name another folder",
+            markup=False, soft_wrap=True,
+        )  # fmt: skip
+        return 2
     except Exception as error:
         if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
             return _interrupted()

@@ -29,7 +29,7 @@ from fmus.host.grading.honest import check_honest
 from scenarios.closing.result import Result, result_of
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 Tell = Callable[[str], None]
 
@@ -137,12 +137,13 @@ def closed(
     if folder is None:
         return found, result_of(e.id, problem, found, time.monotonic() - begun, ())
     tell("building the augmented FMU and writing the report")
-    augmented = augment(posed.builder, e, problem, found, folder, tell)
-    result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
-    from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
+    with written_at_once(folder) as part:
+        augmented = augment(posed.builder, e, problem, found, part, tell)
+        result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
+        from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
 
-    write_report(folder, problem, found, result)
-    result.write(folder / "result.json")
+        write_report(part, problem, found, result)
+        result.write(part / "result.json")
     return found, result
 
 

@@ -24,7 +24,7 @@ from scenarios.comparing.result import (
 )
 from scenarios.experiment.experiment import Experiment, check_names, load_experiment
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 Tell = Callable[[str], None]
 TOLERANCE = 1e-9  # relative, of builds of one model: see docs/native.md
@@ -82,8 +82,9 @@ def compare(
     )
     if folder is not None:
         tell("drawing")
-        found.write(folder / "result.json")
-        difference_plot(found, record, names, both).write(folder)
+        with written_at_once(folder) as part:
+            found.write(part / "result.json")
+            difference_plot(found, record, names, both).write(part)
     return found
 
 

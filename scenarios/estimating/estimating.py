@@ -38,7 +38,7 @@ from scenarios.estimating.setup import set_up
 from scenarios.experiment.declaration import Options
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 
 def estimate(
@@ -200,14 +200,8 @@ def rms_errors(found: Findings, truth: Mapping[str, tuple[Array, Array]]) -> dic
 def _write(
     folder: Path, found: Findings, result: EstimateResult, truth: Mapping[str, tuple[Array, Array]]
 ) -> None:
-    """Write all files to a temporary folder first, then move them, result.json last.
-
-    An error while writing thus leaves no incomplete set of files.
-    """
-    with tempfile.TemporaryDirectory(prefix=".writing_", dir=folder) as part:
-        made = Path(part)
+    """Write all files."""
+    with written_at_once(folder) as made:
         write_csv(made / "estimate.csv", found.history.names, found.history.t, found.value, found.std)
         write_page(made, found, result, truth)
         result.write(made / "result.json")
-        for file in sorted(made.iterdir(), key=lambda f: f.name == "result.json"):
-            file.replace(folder / file.name)

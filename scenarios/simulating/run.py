@@ -12,7 +12,7 @@ from fmus.host.apart.isolation import ISOLATED, FmuEnded, Isolation
 from fmus.host.fmu import FmuError
 from fmus.host.master.recording import Recording
 from scenarios.experiment.validation import of_file
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 from scenarios.simulating.asking import (
     Asked,
     asked,
@@ -65,17 +65,24 @@ def run(
             cases = _all_prepared(read, questions, builder, stack, tell, isolation)
             runs, summaries = _run_all(cases, read, folder, tell)
             result = _judged(read, questions, runs, summaries, folder, begun)
-            result.write(folder / "result.json")  # written before the figures, which may fail
+            _write(result)  # before the figures, which may fail
             if result.interrupted_at is not None:
                 return result
             from scenarios.simulating.drawing import write_figure  # loads Matplotlib
 
             tell(f"{read.id}: drawing")
             pictures = enumerate(read.declared.figure)
-            figures = tuple(write_figure(p, i, questions, runs, folder) for i, p in pictures)
+            with written_at_once(folder) as part:
+                drawn = [write_figure(p, i, questions, runs, part).name for i, p in pictures]
+    figures = tuple(folder / name for name in drawn)
     result = replace(result, figures=figures, wall_seconds=perf_counter() - begun)
-    result.write(folder / "result.json")
+    _write(result)
     return result
+
+
+def _write(result: Result) -> None:
+    with written_at_once(result.folder) as part:
+        result.write(part / "result.json")
 
 
 def run_all(
@@ -110,7 +117,8 @@ def run_all(
     if len(results) > 1:
         from scenarios.simulating.contact_sheet import write_contact_sheet  # loads a library of pictures
 
-        write_contact_sheet(results, folder / "contact-sheet.png")
+        with written_at_once(folder) as part:
+            write_contact_sheet(results, part / "contact-sheet.png")
     return results
 
 
@@ -179,15 +187,15 @@ def _progress(case: Case, name: str, scenario: Scenario, tell: Tell) -> Progress
 def _written(run: Run, name: str, case: Case, scenario: Scenario, folder: Path, took: float) -> RunSummary:
     """Write a variant's recording and the readings of its sensors."""
     ending = scenario.variants[name].record.format
-    target = folder / f"{name}.{ending}"
-    recording, measured = run.recording, None
-    (recording.to_csv if ending == "csv" else recording.to_parquet)(target)
-    if run.measured is not None:
-        measured = f"{name}-measured.{ending}"
-        (run.measured.to_csv if ending == "csv" else run.measured.to_parquet)(folder / measured)
+    file, measured = f"{name}.{ending}", None if run.measured is None else f"{name}-measured.{ending}"
+    recording = run.recording
+    with written_at_once(folder) as part:
+        (recording.to_csv if ending == "csv" else recording.to_parquet)(part / file)
+        if run.measured is not None and measured is not None:
+            (run.measured.to_csv if ending == "csv" else run.measured.to_parquet)(part / measured)
     stopped = recording.interrupted_at
     simulated = case.duration if stopped is None else stopped
-    return RunSummary(target.name, measured, simulated, took, stopped)
+    return RunSummary(file, measured, simulated, took, stopped)
 
 
 def _judged(

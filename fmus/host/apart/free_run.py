@@ -27,7 +27,7 @@ def simulate_apart(
 ) -> list[Array]:
     """Outputs (N, n) of each run; FmuError where the FMU refuses a call, FmuEnded where it must be ended."""
     with Room(isolation or Isolation()) as room:
-        return [room.call(_simulated, fmu, run, list(outputs)) for run in runs]
+        return [room.call(_simulated, fmu.absolute(), run, list(outputs)) for run in runs]
 
 
 def _simulated(fmu: Path, run: FreeRun, outputs: Sequence[str]) -> Array:
