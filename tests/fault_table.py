@@ -10,8 +10,8 @@ FILE = Path(__file__).parents[1] / "docs" / "faults.md"
 HEAD = """# Faults that the tests try
 
 Written by `python -m tests.fault_table` from the cases of the tests. Misbehaving FMUs are compiled from
-[one C file](../tests/helpers/c/misbehaving.c). A fault in `late` is one in `fmi2DoStep` at t = 0.05 s. "All commands"
-are {commands}.
+[one C file](../tests/helpers/c/misbehaving.c). A fault in `late` is one in `fmi2DoStep` at t = 0.05 s. "All
+commands" are {commands}.
 
 | fault | command | what happens | test |
 |---|---|---|---|
