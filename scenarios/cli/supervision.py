@@ -48,7 +48,13 @@ def supervised(command: Command, arguments: Sequence[str]) -> int:
     """Run a command in a process of its own; its exit code, or 128 plus the signal that interrupted it."""
     if not hasattr(os, "fork"):
         return command(arguments)
-    folder = tempfile.mkdtemp(prefix="railfmi_")
+    try:
+        folder = tempfile.mkdtemp(prefix="railfmi_")
+    except OSError as error:
+        _say(
+            f"no temporary folder can be made ({error.strerror}); free space, or set TMPDIR to another folder"
+        )
+        return FAILED
     page = mmap.mmap(-1, PAGE)
     told, tells = os.pipe()
     child = os.fork()
@@ -100,9 +106,9 @@ class Watch:
             return 128 + self._signal if self._signal else code
         if self._signal:
             hint = next((HINTS[name] for name in self._arguments if name in HINTS), "")
-            self._say(f"interrupted{hint}")
+            _say(f"interrupted{hint}")
             return 128 + self._signal
-        self._say(self._sentence(os.waitstatus_to_exitcode(status)))
+        _say(self._sentence(os.waitstatus_to_exitcode(status)))
         return FAILED
 
     def _code(self) -> int | None:
@@ -141,9 +147,10 @@ class Watch:
             "or incomplete; 'railfmi check' on the FMU shows in which call this happens"
         )
 
-    def _say(self, sentence: str) -> None:
-        shown = f"{SHOW_CURSOR}\n" if sys.stderr.isatty() else ""
-        os.write(2, f"{shown}railfmi: {sentence}\n".encode())
+
+def _say(sentence: str) -> None:
+    shown = f"{SHOW_CURSOR}\n" if sys.stderr.isatty() else ""
+    os.write(2, f"{shown}railfmi: {sentence}\n".encode())
 
 
 def _send(how: Callable[[int, int], None], to: int, number: int) -> None:

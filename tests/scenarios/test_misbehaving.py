@@ -1,5 +1,6 @@
 """Misbehaving FMUs through every command: one sentence, exit code 2, and what was recorded is kept."""
 
+import json
 import re
 from pathlib import Path
 
@@ -69,3 +70,29 @@ def test_what_does_no_harm_is_no_failure(fault, tmp_path, compiled, capfd, monke
     code, out, err = told("run", fault, tmp_path, compiled, capfd, monkeypatch)
     assert code == 0, err
     assert out.splitlines()[0].startswith("bad: 1 of 1 expectations met")
+
+
+@pytest.mark.parametrize(
+    "command", ["run", *(pytest.param(c, marks=pytest.mark.slow) for c in ("estimate", "close-loop"))]
+)
+def test_isolation_changes_no_result(command, tmp_path, compiled, monkeypatch):
+    bad_fmu(tmp_path, Fault("none", "none", ""), compiled)
+    monkeypatch.chdir(tmp_path)
+    found = []
+    for trusted in ((), ("--trust-fmu",)):
+        run_safely([*COMMANDS[command], "--out", f"out{len(trusted)}", *trusted])
+        result = json.loads((tmp_path / f"out{len(trusted)}" / "result.json").read_text())
+        found.append(untimed(result))
+    assert found[1] == found[0]
+    for table in ("run.parquet", "estimate.csv"):
+        files = [tmp_path / f"out{i}" / table for i in (0, 1)]
+        assert files[0].exists() == files[1].exists()
+        assert not files[0].exists() or files[0].read_bytes() == files[1].read_bytes()
+
+
+def untimed(value: object) -> object:
+    """A result without the times that its computation took, and what follows from these."""
+    if isinstance(value, dict):
+        timed = ("speed", "access", "refused")
+        return {k: untimed(v) for k, v in value.items() if "seconds" not in k and k not in timed}
+    return [untimed(v) for v in value] if isinstance(value, list) else value
