@@ -13,6 +13,7 @@ from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import build_quick
 from fmus.export.provenance import isolation_of
 from fmus.host.apart.isolation import ISOLATED, Isolation
+from fmus.host.apart.room import closing_rooms
 from fmus.host.archive import Archive
 from fmus.host.grading.honest import check_honest
 from fmus.models import model_class
@@ -68,7 +69,7 @@ def estimate(
         raise BadInput(f"{e.file}: has no [estimate]; list there the parameters, states or inputs to find")
     chosen = options or e.estimate.options
     folder = None if out is None else writable(Path(out))
-    with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work:
+    with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work, closing_rooms():
         tell("opening the FMU and the record")
         fmu = fmu_of(e, Path(work))
         if e.model is None:

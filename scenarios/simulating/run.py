@@ -9,6 +9,7 @@ from time import perf_counter
 
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import ISOLATED, FmuEnded, Isolation
+from fmus.host.apart.room import closing_rooms
 from fmus.host.fmu import FmuError
 from fmus.host.master.recording import Recording
 from scenarios.experiment.validation import of_file
@@ -58,6 +59,7 @@ def run(
     read = load_scenario(scenario)
     folder = writable(Path(out))
     with ExitStack() as stack:
+        stack.enter_context(closing_rooms())
         if builder is None:
             builder = Builder(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_run_"))))
         with of_file(read.file):

@@ -62,7 +62,7 @@ def test_an_end_is_one_sentence_and_exit_code_2(command, fault, tmp_path, compil
     if command == "run" and fault.call == "late":
         kept = read_recording(tmp_path / "out" / "run.parquet").data
         assert kept["time"].iloc[-1] == pytest.approx(0.05)
-        assert "what was recorded until t = 0.05 s is in out" in lines[0]
+        assert f"what was recorded until t = 0.05 s is in {tmp_path}" in lines[0]
 
 
 @pytest.mark.parametrize("fault", HARMLESS, ids=lambda fault: fault.name)
@@ -76,8 +76,11 @@ def test_what_does_no_harm_is_no_failure(fault, tmp_path, compiled, capfd, monke
     "command", ["run", *(pytest.param(c, marks=pytest.mark.slow) for c in ("estimate", "close-loop"))]
 )
 def test_isolation_changes_no_result(command, tmp_path, compiled, monkeypatch):
-    bad_fmu(tmp_path, Fault("none", "none", ""), compiled)
+    """Nor does what another FMU has left in its process, as the direction of rounding."""
     monkeypatch.chdir(tmp_path)
+    bad_fmu(tmp_path, Fault("rounding", "step", ""), compiled)
+    run_safely([*COMMANDS["run"], "--out", "rounding"])
+    bad_fmu(tmp_path, Fault("none", "none", ""), compiled)
     found = []
     for trusted in ((), ("--trust-fmu",)):
         run_safely([*COMMANDS[command], "--out", f"out{len(trusted)}", *trusted])

@@ -7,10 +7,10 @@ numbers are the same and a call costs some 50 µs. What is asked and answered li
 
 import socket
 import time
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from multiprocessing.util import Finalize
-from threading import RLock
+from threading import RLock, local
 from typing import Any, TypeVar, cast
 
 from fmus.host.apart import serving
@@ -220,23 +220,36 @@ class Called:
         return serving.asking, (self._number,)
 
 
-@cache
-def _rooms() -> dict[Isolation, Room]:
-    return {}
+class _Rooms(local):
+    """The rooms of a thread, by their limits."""
+
+    def __init__(self) -> None:
+        self.open: dict[Isolation, Room] = {}
+
+
+ROOMS = _Rooms()
 
 
 def room_of(isolation: Isolation) -> Room:
-    """The room of this process with these limits; a new one where an FMU has ended the last."""
-    rooms = _rooms()
-    if isolation not in rooms or rooms[isolation].ended:
-        rooms[isolation] = Room(isolation)
-    return rooms[isolation]
+    """The room of this thread with these limits; a new one where an FMU has ended the last."""
+    if isolation not in ROOMS.open or ROOMS.open[isolation].ended:
+        ROOMS.open[isolation] = Room(isolation)
+    return ROOMS.open[isolation]
 
 
 def close_rooms() -> None:
-    """End the processes of all rooms that `room_of` made."""
-    while _rooms():
-        _rooms().popitem()[1].close()
+    """End the rooms of this thread: what an FMU has changed in its process goes with it."""
+    while ROOMS.open:
+        ROOMS.open.popitem()[1].close()
+
+
+@contextmanager
+def closing_rooms() -> Iterator[None]:
+    """End the rooms of this thread afterwards."""
+    try:
+        yield
+    finally:
+        close_rooms()
 
 
 def _end(process: Process, connection: socket.socket) -> None:
