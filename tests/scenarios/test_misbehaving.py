@@ -18,8 +18,8 @@ COMMANDS = {
     "compare": ["compare", "bad.fmu", "bad.fmu", "experiment.toml", *LIMITS],
 }
 EVERY = [(command, fault) for fault in (*DEATHS, *ENDLESS) for command in COMMANDS]
-# each fault once, by turns through the commands; endless ones take as long as their limit
-QUICK = {(list(COMMANDS)[i % len(COMMANDS)], fault) for i, fault in enumerate(DEATHS)}
+# every third fault, by turns through the commands; endless ones take as long as their limit
+QUICK = {(list(COMMANDS)[i % len(COMMANDS)], fault) for i, fault in enumerate(DEATHS[::3])}
 QUICK |= {("run", ENDLESS[0]), ("compare", ENDLESS[-1])}
 
 
@@ -65,7 +65,11 @@ def test_an_end_is_one_sentence_and_exit_code_2(command, fault, tmp_path, compil
         assert f"what was recorded until t = 0.05 s is in {tmp_path}" in lines[0]
 
 
-@pytest.mark.parametrize("fault", HARMLESS, ids=lambda fault: fault.name)
+@pytest.mark.parametrize(
+    "fault",
+    [pytest.param(fault, marks=() if i % 3 == 0 else pytest.mark.slow) for i, fault in enumerate(HARMLESS)],
+    ids=lambda fault: fault.name,
+)
 def test_what_does_no_harm_is_no_failure(fault, tmp_path, compiled, capfd, monkeypatch):
     code, out, err = told("run", fault, tmp_path, compiled, capfd, monkeypatch)
     assert code == 0, err
