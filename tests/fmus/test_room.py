@@ -176,6 +176,7 @@ def test_functions_of_this_process_are_called_from_there():
         assert room.call(map_once, room.function(lambda x: x + 1)) == 2.0
         with pytest.raises(BadInput, match="not today"):
             room.call(map_once, room.function(refuse))
+        assert not room._functions  # nothing of a call is kept
 
 
 def refuse(_):

@@ -87,7 +87,6 @@ class Room:
         with self._lock:
             if self._ended:
                 raise FmuEnded(self._ended)
-            functions = len(self._functions)
             self.page.cells[STOP], self._stop_by = 0, float("inf")
             try:
                 return self._result(keep, function, args, kwargs)
@@ -100,7 +99,7 @@ class Room:
                     self._kill("it was interrupted")
                 raise
             finally:
-                del self._functions[functions:]
+                self._functions.clear()
 
     def _result(self, keep: bool, function: Callable[..., Any], args: Any, kwargs: Any) -> Any:
         unused, self.unused = self.unused, []
