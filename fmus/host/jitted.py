@@ -102,8 +102,8 @@ def march() -> Callable[..., tuple[int, int]]:
     calls: addresses of the functions that set, step and get; u: (N-1, n_u) acts over a step; ends: (N-1, n_u)
     is set after it, (0, n_u) for none; told: (6,) int64, all 0, becomes what the last step of an FMI 3.0 FMU
     answered (event, ends, early, the time that it reached), the number of the step and what is done in it;
-    now: (1,) becomes the time of the step, s. Both lie on the page that another process may watch; final: whether no
-    earlier state will come back.
+    now: (1,) becomes the time of the step, s. Both lie on the page that another process may watch.
+    final: whether no earlier state will come back.
     """
     compiled: Callable[..., tuple[int, int]] = numba.njit(cache=True, nogil=True)(_march)
     return compiled
