@@ -115,7 +115,12 @@ def _death(what: str, call: str) -> Fault:
 
 DEATHS = (
     *(_death(what, "late") for what in (*SIGNALS, *EXITS)),
-    *(_death(what, call) for what in ("segfault", "exit0", "_exit0") for call in CALLS if call != "late"),
+    *(
+        _death(what, call)
+        for what in ("segfault", "exit0", "_exit0")
+        for call in CALLS
+        if call not in ("late", "reset")
+    ),
     Fault("memory", "late", "fmi2DoStep.*memory|fmi2DoStep.*Aborted"),
 )
 ENDLESS = tuple(_death(what, call) for what in HANGS for call in ("late", "leave", "instantiate"))
