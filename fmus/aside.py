@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fmus.errors import BadInput
 
-LONG = 1 << 20  # bytes from which an array is set aside
+LONG = 1 << 23  # bytes from which an array is set aside: eight channels at 1 kHz for two minutes
 BLOCK = 1 << 25  # bytes of a block in which long arrays are computed
 FILE = 1 << 28  # bytes of a file that several arrays share, for a process may open a thousand files only
 FOLDER = "/var/tmp"  # for files that are too large for a file system in memory; TMPDIR may name another

@@ -1,17 +1,64 @@
 """The folder into which a command writes its results."""
 
 import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from fmus.errors import BadInput
 
+WRITING = ".writing_"  # begin of the name of a folder of files that are not complete
+LAST = "result.json"  # moved last, so that a folder that holds it is complete
+
 
 def writable(folder: Path) -> Path:
-    """Make the folder if it does not exist; raises BadInput if it cannot be made or written to."""
+    """Make the folder if it does not exist, and return its absolute path.
+
+    What a command that was killed left in it is removed. BadInput if it cannot be made or written to.
+    """
     try:
+        folder = folder.absolute()  # an FMU may change the working directory
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from error
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise BadInput(f"--out {folder}: cannot be made ({why}); name another folder") from error
     if not os.access(folder, os.W_OK):
         raise BadInput(f"--out {folder}: may not be written to; name another folder")
+    for left in folder.glob(f"{WRITING}*"):
+        if not _lives(left.name.removeprefix(WRITING).partition("_")[0]):
+            shutil.rmtree(left, ignore_errors=True)
     return folder
+
+
+@contextmanager
+def written_at_once(folder: Path) -> Iterator[Path]:
+    """A folder for files that are moved to `folder` when all are complete; none is if one fails.
+
+    BadInput if the disk is full or may not be written to.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix=f"{WRITING}{os.getpid()}_", dir=folder) as part:
+            yield Path(part)
+            for file in sorted(Path(part).iterdir(), key=lambda f: f.name == LAST):
+                file.replace(folder / file.name)
+    except OSError as error:
+        raise unwritten(error, folder) from error
+
+
+def unwritten(error: OSError, folder: object) -> BadInput:
+    """The error in one line; the folder is named if the error names no file."""
+    why = error.strerror or " ".join(str(error).split())
+    return BadInput(f"{folder}: cannot be written ({why}); free space, or name another folder")
+
+
+def _lives(process: str) -> bool:
+    """Whether a process of this number runs; another user's does as well."""
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, ValueError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from fmus.aside import blocks
 from fmus.errors import BadInput, did_you_mean
+from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
 from fmus.host.fmi2 import Fmi2Instance
@@ -18,27 +18,35 @@ from fmus.host.rows import AT_ONCE, Inputs, Rows, base_of, offers_rows
 
 
 class FmuError(RuntimeError):
-    """An FMU refused a call; the sentence says which and what it gave as the reason."""
+    """An FMU refused a call; the sentence says which and what it gave as the reason.
+
+    so_far: the Recording of a run until then.
+    """
+
+    so_far: Any = None
 
 
 class Fmu:
     """An instance of a co-simulation FMU.
 
     source: an FMU file, or an Archive that stays open while its instances live.
-    BadInput where the file cannot be used, FmuError where the running FMU refuses a call.
+    isolation: for a file, limits of the process in which it runs; None: it runs in this process.
+    BadInput where the file cannot be used, FmuError where the running FMU refuses a call, FmuEnded where it
+    ends the process in which it runs.
     """
 
-    def __init__(self, source: str | Path | Archive) -> None:
-        self._own = None if isinstance(source, Archive) else Archive(source)
+    def __init__(self, source: str | Path | Archive, isolation: Isolation | None = None) -> None:
+        self._own = None if isinstance(source, Archive) else Archive(source, isolation)
         archive = source if isinstance(source, Archive) else self._own
         if archive is None:
             raise BadInput("no FMU given")
         self.description: FmuDescription = archive.description
         self.name = archive.path.name
         self.time = 0.0
+        self._sent: tuple[Array, Array] | None = None  # times and inputs that an instance apart has
         try:
             kind = Fmi3Instance if self.description.fmi_version == "3.0" else Fmi2Instance
-            self._instance: Instance = self._safely(kind, archive, self.description.name)
+            self._instance: Instance = self._safely(archive.made, kind, self.description.name)
         except BaseException:
             if self._own:
                 self._own.close()
@@ -84,16 +92,28 @@ class Fmu:
         manyth is returned, ((N - 1) // every + 1, n_y).
         """
         first, u = _driving(t, inputs)
-        self.restart(float(t[0]), **{**start, **first})
-        found = np.empty(((len(t) - 1) // every + 1, len(outputs)))
-        found[0] = self.read(outputs)
-        put, get, more = self.references(inputs), self.references(outputs), len(u) - len(t) + 1
-        for rows in blocks(len(t) - 1, 8 * (len(outputs) + u.shape[1]), every):
-            given = t[rows.start : rows.stop + 1], u[rows.start : rows.stop + more]
-            y = self._safely(self._instance.run, *given, put, get)[every - 1 :: every]
-            found[rows.start // every + 1 :][: len(y)] = y
+        begin = {**start, **first}
+        read, driven = self.references(outputs), self.references(inputs)
+        times, held = (t, u) if isinstance(self._instance, Instance) else self._news(t, u)
+        y: Array = self._safely(
+            self._instance.simulate,
+            self.references(begin),
+            list(begin.values()),
+            times,
+            held,
+            driven,
+            read,
+            every,
+        )
         self.time = float(t[-1])
-        return found
+        return y
+
+    def _news(self, t: Array, u: Array) -> tuple[Array | None, Array | None]:
+        """Times and inputs to send to another process; None if they are those of the last simulation."""
+        if self._sent and all(map(np.array_equal, self._sent, (t, u))):
+            return None, None
+        self._sent = t.copy(), u.copy()
+        return t, u
 
     @property
     def at_once(self) -> int:

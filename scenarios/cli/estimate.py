@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from fmus import limits
+from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, said
 
 
 @app.command()
@@ -15,12 +16,19 @@ def estimate(
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
+    trust_fmu: Trust = False,
+    call_limit: CallLimit = limits.CALL,
+    run_limit: RunLimit = limits.RUN,
+    memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
     """Estimate states, parameters and unknown inputs of an FMU; exit 1 if the filter fails its tests."""
+    from fmus.host.apart.isolation import Isolation
     from scenarios.estimating.estimating import estimate as filtered
 
+    isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
+
     with said.status("reading the experiment") as status:
-        result = filtered(experiment, out, data, tell=status.update)
+        result = filtered(experiment, out, data, tell=status.update, isolation=isolation)
     for name, found in result.estimated.items():
         spread, unit = found["std_error"], found["unit"] or ""
         bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""

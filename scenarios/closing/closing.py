@@ -20,14 +20,16 @@ from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
-from fmus.export.provenance import Origin, checksum
+from fmus.export.provenance import Origin, checksum, isolation_of
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
+from fmus.host.grading.honest import check_honest
 from scenarios.closing.result import Result, result_of
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 Tell = Callable[[str], None]
 
@@ -46,6 +48,7 @@ def close_loop(
     jobs: int | None = None,
     seed: int = 0,
     resume: bool = False,
+    isolation: Isolation | None = ISOLATED,
 ) -> Result:
     """Run `railfmi close-loop` and return the result that is written as result.json.
 
@@ -55,12 +58,13 @@ def close_loop(
     jobs: number of processes, by default one per core.
     seed: seed of the random numbers.
     resume: continue from the checkpoints that an interrupted run left in `out`.
-    Raises BadInput if the experiment is wrong.
+    isolation: limits of the processes in which a foreign FMU runs; None runs it in this process.
+    Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit.
     """
     begun = time.monotonic()
     declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
-        posed = Posed.of(declared, Path(work))
+        posed = Posed.of(declared, Path(work), isolation)
         folder = None if out is None else writable(Path(out))
         stages = stages_of(declared, folder, seed, resume)
         result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]
@@ -77,9 +81,11 @@ class Posed:
     problem: Problem
 
     @classmethod
-    def of(cls, declared: Experiment, work: Path) -> "Posed":
+    def of(cls, declared: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> "Posed":
         """The question of an experiment; work: folder for the builds of its FMU."""
-        builder = builder_for(declared, work)
+        builder = builder_for(declared, work, isolation)
+        if declared.fmu_path:
+            check_honest(declared.fmu_path, isolation or ISOLATED)
         return cls(declared, builder, pose(declared, builder))
 
 
@@ -131,23 +137,24 @@ def closed(
     if folder is None:
         return found, result_of(e.id, problem, found, time.monotonic() - begun, ())
     tell("building the augmented FMU and writing the report")
-    augmented = augment(posed.builder, e, problem, found, folder, tell)
-    result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
-    from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
+    with written_at_once(folder) as part:
+        augmented = augment(posed.builder, e, problem, found, part, tell)
+        result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
+        from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
 
-    write_report(folder, problem, found, result)
-    result.write(folder / "result.json")
+        write_report(part, problem, found, result)
+        result.write(part / "result.json")
     return found, result
 
 
-def builder_for(e: Experiment, work: Path) -> Builder:
+def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> Builder:
     """The builder of the experiment's FMUs: from one of our models, or from a foreign FMU."""
     if e.model is not None:
         return ModelBuilder(e.model, work)
     if e.fmu_path is None:
         raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
     ports = tuple(PortNames(p.name, p.force, p.velocity, p.displacement) for p in e.ports)
-    return ForeignBuilder(e.fmu_path, ports, work)
+    return ForeignBuilder(e.fmu_path, ports, work, isolation_of(e.fmu_path, isolation))
 
 
 def pose(e: Experiment, builder: Builder) -> Problem:

@@ -174,7 +174,7 @@ def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: R
     first = [values.get(n, d.variables[n].start or 0.0) for n in states]
     constants = {n: v for n, v in values.items() if n not in put}
     get = [*states, *(n for n in record.outputs if n not in states)]
-    with Copies(archive, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
+    with archive.made(Copies, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
         row = np.array([*first, *s.u[0].tolist()])
         return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), s.step))
 

@@ -43,11 +43,12 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
 
     Raises BadInput with one line that names the file, the key and the way out.
     """
-    file = Path(path)
+    file = Path(path).absolute()  # an FMU may change the working directory
     declared = read_file(Declaration, file, "an experiment.toml")
     if declared.model is not None:
         _check_model(file, declared.model)
-    place: dict[str, Any] = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
+    data = file.parent if data_dir is None else Path(data_dir).absolute()
+    place: dict[str, Any] = {"file": file, "data_dir": data}
     return Experiment.model_construct(**dict(declared), **place)
 
 

@@ -30,6 +30,7 @@ CHOOSE = 0.2  # share of the identify part that becomes the part to choose, if n
 PIECES = 5  # number of pieces in which these samples lie
 GRID = 15  # samples; pieces begin at multiples of it, so that screening can average 3 or 5 samples
 MIN_SAMPLES = 50  # samples in each part; with fewer, an error is within its own scatter
+LARGEST = 1e100  # of a measured number
 MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
 
 
@@ -131,6 +132,11 @@ def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -
         check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
         if np.isfinite(values).sum() < MIN_MEASURED:
             raise BadInput(f"{file}: column '{column}' has almost no numbers; leave its output out")
+        if np.nanmax(np.abs(values)) > LARGEST:
+            raise BadInput(
+                f"{file}: column '{column}' holds numbers above {LARGEST:g}, whose squares cannot be summed; "
+                "mend the column or leave it out"
+            )
     notes = list(time_notes(file.name, t))
     for column in measured:
         notes += output_notes(file.name, column, data[column][np.isfinite(data[column])])

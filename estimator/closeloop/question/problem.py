@@ -17,6 +17,7 @@ from estimator.record import Array, Record, Run
 from estimator.sensor_faults import faulty
 from fmus.aside import set_aside
 from fmus.export.around.outside import Outside
+from fmus.host.apart.isolation import Isolation
 from fmus.host.description import PortNames
 
 START_SAMPLES = 20  # first samples from which the start value of a measured state is estimated
@@ -56,6 +57,10 @@ class Builder(Protocol):
     def quick(self) -> bool:
         """Whether an FMU with effects simulates as fast as one without."""
 
+    @property
+    def isolation(self) -> Isolation | None:
+        """Limits of the process in which the FMUs run; None: the process that uses them."""
+
     def outside(self) -> Outside:
         """Ports, parameters and inputs of the FMU at which effects can be placed."""
 
@@ -92,7 +97,12 @@ class Problem:
     @property
     def plant(self) -> Plant:
         """The FMU as a function of inputs and parameters; one instance per process."""
-        return PLANTS.get(self.builder(self.effects), self.record.inputs, self.record.outputs)
+        return self.plant_with(self.record.outputs)
+
+    def plant_with(self, outputs: tuple[str, ...]) -> Plant:
+        """The same with other outputs."""
+        builder = self.builder
+        return PLANTS.get(builder(self.effects), self.record.inputs, outputs, builder.isolation)
 
     @property
     def at_once(self) -> int:

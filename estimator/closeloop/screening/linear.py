@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from estimator.closeloop.question.problem import Problem
 from estimator.filters.algebra import compiled
-from estimator.plant import PLANTS
 from estimator.record import Array
 from fmus.aside import blocks, set_aside
 from fmus.host.description import FmuVariable
@@ -75,7 +74,7 @@ def linearise(
     levers: inputs; more: further outputs, beside those of the record.
     """
     record, run = problem.record, problem.record.runs[0]
-    plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
+    plant = problem.plant_with((*record.outputs, *more))
     index = np.unique(np.linspace(0, len(keep) - 2, min(LINEARISATIONS, len(keep) - 1)).astype(int))
     start, known = problem.start(theta), plant.fmu.description.variables
     nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fmus.errors import BadInput
 from fmus.registry import classes_in
+from fmus.taken import check_file
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -40,4 +41,5 @@ def read_sheet(file: Path, time: str | None = None, columns: Collection[str] | N
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise BadInput(f"{file}: has no known format; convert it to one of {known}")
+    check_file(file)
     return reader.read(file, time, columns)
