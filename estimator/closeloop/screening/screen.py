@@ -77,6 +77,12 @@ class Screening:
         own |= {c: self._fault(c) for c in candidates if c.is_fault}
         return [own[c] for c in candidates]
 
+    def prepare(self, candidates: Sequence[Candidate]) -> None:
+        """Linearise the FMU for all candidates at once, so that their changes can be asked for in parts."""
+        levers = dict.fromkeys(n for c in candidates if not c.is_fault for n in self._around(c).told)
+        if levers and self._states is not None:
+            self._linearised(list(levers), self._states)
+
     @property
     def length(self) -> float:
         """Length of the fitted run, s."""
@@ -84,13 +90,17 @@ class Screening:
 
     def _moved(self, c: Candidate) -> list[dict[str, Array]]:
         """Changes of the inputs and parameters of the FMU by each amplitude of a candidate."""
+        course = self._courses.get(c.location, self._free)
+        return [shifts(self._around(c), course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
+
+    def _around(self, c: Candidate) -> Around:
+        """The equations of a candidate's effect."""
         if c.label not in self._made:
             self._made[c.label] = around(self.problem.builder.outside(), [(c.kind, c.location)])
-        course = self._courses.get(c.location, self._free)
-        return [shifts(self._made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
+        return self._made[c.label]
 
     @cached_property
-    def _at(self) -> NDArray[np.intp]:
+    def samples(self) -> NDArray[np.intp]:
         """Index of the middle sample of each group, up to the end of the part to identify."""
         return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
 
@@ -101,7 +111,7 @@ class Screening:
     @cached_property
     def _free(self) -> Course:
         """The simulation of the first run of the record."""
-        problem, theta, at = self.problem, self.theta, self._at
+        problem, theta, at = self.problem, self.theta, self.samples
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
         plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
@@ -136,12 +146,12 @@ class Screening:
         if self._states is None:
             return [self._simulated(change) for change in moved]
         local, levers = self._linearised(names_of(moved), self._states)
-        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group)
+        fit, scale = self.problem.record.runs[0].fit[self.samples], -np.sqrt(self.group)
         found: list[Array] = []
         for i in range(0, len(moved), CHANGES_AT_ONCE):
             some = moved[i : i + CHANGES_AT_ONCE]
             with np.errstate(over="ignore", invalid="ignore"):
-                shown = responses(local, levers, some, len(self._at))[:, fit]
+                shown = responses(local, levers, some, len(self.samples))[:, fit]
                 columns = np.array([scale * self.weighting.of(y, self._stretches).ravel() for y in shown])
                 sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
             # the linearised response of a model with stick and slip may diverge, so that it is simulated
@@ -150,7 +160,7 @@ class Screening:
 
     def _linearised(self, levers: list[str], x: Array) -> tuple[Linearised, dict[str, Influence]]:
         if self._local is None or not set(levers) <= set(self._local[1]):
-            self._local = influences(self.problem, self.theta, x, self._at, levers)
+            self._local = influences(self.problem, self.theta, x, self.samples, levers)
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:
@@ -161,7 +171,7 @@ class Screening:
         push = {}
         for name, samples in change.items():
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
-            push[name] = rest + np.interp(np.arange(len(run.t)), self._at, samples)
+            push[name] = rest + np.interp(np.arange(len(run.t)), self.samples, samples)
         moved = plant.simulate(run, start, push=push) - self._unchanged
         return self._weighted(moved[run.fit])
 
