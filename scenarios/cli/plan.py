@@ -16,7 +16,7 @@ def plan(
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
 ) -> None:
-    """Say which effects the inputs and sensors of an experiment could show and tell apart, and what would help.
+    """Say which effects an experiment could show and tell apart, and what would help.
 
     Only the time and the inputs are read from the data; the outputs need not exist.
     """

@@ -66,10 +66,10 @@ def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
     check_names(experiment, description)
     scale, _ = _conversions(experiment, description)
     needed = {c.column for c in experiment.input_columns.values()}
-    for name, derived in reversed(experiment.derived.items()):
+    for name, made in reversed(experiment.derived.items()):
         if name in needed:
-            needed.add(derived.derivative)
-    derived = {name: d for name, d in experiment.derived.items() if name in needed}
+            needed.add(made.derivative)
+    derived = {name: made for name, made in experiment.derived.items() if name in needed}
     inputs_alone = experiment.model_copy(update={"outputs": {}, "derived": derived})
     record = load_record(inputs_alone, description)
     std = [output.noise_std or np.nan for output in experiment.outputs.values()]

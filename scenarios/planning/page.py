@@ -15,6 +15,7 @@ from scenarios.planning.result import PlanResult
 
 HERE = Path(__file__).parent
 BEST = 4  # sensors and changes of inputs that are listed for a class; plan.json has all
+PERCENT = 5e-3  # share from which on one decimal of a percentage is enough
 Row = dict[str, Any]
 
 
@@ -84,13 +85,14 @@ def _visible(v: Row) -> Row:
         "smallest": told("smallest"),
         "largest": told("largest"),
         "output": v["output"],
-        "share": NOTHING
-        if v["share"] is None
-        else percent(v["share"])
-        if v["share"] > 1e-3
-        else number(v["share"], 2),
+        "share": NOTHING if v["share"] is None else _share(v["share"]),
         "shape": ", ".join(f"{n} = {short(x, 3)}" for n, x in v["shape"].items()) or NOTHING,
     }
+
+
+def _share(share: float) -> str:
+    """A share in percent, also a very small one."""
+    return percent(share) if share > PERCENT else f"{number(100 * share, 2)}\u00a0%"
 
 
 def _embedded(plot: Any, folder: Path) -> Row:

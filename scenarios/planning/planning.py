@@ -93,7 +93,7 @@ def _sensors(e: Experiment, problem: Problem, record: Record) -> tuple[str, ...]
 
 
 def _noise(e: Experiment, problem: Problem, declared: dict[str, float]) -> Array:
-    """Noise of each output (n_y,): declared, else a share of its rms or, if it rests at zero, of its nominal value."""
+    """Noise of each output (n_y,): declared, else a share of its rms, or of its nominal value."""
     [y] = problem.simulate({})
     known = problem.plant.fmu.description.variables
     told = {n: s for n, s in declared.items() if np.isfinite(s)} | e.plan.sensors

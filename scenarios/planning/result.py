@@ -134,7 +134,7 @@ def table_of(result: PlanResult) -> Iterator[str]:
     """The lines that the command prints."""
     seen = len(result.alone) + sum(len(c["effects"]) for c in result.classes)
     yield (
-        f"{result.experiment}: {result.seconds:g} s; of {seen + len(result.hidden)} effects and faults, {seen} "
+        f"{result.experiment}: {result.seconds:g} s; of {seen + len(result.hidden)} effects, {seen} "
         f"could be seen, {len(result.alone)} of these told from all others"
     )
     yield (

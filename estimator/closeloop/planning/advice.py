@@ -51,9 +51,11 @@ def sentences(c: EffectClass, length: float) -> list[str]:
         found.append(f"by simulation, a record of the same length, {', or '.join(named)}")
     if c.times is not None and c.times > 1:
         found.append(
-            f"a record of {c.times * length:.3g} s with the same excitation would tell all of them apart"
+            f"a record of the same excitation over {c.times * length:.3g} s would tell all of them apart"
         )
-    return found or ["no other output of the FMU and none of the simulated changes of its inputs would do"]
+    if found:
+        return found
+    return ["by simulation, no other output would do, and no change of the inputs within the FMU's limits"]
 
 
 def _said(s: Splitter, c: EffectClass, noise: str) -> str:
@@ -94,7 +96,7 @@ def _question(baseline: Baseline) -> Question:
 
 
 def _assumed_noise(y: Array) -> Array:
-    """Noise (n,) assumed for outputs y (N, n); infinite where they rest at zero, so that they are not named."""
+    """Noise (n,) assumed for outputs y (N, n); infinite where they rest at zero."""
     rms = np.sqrt(np.mean(y**2, axis=0))
     return np.asarray(np.where(rms > 0, ASSUMED_NOISE * rms, np.inf))
 

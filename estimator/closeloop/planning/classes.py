@@ -39,9 +39,10 @@ class Splitter:
 class EffectClass:
     """Effects that the record does not tell apart; a single effect is told from all others.
 
-    sizes: amplitudes with which they are compared, in scales of the first variant of each; margin: of the closest pair; pairs: their number; score: difference of the log scores on the part to
-    choose; size: how many times as large all effects had to be, infinite if no size would do; times: how
-    many times as long the record, None if up to 100 times would not do; sensors, excitations: best first.
+    sizes: amplitudes with which they are compared, in scales of the first variant of each; margin: of the
+    closest pair; pairs: their number; score: difference of the log scores on the part to choose; size: how
+    many times as large all effects had to be, infinite if no size would do; times: how many times as long the
+    record, None if up to 100 times would not do; sensors, excitations: best first.
     """
 
     members: tuple[Sought, ...]

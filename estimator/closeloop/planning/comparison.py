@@ -1,10 +1,10 @@
 """How well a record could detect effects and tell them apart, to first order, from what the outputs show.
 
-What the calibration can make up for is taken away. The residual that an effect leaves then has the length d,
-in units of the noise. It is detected by a chi-square test with as many degrees of freedom as the effect has
-amplitudes, in which d is the root of the noncentrality. Two effects are compared as the decision of close-loop
-does it: the second is fitted to what the first one causes, and what it misses has the length d. The log score
-of the right one then exceeds that of the other by d^2 / 2, with a standard deviation of d.
+What the calibration can make up for is taken away. The residual that an effect leaves then has the length
+d, in units of the noise. It is detected by a chi-square test with as many degrees of freedom as the effect
+has amplitudes, in which d is the root of the noncentrality. Two effects are compared as in the decision of
+close-loop: the second is fitted to what the first one causes, and what it misses has the length d. The log
+score of the right one then exceeds that of the other by d^2 / 2, with a standard deviation of d.
 """
 
 from __future__ import annotations
@@ -24,8 +24,11 @@ from estimator.closeloop.hypotheses.relations import groups_with, limits
 from estimator.closeloop.planning.responses import Responses
 from estimator.closeloop.planning.sought import Sought
 from estimator.closeloop.policy import Policy
-from estimator.closeloop.screening.regressors import NOTHING, RIDGE, is_wave
+from estimator.closeloop.screening.regressors import is_wave
 from estimator.record import Array
+
+LEAST_PRIOR = 1e-12  # ridge, as share of a column's squares, for columns that are alike
+LEFT_OVER = 1e-10  # share of a column's squares after projection, below which only rounding is left
 
 Index = NDArray[np.intp]
 
@@ -37,7 +40,7 @@ def noncentrality(false_alarm: float, power: float, freedom: int) -> float:
     """
     limit = chi2.isf(false_alarm, freedom)
     high = 4.0 * (limit + norm.isf(1 - power) ** 2 + 1)
-    return float(brentq(lambda c: ncx2.sf(limit, freedom, c) - power, 1e-9, high))
+    return float(np.asarray(brentq(lambda c: ncx2.sf(limit, freedom, c) - power, 1e-9, high)))
 
 
 @dataclass(frozen=True)
@@ -49,12 +52,18 @@ class Test:
 
     @property
     def false_alarm(self) -> float:
-        """Probability that noise alone is taken for a certain effect: that of `significant` standard errors."""
-        return float(2 * norm.sf(self.policy.decision.significant))
+        """Probability that noise alone is taken for a given effect: beyond `significant` standard errors."""
+        chance: float = 2 * norm.sf(self.policy.decision.significant)
+        return chance
+
+    @property
+    def above_chance(self) -> float:
+        """Standard errors by which the mean square of a residual must exceed the noise to matter."""
+        return self.policy.detection.chance + float(norm.ppf(self.power))
 
     def detected(self, freedom: int) -> float:
         """Length d of a response of so many amplitudes, from which on it is detected."""
-        return noncentrality(self.false_alarm, self.power, freedom) ** 0.5
+        return float(np.sqrt(noncentrality(self.false_alarm, self.power, freedom)))
 
     def missed(self, fit: float, choose: float, form: float) -> tuple[float, float]:
         """Lengths d from which on an effect is rejected by the part to identify, or by the part to choose.
@@ -132,14 +141,14 @@ class Comparison:
         return self.test.missed(m[0], m[1], float(share * sum(m)))
 
     def _fitted(self, columns: Index, along: Array) -> Array:
-        """What least squares with priors makes of columns (k, n), from their products (k, n) with responses."""
+        """Steps along columns (k, n) that fit n responses by least squares, from their products (k, n)."""
         n = len(self.responses.unknowns)
         information = self.fit[np.ix_(columns, columns)]
         size = np.sqrt(np.diag(information))
         size[size == 0] = 1.0  # of what no measured output shows, nothing can be fitted
         prior = np.zeros(len(columns))
         prior[columns < n] = self.responses.prior[columns[columns < n]]
-        scaled = information / np.outer(size, size) + np.diag(prior / size**2 + RIDGE)
+        scaled = information / np.outer(size, size) + np.diag(prior / size**2 + LEAST_PRIOR)
         factor = cho_factor(scaled, check_finite=False)
         return np.asarray(cho_solve(factor, along / size[:, None], check_finite=False) / size[:, None])
 
@@ -162,12 +171,12 @@ class Comparison:
         scale = np.array([abs(u.scale) for u in c.amplitudes])
         if is_wave(c):
             least = float(np.linalg.eigvalsh(left / np.outer(scale, scale))[0])
-            seen = least > NOTHING**2 * float(np.max(whole / scale**2))
+            seen = least > LEFT_OVER * float(np.max(whole / scale**2))
             size = self.test.detected(2) / np.sqrt(least) if seen else np.inf
             return [self._shown("amplitude", own[:1], np.array([1 / scale[0]]), size, room)]
         found = []
         for i, u in enumerate(c.amplitudes):
-            seen = left[i, i] > NOTHING**2 * whole[i] > 0
+            seen = left[i, i] > LEFT_OVER * whole[i] > 0
             size = self.test.detected(1) * scale[i] / np.sqrt(left[i, i]) if seen else np.inf
             name = u.name.removeprefix(c.prefix)
             found.append(self._shown(name, own[i : i + 1], np.array([1 / scale[i]]), float(size), room))
@@ -178,7 +187,9 @@ class Comparison:
         rms = self.residual(columns, per_unit)[self.measured]
         size, std = r.size[self.measured], self.std[self.measured]
         lowest = np.minimum(limits_.signal_share * size, limits_.noise_share * std)
-        most = float(np.max(rms / lowest)) if len(rms) else 0.0
+        # close-loop allows for the chance scatter of the mean square before it compares
+        scatter = self.test.above_chance * np.sqrt(2 * len(size) / self.samples("fit"))
+        most = float(np.max(rms / np.sqrt(lowest**2 + scatter * std**2)))
         loudest = int(np.argmax(rms / std))
         detected = detected if detected <= room else np.inf
         matters = 1 / most if most > 0 else np.inf
@@ -203,7 +214,7 @@ class Comparison:
         columns, along = self.reference(c)
         left, whole = self.left(columns), self.fit[np.ix_(columns, columns)]
         length, before = (float(along @ m @ along) for m in (left, whole))
-        return length > NOTHING**2 * before and size**2 * length >= self.test.detected(len(columns)) ** 2
+        return length > LEFT_OVER * before and size**2 * length >= self.test.detected(len(columns)) ** 2
 
     def restricted(self, some: Sequence[Candidate]) -> Comparison:
         """The same comparison of some candidates only, for which less has to be computed."""
@@ -217,7 +228,7 @@ class Comparison:
     def missed(
         self, truths: Sequence[tuple[Candidate, float]], other: Candidate | None
     ) -> tuple[Array, Array]:
-        """Lengths (n,) of what another candidate misses of each truth, on the parts to identify and to choose.
+        """Lengths (n,) of what another candidate misses of each truth: to identify, and to choose.
 
         truths: candidates and their amplitudes, in scales; other: None for the calibrated FMU alone.
         """
@@ -250,10 +261,10 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """Lengths (n, v) of what each variant misses of each of n effects, on the parts to identify and to choose.
+    """Lengths (n, v) of what each variant misses of each of n effects, to identify (fit) and to choose.
 
-    owner: (v,) effect to which each variant belongs; nested: (n, n) pairs of which nothing is asked: an effect
-    and itself, and an effect and one that has it as its limit, of which close-loop keeps the simpler one.
+    owner: (v,) effect to which each variant belongs; nested: (n, n) pairs of which nothing is asked: an
+    effect and itself, and an effect and one that has it as its limit, as close-loop keeps the simpler one.
     """
 
     fit: Array
@@ -288,7 +299,7 @@ class Distances:
         for v, j in enumerate(self.owner):
             found[:, j] = np.minimum(found[:, j], figure[:, v])
         found[self.nested] = np.inf
-        return np.minimum(found, found.T)
+        return np.asarray(np.minimum(found, found.T))
 
 
 def _contains(rich: Sought, simple: Sought) -> bool:

@@ -30,7 +30,7 @@ Change = Callable[[Array, Array], Array]  # of an input (N,) over times from 0 t
 
 
 def _amplitude(u: Array, nominal: float) -> float:
-    """Size of a change that is realistic for an input: its spread, a share of its mean, or its nominal value."""
+    """Realistic size of a change of an input: its spread, a share of its mean, or of its nominal value."""
     return max(float(np.std(u)), LEVEL * abs(float(np.mean(u)))) or LEVEL * nominal
 
 

@@ -56,9 +56,9 @@ class Question:
 class Sight:
     """How well an effect is seen.
 
-    visible: the smallest visible amplitude of each parameter, for the shape for which it is smallest, which is
-    given; largest: for the shape for which it is largest; size: amplitude at which it is compared with others,
-    in scales; hidden: whether it cannot be detected with any amplitude within its limits.
+    visible: the smallest visible amplitude of each parameter, for the most visible `shape`; largest: for the
+    least visible one; size: amplitude at which it is compared with others, in scales; hidden: whether it
+    cannot be detected with that amplitude or any other one within its limits.
     """
 
     effect: Sought
@@ -120,8 +120,8 @@ def _sight(comparison: Comparison, question: Question, s: Sought, rooms: Mapping
     best = int(np.argmin(smallest))
     c, loudness = s.first, comparison.loudness(s.first)
     size = question.ratio / loudness if loudness > 0 else 0.0
-    limits = [largest(c, u, rooms) / abs(u.scale) for u in c.amplitudes]
-    size = 1.0 if all(u.name in c.fixed for u in c.amplitudes) else min(size, *limits)
+    limits = [1.0 if u.name in c.fixed else largest(c, u, rooms) / abs(u.scale) for u in c.amplitudes]
+    size = min(size, *limits)
     enough = size > 0 and comparison.is_seen(c, size)
     shape = {u.name.removeprefix(s.variants[best].prefix): u.start for u in s.variants[best].shape}
     return Sight(s, seen[best], shape, max(smallest), float(size), not enough)

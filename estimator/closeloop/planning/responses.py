@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import WIDE, Fit
+from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.screen import Screening
 from estimator.record import Array, BoolArray
@@ -50,9 +50,11 @@ class Responses:
         """The responses to the unknowns and to some of the candidates."""
         used = np.concatenate([self.calibration, *(at for c in some for at in self.columns[c])])
         place = dict(zip(used.tolist(), range(len(used)), strict=True))
-        columns = {
-            c: tuple(np.array([place[i] for i in at], np.intp) for at in self.columns[c]) for c in some
-        }
+
+        def placed(at: NDArray[np.intp]) -> NDArray[np.intp]:
+            return np.array([place[i] for i in at.tolist()], np.intp)
+
+        columns = {c: (placed(self.columns[c][0]), placed(self.columns[c][1])) for c in some}
         return replace(self, columns=columns, values=self.values[:, :, used], _kept={})
 
     def information(self, part: str, std: Array) -> Array:
@@ -146,9 +148,9 @@ def _arranged(
 
 
 def prior_of(unknowns: Sequence[Unknown]) -> Array:
-    """Information (n,) that the bounds of unknowns add, in scales: that of a uniform distribution."""
-    width = np.array([min(u.high - u.low, WIDE * u.scale) / u.scale for u in unknowns])
-    return 12 / width**2
+    """Information (n,) that the bounds of unknowns add, in scales; none without bounds."""
+    width = np.array([(u.high - u.low) / u.scale for u in unknowns])
+    return np.asarray(12 / width**2)
 
 
 def _sizes(problem: Problem, y: Array) -> Array:

@@ -76,9 +76,8 @@ def _assumed(problem: Problem, t: Array, motion: Array) -> Iterator[MissingForce
 
 
 def _variants(some: Sequence[Candidate], t: Array) -> tuple[Candidate, ...]:
-    """The candidates of one effect, of those with an onset only the one nearest to the middle of the record."""
+    """The candidates of one effect; of those with an onset only the one nearest to the middle."""
+    middle = (t[-1] - t[0]) / 2
     always = [c for c in some if c.onset is None]
-    begun = sorted(
-        (c for c in some if c.onset is not None), key=lambda c: abs((c.onset or 0.0) - (t[-1] - t[0]) / 2)
-    )
-    return tuple(always + begun[:1])
+    begun = [(abs(c.onset - middle), c) for c in some if c.onset is not None]
+    return (*always, *(c for _, c in sorted(begun, key=lambda pair: pair[0])[:1]))
