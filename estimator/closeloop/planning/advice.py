@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.decision.equivalence import splitting
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.relations import splitting
 from estimator.closeloop.planning.classes import EffectClass, Splitter, class_of
 from estimator.closeloop.planning.plan import Question, advised, compared
 from estimator.closeloop.planning.responses import responses, unknowns_of
