@@ -1,6 +1,7 @@
 """The command plan: from an experiment whose outputs do not exist yet to the plan, its page and its table."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +10,14 @@ import pytest
 from scipy.stats import chi2
 from typer.testing import CliRunner
 
+from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.planning.plan import Question
 from estimator.closeloop.planning.plan import plan as planned
+from estimator.closeloop.planning.responses import unknowns_of
 from estimator.plant import PLANTS
+from estimator.weighting import Weighting
 from fmus.errors import BadInput
 from scenarios import plan
 from scenarios.cli.app import loaded, run_safely
@@ -20,7 +25,9 @@ from scenarios.closing.closing import builder_for
 from scenarios.experiment.experiment import load_experiment
 from scenarios.planning.planning import question_of
 from scenarios.planning.result import PlanResult
+from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 
+FITS = 60
 TEXT = """\
 id = "planned"
 model = "drive"
@@ -116,6 +123,42 @@ def test_at_the_stated_size_the_simulated_effect_is_detected_as_often_as_stated(
     draws = rng.standard_normal((4000, len(shown)))
     assert np.mean(((draws + shown) @ along) ** 2 > limit) == pytest.approx(0.8, abs=0.03)
     assert np.mean((draws @ along) ** 2 > limit) < 2e-3
+
+
+def test_close_loops_own_fit_finds_the_stated_size_about_as_often_as_stated(tmp_path: Path) -> None:
+    """Records with the effect built in and drawn noise, fitted together with the mass that is calibrated."""
+    e = load_experiment(write(tmp_path, sign=-1.0))
+    question = question_of(e, builder_for(e, tmp_path / "work"))
+    [sight] = [
+        s
+        for s in planned(replace(question, excite=())).sights
+        if s.effect.label == "viscous_damping@carriage"
+    ]
+    c, size = sight.effect.first, sight.visible[0].detected
+    problem, rng = question.problem.with_effects([(c.kind, c.location)]), np.random.default_rng(3)
+    [true] = problem.simulate({"M": 97.0, c.amplitudes[0].name: size})
+    [run], unknowns = problem.record.runs, [*unknowns_of(problem), *c.unknowns]
+    weighting, found = Weighting.white(question.std[:1]), []
+    for _ in range(FITS):
+        y = true[:, :1] + question.std[0] * rng.standard_normal((len(run.t), 1))
+        record = replace(problem.record, outputs=("q",), runs=(replace(run, y=y, fit=question.parts["fit"]),))
+        fitted = fit(replace(problem, record=record), unknowns, weighting)
+        found.append(Hypothesis((c,), fitted, ()).significance()[0])
+    PLANTS.close()
+    share = np.mean(np.array(found) > question.problem.policy.decision.significant)
+    # standard errors of fits allow for residuals that are not white, so that they are a little larger
+    assert 0.6 < share < 0.92
+
+
+@pytest.mark.parametrize("initial", ["exact", pytest.param("calculated", marks=pytest.mark.slow)])
+def test_a_foreign_fmu_is_planned_whether_it_shows_its_state_or_not(
+    initial: str, foreign: Callable[..., Path], tmp_path: Path
+) -> None:
+    write_foreign(tmp_path, foreign(initial=initial), FOREIGN + "[plan]\ninputs = []\n")
+    result = plan(tmp_path)
+    seen = {(v["kind"], v["location"]): v["smallest"] for v in result.visible}
+    assert 0 < seen["quadratic_damping", "shaft"] < 0.3  # of the record that close-loop traces
+    assert "quadratic_damping@shaft" not in result.hidden
 
 
 def _shown(question: Question, c: Candidate, size: float) -> np.ndarray:

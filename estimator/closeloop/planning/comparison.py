@@ -79,7 +79,7 @@ class Test:
 
 
 @dataclass(frozen=True)
-class Visible:
+class SmallestSize:
     """The smallest visible amplitude of an effect, in the unit of its parameter.
 
     parameter: its name, "amplitude" for a sine and a cosine together; detected: infinite if no amplitude
@@ -164,7 +164,7 @@ class Comparison:
         whole = self.fit[np.ix_(columns, columns)]
         return np.asarray(whole - self.fit[np.ix_(columns, cal)] @ self.calibrated[:, columns])
 
-    def visible(self, c: Candidate, room: float) -> list[Visible]:
+    def visible(self, c: Candidate, room: float) -> list[SmallestSize]:
         """The smallest visible amplitude of each parameter of a candidate; room: its largest amplitude."""
         own = self.responses.columns[c][0]
         left, whole = self.left(own), np.diag(self.fit)[own]
@@ -182,7 +182,9 @@ class Comparison:
             found.append(self._shown(name, own[i : i + 1], np.array([1 / scale[i]]), float(size), room))
         return found
 
-    def _shown(self, name: str, columns: Index, per_unit: Array, detected: float, room: float) -> Visible:
+    def _shown(
+        self, name: str, columns: Index, per_unit: Array, detected: float, room: float
+    ) -> SmallestSize:
         r, limits_ = self.responses, self.test.policy.detection
         rms = self.residual(columns, per_unit)[self.measured]
         size, std = r.size[self.measured], self.std[self.measured]
@@ -195,7 +197,7 @@ class Comparison:
         matters = 1 / most if most > 0 else np.inf
         smallest = max(detected, matters)
         share = float(rms[loudest] / size[loudest] * smallest) if np.isfinite(smallest) else np.inf
-        return Visible(name, detected, matters, r.outputs[self.measured[loudest]], share)
+        return SmallestSize(name, detected, matters, r.outputs[self.measured[loudest]], share)
 
     def residual(self, columns: Index, along: Array) -> Array:
         """Rms (n_y,) of what steps along columns leave in each output after calibration."""

@@ -10,7 +10,7 @@ import numpy as np
 from estimator.closeloop.diagnostics.diagnostics import room
 from estimator.closeloop.diagnostics.power import POWER, largest
 from estimator.closeloop.planning.classes import EffectClass, Splitter, classed, ranked, splitter
-from estimator.closeloop.planning.comparison import Comparison, Test, Visible
+from estimator.closeloop.planning.comparison import Comparison, SmallestSize, Test
 from estimator.closeloop.planning.excitations import bearable, changeable, excitations, with_run
 from estimator.closeloop.planning.responses import Responses, responses, unknowns_of
 from estimator.closeloop.planning.sought import Sought, sought
@@ -62,7 +62,7 @@ class Sight:
     """
 
     effect: Sought
-    visible: tuple[Visible, ...]
+    visible: tuple[SmallestSize, ...]
     shape: Mapping[str, float]
     largest: float
     size: float
