@@ -26,7 +26,8 @@ class PlanResult:
     power, false_alarm: what was asked; visible: for each effect and parameter the smallest amplitude that is
     `detected`, that `matters`, and both (`smallest`), null if there is none within the limits; classes: the
     effects that are not told apart, with what would split them; alone: effects that are told from all others;
-    hidden: effects that the record cannot show; refused: changes of the inputs that are not possible.
+    hidden: effects that are not detected at the size that is compared, or that cannot be that large;
+    refused: changes of the inputs that are not possible.
     """
 
     experiment: str

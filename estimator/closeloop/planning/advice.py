@@ -11,7 +11,7 @@ from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.relations import splitting
-from estimator.closeloop.planning.classes import EffectClass, Splitter, class_of
+from estimator.closeloop.planning.classes import SPLIT, EffectClass, Splitter, class_of
 from estimator.closeloop.planning.plan import Question, advised, compared
 from estimator.closeloop.planning.responses import responses, unknowns_of
 from estimator.closeloop.planning.sought import Sought
@@ -28,7 +28,8 @@ def next_experiment(baseline: Baseline, members: Sequence[Hypothesis]) -> str:
     """The experiment that would tell the members of a class apart.
 
     What their laws declare comes first, then what simulations of this FMU with the fitted values show. The
-    second part is left out if a member has several effects, or if the FMU cannot be simulated.
+    second part is left out if a member has several effects, if the FMU cannot be simulated, or if the record
+    would tell the members apart to first order.
     """
     declared = splitting(members)
     if any(len(m.candidates) > 1 for m in members):
@@ -36,6 +37,8 @@ def next_experiment(baseline: Baseline, members: Sequence[Hypothesis]) -> str:
     try:
         found, length = _class_with_advice(baseline, members)
     except (FmuError, np.linalg.LinAlgError):
+        return declared
+    if found.margin >= SPLIT:  # to first order the record splits them, so that this is no help here
         return declared
     return "; ".join([declared, *sentences(found, length)])
 

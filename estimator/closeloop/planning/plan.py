@@ -58,7 +58,7 @@ class Sight:
 
     visible: the smallest visible amplitude of each parameter, for the most visible `shape`; largest: for the
     least visible one; size: amplitude at which it is compared with others, in scales; hidden: whether it
-    cannot be detected with that amplitude or any other one within its limits.
+    is not detected with that amplitude, which may be limited by its bounds.
     """
 
     effect: Sought
