@@ -18,6 +18,7 @@ from estimator.closeloop.pipeline import trace
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
+from estimator.record import Record
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
 from fmus.export.provenance import Origin, checksum, isolation_of
@@ -159,8 +160,15 @@ def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATE
 
 def pose(e: Experiment, builder: Builder) -> Problem:
     """The problem to be solved: the FMU, the record, and the parameters to calibrate."""
+    return problem_of(e, builder, load_record)
+
+
+def problem_of(
+    e: Experiment, builder: Builder, load: Callable[[Experiment, FmuDescription], Record]
+) -> Problem:
+    """The problem of an experiment, whose record is read by `load`."""
     description = describe(e.fmu_path or builder(()))
-    record = load_record(e, description)
+    record = load(e, description)
     form = {n: bounds for n, bounds in builder.form.items() if n not in e.parameters}
     calibrate = {**form, **e.calibrate}
     declared = {**_starts(description, calibrate), **e.parameters, **e.initial}

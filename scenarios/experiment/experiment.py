@@ -91,6 +91,7 @@ def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
     yield "[initial]", e.initial, states, "a state whose start can be set"
     yield "[inputs]", e.inputs, fmu.inputs, "an input"
     yield "[outputs]", e.outputs, fmu.outputs, "an output"
+    yield "[plan.sensors]", e.plan.sensors, fmu.outputs, "an output"
     for port in e.ports:
         yield f"[[ports]] '{port.name}' force", [port.force], fmu.inputs, "an input"
         yield f"[[ports]] '{port.name}'", [port.velocity, port.displacement], fmu.outputs, "an output"

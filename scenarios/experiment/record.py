@@ -1,6 +1,7 @@
 """Measured data: from the files of an experiment to a checked Record in the FMU's units."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,24 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
     )
 
 
+def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
+    """The inputs of an experiment that is planned, checked; its outputs are not read and need not exist.
+
+    Without [split], all samples belong to the part to identify. The noise is that of the declared outputs.
+    """
+    check_names(experiment, description)
+    scale, _ = _conversions(experiment, description)
+    needed = {c.column for c in experiment.input_columns.values()}
+    for name, made in reversed(experiment.derived.items()):
+        if name in needed:
+            needed.add(made.derivative)
+    derived = {name: made for name, made in experiment.derived.items() if name in needed}
+    inputs_alone = experiment.model_copy(update={"outputs": {}, "derived": derived})
+    record = load_record(inputs_alone, description)
+    std = [output.noise_std or np.nan for output in experiment.outputs.values()]
+    return replace(record, outputs=tuple(experiment.outputs), noise_std=np.array(std) * np.abs(scale[:, 0]))
+
+
 def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]:
     """Factor and offset of each output's column, (n_y, 2), and notes on conversions."""
     scale, notes = [], []
@@ -68,7 +87,7 @@ def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]
         if scale[-1] != SAME:
             said = f"column '{output.column}' is converted from {output.unit} to {unit}"
             notes.append(Note("unit", output.column, said))
-    return np.array(scale), notes
+    return np.array(scale).reshape(-1, 2), notes
 
 
 def _run(
@@ -89,7 +108,8 @@ def _run(
     u = np.empty((t.size, len(e.inputs)))
     for j, name in enumerate(e.inputs):
         u[:, j] = given[name]
-    outputs = np.column_stack([data[output.column] for output in e.outputs.values()])
+    measured = [data[output.column] for output in e.outputs.values()]
+    outputs = np.column_stack(measured) if measured else np.empty((t.size, 0))  # of an experiment planned
     y = outputs * scale[:, 0] + scale[:, 1]
     masks = {"fit": fit[used], "choose": choose[used], "test": test[used]}
     return Run(t=t, u=u, y=y, **masks), [*notes, *stated.notes]

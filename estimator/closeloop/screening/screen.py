@@ -85,9 +85,15 @@ class Screening:
         """Change of the residual by each amplitude, one candidate after the other, (m,) each."""
         levers = list(dict.fromkeys(name for c in physical for name in self._around(c).told))
         moved = (change for c in physical for change in self._moved(c))
-        at_once = TOGETHER // (8 * len(self.weighting) * len(self._at))
+        at_once = TOGETHER // (8 * len(self.weighting) * len(self.samples))
         while some := list(islice(moved, min(max(1, at_once), CHANGES_AT_ONCE))):
             yield from self._answers(some, levers)
+
+    def prepare(self, candidates: Sequence[Candidate]) -> None:
+        """Linearise the FMU for all candidates at once, so that their changes can be asked for in parts."""
+        levers = dict.fromkeys(n for c in candidates if not c.is_fault for n in self._around(c).told)
+        if levers and self._states is not None:
+            self._linearised(list(levers), self._states)
 
     @property
     def length(self) -> float:
@@ -106,7 +112,7 @@ class Screening:
         return self._made[c.label]
 
     @cached_property
-    def _at(self) -> NDArray[np.intp]:
+    def samples(self) -> NDArray[np.intp]:
         """Index of the middle sample of each group, up to the end of the part to identify."""
         return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
 
@@ -117,7 +123,7 @@ class Screening:
     @cached_property
     def _free(self) -> Course:
         """The simulation of the first run of the record."""
-        problem, theta, at = self.problem, self.theta, self._at
+        problem, theta, at = self.problem, self.theta, self.samples
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
         plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
@@ -155,9 +161,9 @@ class Screening:
         if self._states is None:
             return [self._simulated(change) for change in moved]
         local, influence = self._linearised(levers, self._states)
-        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group)
+        fit, scale = self.problem.record.runs[0].fit[self.samples], -np.sqrt(self.group)
         with np.errstate(over="ignore", invalid="ignore"):
-            shown = responses(local, influence, moved, len(self._at))[:, fit]
+            shown = responses(local, influence, moved, len(self.samples))[:, fit]
             columns = np.array([scale * self.weighting.of(y, self._stretches).ravel() for y in shown])
             sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
         # the linearised response of a model with stick and slip may diverge, so that it is simulated
@@ -165,7 +171,7 @@ class Screening:
 
     def _linearised(self, levers: list[str], x: Array) -> tuple[Linearised, dict[str, Influence]]:
         if self._local is None or not set(levers) <= set(self._local[1]):
-            self._local = influences(self.problem, self.theta, x, self._at, levers)
+            self._local = influences(self.problem, self.theta, x, self.samples, levers)
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:
@@ -176,7 +182,7 @@ class Screening:
         push = {}
         for name, samples in change.items():
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
-            push[name] = rest + np.interp(np.arange(len(run.t)), self._at, samples)
+            push[name] = rest + np.interp(np.arange(len(run.t)), self.samples, samples)
         moved = plant.simulate(run, start, push=push) - self._unchanged
         return self._weighted(moved[run.fit])
 
