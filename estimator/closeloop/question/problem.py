@@ -21,7 +21,9 @@ from fmus.host.apart.isolation import Isolation
 from fmus.host.description import PortNames
 
 START_SAMPLES = 20  # first samples from which the start value of a measured state is estimated
+SHORTER_STARTS = (8, 12, 16)  # numbers of first samples that are tried too
 HIGHEST_DEGREE = 6  # of the polynomial through them
+FREE_SAMPLES = 4  # samples more than coefficients, at least
 START_ERROR = 3.0  # times the scatter of these samples: bound of the error of that start value
 
 
@@ -162,8 +164,8 @@ class Problem:
         for name in self.free_states:
             if name in self.measured_state:
                 t, y = run.t[head] - run.t[0], run.y[head, self.measured_state[name]]
-                curve = smooth_start(t, y)
-                guess[name] = float(curve(0.0)), START_ERROR * float(np.std(y - curve(t)))
+                value, scatter = smooth_start(t, y)
+                guess[name] = value, START_ERROR * scatter
             else:
                 guess[name] = self.plant.fmu.description.variables[name].start or 0.0, np.inf
         return guess
@@ -207,18 +209,23 @@ class Problem:
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
 
 
-def smooth_start(t: Array, y: Array) -> np.polynomial.Polynomial:
-    """The polynomial through samples y (N,) at times t (N,) whose degree Akaike's criterion chooses.
+def smooth_start(t: Array, y: Array) -> tuple[float, float]:
+    """Value at the first of the samples y (N,) at times t (N,), and the scatter of the samples used.
 
-    The criterion is that of short series (C. M. Hurvich, C.-L. Tsai, Biometrika 76 (1989), 297-307). A line
-    would be wrong by far if the samples cover a large part of an oscillation.
+    A polynomial through some of the first samples gives the value. Degree and number of samples are those
+    with the smallest standard error of the value: a line through all of them would be wrong by far where
+    they cover a large part of an oscillation.
     """
-    n, tried = len(t), {}
-    for degree in range(1, max(1, min(HIGHEST_DEGREE, n - 4)) + 1):
-        curve, free = np.polynomial.Polynomial.fit(t, y, degree), degree + 2
-        left = float(np.sum((y - curve(t)) ** 2)) + np.finfo(float).tiny
-        tried[degree] = n * np.log(left / n) + 2 * free * n / max(n - free - 1, 1), curve
-    return min(tried.values(), key=lambda found: found[0])[1]
+    found = [(np.inf, float(y[0]), float(np.std(y)))]
+    for n in sorted({len(t), *(m for m in SHORTER_STARTS if m < len(t))}):
+        for degree in range(1, min(HIGHEST_DEGREE, n - FREE_SAMPLES - 1) + 1):
+            powers = ((t[:n] - t[0]) / (t[n - 1] - t[0]))[:, None] ** np.arange(degree + 1)
+            q, r = np.linalg.qr(powers)
+            coefficients = np.linalg.solve(r, q.T @ y[:n])
+            scatter = float(np.sqrt(np.sum((y[:n] - powers @ coefficients) ** 2) / (n - degree - 1)))
+            leverage = float(np.linalg.norm(np.linalg.solve(r.T, powers[0])))
+            found.append((scatter * leverage, float(coefficients[0]), scatter))
+    return min(found)[1:]
 
 
 def _missed(run: Run, y: Array) -> Array:
