@@ -146,7 +146,10 @@ def builder_for(e: Experiment, work: Path) -> Builder:
         return ModelBuilder(e.model, work)
     if e.fmu_path is None:
         raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
-    ports = tuple(PortNames(p.name, p.force, p.velocity, p.displacement) for p in e.ports)
+    units = {name: output.model_unit for name, output in e.outputs.items()}
+    ports = tuple(
+        PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity)) for p in e.ports
+    )
     return ForeignBuilder(e.fmu_path, ports, work)
 
 

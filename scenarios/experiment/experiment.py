@@ -35,7 +35,7 @@ class Experiment(Declaration):
         """One file, or one for each part of the split: to identify, to choose if it is given, to test."""
         if self.split and self.split.files:
             return tuple(self.data_dir / file for file in self.split.files.values())
-        return (self.data_dir / (self.data or ""),)
+        return (self.data_dir / (self.data_file or ""),)
 
 
 def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
@@ -92,7 +92,8 @@ def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
     yield "[outputs]", e.outputs, fmu.outputs, "an output"
     for port in e.ports:
         yield f"[[ports]] '{port.name}' force", [port.force], fmu.inputs, "an input"
-        yield f"[[ports]] '{port.name}'", [port.velocity, port.displacement], fmu.outputs, "an output"
+        motion = [name for name in (port.velocity, port.displacement) if name]
+        yield f"[[ports]] '{port.name}'", motion, fmu.outputs, "an output"
     if e.estimate:
         yield "[estimate] states", e.estimate.states, states, "a state whose start can be set"
         yield "[estimate.parameters]", e.estimate.parameters, fmu.parameters, "a parameter"
