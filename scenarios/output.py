@@ -1,9 +1,12 @@
 """The folder into which a command writes its results."""
 
 import os
+from datetime import datetime
 from pathlib import Path
 
 from fmus.errors import BadInput
+
+RESULTS = ("result.json", "results.json", "*/result.json")  # what commands write, by pattern
 
 
 def writable(folder: Path) -> Path:
@@ -15,3 +18,17 @@ def writable(folder: Path) -> Path:
     if not os.access(folder, os.W_OK):
         raise BadInput(f"--out {folder}: may not be written to; name another folder")
     return folder
+
+
+def replaced(folder: Path) -> str:
+    """A sentence on earlier results in a folder, which a command is about to replace; empty if none."""
+    found = [file for pattern in RESULTS for file in sorted(folder.glob(pattern))]
+    if not found:
+        return ""
+    written = datetime.fromtimestamp(max(file.stat().st_mtime for file in found))
+    more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+    name = found[0].relative_to(folder)
+    return (
+        f"{folder} holds earlier results ({name}{more}, of {written:%Y-%m-%d %H:%M}), which are replaced; "
+        "give another --out to keep them"
+    )

@@ -5,18 +5,22 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
 
 
 @app.command("close-loop")
 def close_loop(
     experiments: Annotated[list[Path], typer.Argument(help="experiment.toml, or its folder; or several")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "close-loop",
     data: Annotated[Path | None, typer.Option(help="folder of the data files, if elsewhere")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; one per core by default")] = None,
     seed: Annotated[int, typer.Option(help="seed of the random numbers")] = 0,
     resume: Annotated[
         bool, typer.Option("--resume", help="continue from the checkpoints of an interrupted run")
+    ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="only show the mapping, a first simulation, and the expected time"),
     ] = False,
 ) -> None:
     """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
@@ -24,14 +28,18 @@ def close_loop(
     Several experiments get a folder each and a common table. If they use the same FMU, each effect found is
     tested on the other records and fitted to all of them. Ctrl-C keeps the experiments that are finished.
     """
+    if dry_run:
+        _try(experiments, out, data, jobs)
+        return
     from scenarios.closing.lines import lines_of, table_of
 
+    will_write(out)
     if len(experiments) == 1:
         from scenarios.closing.closing import close_loop as run
 
         try:
             with said.status("reading the experiment") as status:
-                result = run(experiments[0], out, data, status.update, jobs, seed, resume)
+                result = run(experiments[0], out, data, status.update, jobs, seed, resume, show)
         except KeyboardInterrupt:
             said.print("railfmi: interrupted; run the same command with --resume to continue from here")
             raise typer.Exit(130) from None
@@ -51,6 +59,7 @@ def close_loop(
             jobs,
             seed,
             resume,
+            show,
         )
     if found.results:
         for line in table_of(found):
@@ -62,3 +71,14 @@ def close_loop(
             "the same command with --resume goes on from here"
         )
         raise typer.Exit(130)
+
+
+def _try(experiments: list[Path], out: Path, data: Path | None, jobs: int | None) -> None:
+    """Show for each experiment what a run would do."""
+    from scenarios.preparing.trial import dry_run as tried
+
+    for experiment in experiments:
+        with said.status("simulating the record once"):
+            trial = tried(experiment, out if len(experiments) == 1 else out / experiment.stem, data, jobs)
+        for line in trial.lines():
+            typer.echo(line)

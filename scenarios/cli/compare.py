@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 
 @app.command()
@@ -15,7 +15,7 @@ def compare(
     experiment: Annotated[
         Path, typer.Argument(help="experiment.toml with the inputs and parameters for both FMUs")
     ],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "compare",
     tolerance: Annotated[float, typer.Option(help="relative difference that is accepted")] = 1e-9,
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
@@ -24,6 +24,7 @@ def compare(
     """Simulate two FMUs and report their differences; exit 1 if one is larger than the tolerance."""
     from scenarios.comparing.comparing import compare as side_by_side
 
+    will_write(out)
     with said.status("reading the experiment") as status:
         found = side_by_side(a, b, experiment, out, tolerance, data, tell=status.update)
     for line in found.lines():

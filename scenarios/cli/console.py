@@ -1,11 +1,14 @@
 """Parts shared by all commands: the application, the console for progress, common options."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
+
+from scenarios.output import replaced
 
 app = typer.Typer(
     name="railfmi", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
@@ -32,3 +35,17 @@ said = Console(stderr=True, highlight=False)
 
 
 Out = Annotated[Path, typer.Option("--out", help="folder to write to", file_okay=False)]
+RESULTS = Path("out")  # of each command a folder in it, so that none replaces the results of another
+
+
+def will_write(folder: Path) -> None:
+    """Say so if a command is about to replace earlier results."""
+    sentence = replaced(folder)
+    if sentence:
+        said.print(f"railfmi: {sentence}", markup=False, soft_wrap=True)
+
+
+def show(lines: Sequence[str]) -> None:
+    """Print lines that stay, above the progress."""
+    for line in lines:
+        said.print(line, markup=False, soft_wrap=True)

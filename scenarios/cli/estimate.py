@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
 
 
 @app.command()
 def estimate(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "estimate",
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
@@ -19,8 +19,9 @@ def estimate(
     """Estimate states, parameters and unknown inputs of an FMU; exit 1 if the filter fails its tests."""
     from scenarios.estimating.estimating import estimate as filtered
 
+    will_write(out)
     with said.status("reading the experiment") as status:
-        result = filtered(experiment, out, data, tell=status.update)
+        result = filtered(experiment, out, data, tell=status.update, show=show)
     for name, found in result.estimated.items():
         spread, unit = found["std_error"], found["unit"] or ""
         bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""

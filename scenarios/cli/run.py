@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 
 @app.command("run")
 def run_scenarios(
     scenarios: Annotated[list[Path], typer.Argument(help="scenario files; several get a contact sheet")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "run",
     watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
 ) -> None:
     """Run scenarios and check their expectations; exit 1 if one is not met. Ctrl-C keeps the recording."""
@@ -29,6 +29,7 @@ def run_scenarios(
         for finding in result.failed:
             typer.echo(f"  not met: {finding.sentence}; {finding.because}")
 
+    will_write(out)
     with said.status("reading the scenarios") as status:
         results = run_all(scenarios, out, status.update if watch else (lambda _: None), done)
     typer.echo(f"results: {out}")

@@ -25,6 +25,7 @@ from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
 from scenarios.closing.result import Result, result_of
+from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import writable
@@ -46,6 +47,7 @@ def close_loop(
     jobs: int | None = None,
     seed: int = 0,
     resume: bool = False,
+    show: Show = lambda _: None,
 ) -> Result:
     """Run `railfmi close-loop` and return the result that is written as result.json.
 
@@ -55,12 +57,14 @@ def close_loop(
     jobs: number of processes, by default one per core.
     seed: seed of the random numbers.
     resume: continue from the checkpoints that an interrupted run left in `out`.
+    show: gets the table of conversions as lines, before anything is simulated.
     Raises BadInput if the experiment is wrong.
     """
     begun = time.monotonic()
     declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
         posed = Posed.of(declared, Path(work))
+        show(conversion_lines(posed.problem.record))
         folder = None if out is None else writable(Path(out))
         stages = stages_of(declared, folder, seed, resume)
         result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]

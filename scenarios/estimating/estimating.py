@@ -32,6 +32,7 @@ from scenarios.estimating.result import (
     write_csv,
 )
 from scenarios.estimating.setup import set_up
+from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.declaration import Options
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.record import load_record
@@ -45,6 +46,7 @@ def estimate(
     tell: Tell = lambda _: None,
     options: Options | None = None,
     truth: Mapping[str, tuple[Array, Array]] | None = None,
+    show: Show = lambda _: None,
 ) -> EstimateResult:
     """Run `railfmi estimate` and return the result that is written as result.json.
 
@@ -53,6 +55,7 @@ def estimate(
     data_dir: folder of the data files, by default the folder of the experiment.
     options: replace the options of the experiment.
     truth: true values by name as (times, values), for errors and figures.
+    show: gets the table of conversions as lines, before anything is estimated.
     Raises BadInput if the experiment is wrong. If the filter diverges, the result contains the estimates up
     to that time, and `diverged` and `reason` are set.
     """
@@ -67,6 +70,7 @@ def estimate(
         tell("opening the FMU and the record")
         with Archive(fmu_of(e, Path(work))) as archive:
             record = load_record(e, archive.description, missing=True)
+            show(conversion_lines(record))
             setup = set_up(e, chosen, record, archive)
             found = find(setup, archive, tell)
             try:
