@@ -15,7 +15,7 @@ from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.host.archive import describe
 from scenarios.closing.closing import Posed, experiment_of
-from scenarios.drawing.sheet import AFTER, INK, Plot, envelope, legend, name_axes, sheet, sheets
+from scenarios.drawing.sheet import BEFORE, INK, Plot, envelope, legend, name_axes, sheet, sheets
 from scenarios.drawing.typography import unit
 from scenarios.experiment.conversions import conversion_lines
 from scenarios.output import writable
@@ -132,7 +132,7 @@ def _drawn(problem: Problem, simulated: Array, folder: Path) -> Iterator[Path]:
             ax = axes[name]
             ax.plot(*envelope(run.t[head], run.y[head, j]), color=INK, linewidth=0.9, label="measured")
             drawn = envelope(run.t[head], simulated[head, j])
-            ax.plot(*drawn, color=AFTER, linewidth=1.1, label="simulated with the declared values")
+            ax.plot(*drawn, color=BEFORE, linewidth=1.1, label="simulated with the declared values")
             name_axes(ax, "", unit(units.get(name)) or "1", name)
         axes[some[-1][1]].set_xlabel("time in s", fontsize=9)
         legend(figure, axes[some[0][1]])
