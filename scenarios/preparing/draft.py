@@ -10,13 +10,14 @@ from pathlib import Path
 from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.experiment.readers.header import spelled
 from scenarios.preparing.matching import SURE, Match, matches
-from scenarios.preparing.quantities import alike, known, likely_unit, quantities_of
+from scenarios.preparing.quantities import alike, known, likely_unit, quantities_of, words_of
 from scenarios.preparing.survey import Channel, Raster
 
 IDENTIFY = 0.65  # share of the record that identifies; the rest tests
 AROUND = 0.2  # of the FMU's value: the bounds of a parameter that is calibrated
 CALIBRATED = 6  # parameters; with more the user has to choose
 FORCES = ("force", "torque")
+LABELS = {"force": "mass", "torque": "shaft"}  # of the only port of its kind
 MOTION = {"force": ("velocity", "displacement"), "torque": ("speed of rotation", "angle")}
 
 
@@ -121,18 +122,22 @@ def _ports(made: Draft) -> Iterator[Place]:
     taken = {s.variable.name for s in made.inputs}
     variables = made.description.variables
     outputs = [variables[n] for n in made.description.outputs]
-    names: list[str] = []
-    for name in made.description.inputs:
-        kind = next((q for q in _quantity(variables[name]) if q in FORCES), None)
-        if name in taken or kind is None:
-            continue
-        fast, far = MOTION[kind]
-        velocity = next((v.name for v in outputs if fast in _quantity(v)[:1]), None)
-        displacement = next((v.name for v in outputs if far in _quantity(v)[:1]), None)
+    kinds = {
+        n: next((q for q in _quantity(variables[n]) if q in FORCES), "") for n in made.description.inputs
+    }
+    kinds = {name: kind for name, kind in kinds.items() if kind and name not in taken}
+    for name, kind in kinds.items():
+        velocity, displacement = (_nearest(name, outputs, quantity) for quantity in MOTION[kind])
         if velocity is not None:
-            names.append("shaft" if kind == "torque" else "mass")
-            label = names[-1] if names.count(names[-1]) == 1 else name
-            yield Place(label, name, velocity, displacement)
+            alone = list(kinds.values()).count(kind) == 1
+            yield Place(LABELS[kind] if alone else name, name, velocity, displacement)
+
+
+def _nearest(name: str, outputs: Sequence[FmuVariable], quantity: str) -> str | None:
+    """The output that is such a quantity and whose name has most in common with a name; None if none is."""
+    words = {*words_of(name)}
+    fitting = [v.name for v in outputs if quantity in _quantity(v)[:1]]
+    return max(fitting, key=lambda other: len(words & {*words_of(other)}), default=None)
 
 
 def sure(likeness: float) -> str:

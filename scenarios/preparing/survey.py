@@ -73,16 +73,29 @@ def survey(file: Path, time: str | None = None) -> list[Raster]:
         try:
             sheets = [read_sheet(file)]
         except BadInput:  # several rasters, or a file that cannot be read at all
-            known = read_sheet(file, "", ()).known
-            times = [name for name in known if TIME.search(name)]
-            sheets = [_with_time(file, name) for name in times]
-            if not sheets:
+            found = [*_rasters(file)]
+            if not found:
                 raise
-            found = [_raster(sheet, name) for sheet, name in zip(sheets, times, strict=True)]
             return sorted(found, key=lambda r: -len(r.channels))
         return [_raster(sheets[0], time_of(sheets[0]))]
     sheet = _with_time(file, time)
     return [_raster(sheet, time)]
+
+
+def _rasters(file: Path) -> Iterator[Raster]:
+    """The rasters of a file with several, each once."""
+    seen = set()
+    for name in read_sheet(file, "", ()).known:
+        if not TIME.search(name):
+            continue
+        try:
+            raster = _raster(_with_time(file, name), name)
+        except BadInput:  # the name alone is that of several times; with its group it comes too
+            continue
+        key = (raster.t.size, *raster.t[[0, -1]], *(c.name for c in raster.channels))
+        if key not in seen:
+            seen.add(key)
+            yield raster
 
 
 def _with_time(file: Path, time: str) -> Sheet:
