@@ -22,18 +22,8 @@ def estimate(
     will_write(out)
     with said.status("reading the experiment") as status:
         result = filtered(experiment, out, data, tell=status.update, show=show)
-    for name, found in result.estimated.items():
-        spread, unit = found["std_error"], found["unit"] or ""
-        bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
-        typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound)
-    if result.doubt:
-        typer.echo(result.doubt)
-    for alarm in result.alarms:
-        end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
-        likely = f"probability {alarm.probability:.3f}"
-        typer.echo(f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, {likely}")
-    if result.diverged:
-        typer.echo(f"diverged: {result.reason}")
+    for line in result.lines():
+        typer.echo(line)
     typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
     if not result.consistent:
         raise typer.Exit(1)

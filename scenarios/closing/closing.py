@@ -4,11 +4,13 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
 from math import isfinite
 from pathlib import Path
 
+import pandas as pd
 from joblib import cpu_count
 
 from estimator.closeloop.checkpoints import Stages
@@ -27,6 +29,7 @@ from fmus.host.fmu import FmuError
 from scenarios.closing.result import Result, result_of
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment, load_experiment
+from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
 from scenarios.output import writable
 
@@ -40,7 +43,7 @@ STAGES = ".stages"  # folder of the checkpoints, kept when a run is interrupted
 
 
 def close_loop(
-    experiment: str | Path,
+    experiment: Given,
     out: str | Path | None = None,
     data_dir: str | Path | None = None,
     tell: Tell = lambda _: None,
@@ -48,21 +51,23 @@ def close_loop(
     seed: int = 0,
     resume: bool = False,
     show: Show = lambda _: None,
+    data: pd.DataFrame | None = None,
 ) -> Result:
     """Run `railfmi close-loop` and return the result that is written as result.json.
 
-    experiment: path of an experiment.toml, or of its folder.
+    experiment: path of an experiment.toml, or of its folder; or its content as a dictionary or an object.
     out: folder for result.json, report.html, the figures and the augmented FMU; None writes nothing.
     data_dir: folder of the data files, by default the folder of the experiment.
     jobs: number of processes, by default one per core.
     seed: seed of the random numbers.
     resume: continue from the checkpoints that an interrupted run left in `out`.
     show: gets the table of conversions as lines, before anything is simulated.
+    data: the record, in place of the data file; units by column in data.attrs["units"].
     Raises BadInput if the experiment is wrong.
     """
     begun = time.monotonic()
-    declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
+        declared = with_test_part(given(experiment, data_dir, data, Path(work)))
         posed = Posed.of(declared, Path(work))
         show(conversion_lines(posed.problem.record))
         folder = None if out is None else writable(Path(out))
@@ -90,7 +95,11 @@ class Posed:
 def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
     """Read the experiment in a file or folder; raises BadInput also if it declares no test part."""
     where = Path(path)
-    declared = load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir)
+    return with_test_part(load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir))
+
+
+def with_test_part(declared: Experiment) -> Experiment:
+    """The experiment; raises BadInput if it declares no test part."""
     if declared.split is None:
         raise BadInput(
             f"{declared.file}: key 'split' is missing; close-loop needs it to set a test part apart"
@@ -105,8 +114,9 @@ def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> St
     """
     if folder is None:
         return Stages()
-    files = [e.file, *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
-    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files)]
+    files = [*([e.file] if e.file.is_file() else []), *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
+    said = [] if e.file.is_file() else [sha256(repr(dict(e)).encode()).hexdigest()]
+    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files), *said]
     stages = Stages(folder / STAGES, " ".join(key))
     if not resume:
         stages.forget()

@@ -45,10 +45,15 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
     """
     file = Path(path)
     declared = read_file(Declaration, file, "an experiment.toml")
+    return placed(declared, file, data_dir)
+
+
+def placed(declared: Declaration, file: Path, data_dir: str | Path | None = None) -> Experiment:
+    """A declaration as the experiment of a file, which need not exist; data_dir: see load_experiment."""
     if declared.model is not None:
         _check_model(file, declared.model)
     place: dict[str, Any] = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
-    return Experiment.model_construct(**dict(declared), **place)
+    return Experiment.model_construct(**{**dict(declared), **place})
 
 
 def _check_model(file: Path, name: str) -> None:
