@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from estimator.record import Conversion, Record
+from scenarios.drawing.typography import aligned
 
 Show = Callable[[Sequence[str]], None]  # shows lines that stay, unlike progress
 HEAD = ("FMU variable", "column", "unit", "unit in the FMU", "value in the FMU")
@@ -11,9 +12,7 @@ UNSTATED = "not stated"
 
 def conversion_lines(record: Record) -> list[str]:
     """The table as lines, one for each measured output and input, with aligned columns."""
-    rows = [HEAD, *(_row(c) for c in record.conversions)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return aligned([HEAD, *(_row(c) for c in record.conversions)])
 
 
 def _row(c: Conversion) -> tuple[str, str, str, str, str]:

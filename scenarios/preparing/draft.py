@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import copysign
+from math import copysign, floor, log10
 from pathlib import Path
 
 from fmus.host.description import FmuDescription, FmuVariable
@@ -63,7 +63,8 @@ class Draft:
         """Begin of the record, end of the part that identifies, and end of the part that tests, s."""
         begin, end = self.raster.longest()
         middle = begin + IDENTIFY * (end - begin)
-        return tuple(float(f"{t:.6g}") if abs(t) < 1e5 else t for t in (begin, middle, end))  # type: ignore
+        places = max(0, 2 - floor(log10(self.raster.step)))  # finer than a sample, coarser than rounding
+        return round(begin, places), round(middle, places), round(end, places)
 
     @property
     def free_inputs(self) -> list[FmuVariable]:
@@ -80,11 +81,10 @@ class Draft:
 
 def draft(fmu: Path, description: FmuDescription, raster: Raster) -> Draft:
     """The guess: columns by likeness, ports by the inputs that are forces and have no column."""
-    known_ = description.variables
-    found = matches([known_[n] for n in (*description.inputs, *description.outputs)], raster.channels)
-    signals = [_signal(m) for m in found]
-    inputs = tuple(s for s in signals if s.variable.causality == "input")
-    outputs = tuple(s for s in signals if s.variable.causality == "output")
+    signals = [description.variables[n] for n in (*description.inputs, *description.outputs)]
+    found = [_signal(m) for m in matches(signals, raster.channels)]
+    inputs = tuple(s for s in found if s.variable.causality == "input")
+    outputs = tuple(s for s in found if s.variable.causality == "output")
     made = Draft(fmu, description, raster, inputs, outputs, ())
     return replace(made, ports=tuple(_ports(made)))
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from fmus.errors import BadInput
 from fmus.host.archive import describe
+from scenarios.drawing.typography import aligned
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import writable
 from scenarios.preparing.draft import Draft, doubtful, draft, sure, toml_of, with_column
-from scenarios.preparing.survey import survey, table
+from scenarios.preparing.survey import survey
 
 NONE = "-"  # the answer that leaves a variable without a column
 # question, answers, default -> answer
@@ -34,7 +35,7 @@ class Initialised:
              f"{sure(s.likeness)}, {s.likeness:.0%}")
             for s in d.signals
         ]  # fmt: skip
-        lines = table(rows)
+        lines = aligned(rows)
         for port in d.ports:
             far = f", displacement {port.displacement}" if port.displacement else ", no displacement"
             lines.append(f"port '{port.name}': force {port.force}, velocity {port.velocity}{far}")

@@ -10,9 +10,9 @@ from estimator.record import Array
 from fmus.host.archive import describe, problems
 from fmus.host.description import FmuDescription
 from scenarios.drawing.sheet import INK, NOISE, Plot, envelope, name_axes, sheet, sheets
-from scenarios.drawing.typography import unit
+from scenarios.drawing.typography import aligned, unit
 from scenarios.output import writable
-from scenarios.preparing.survey import Raster, survey, table
+from scenarios.preparing.survey import Raster, survey
 
 MOST_POWER = 0.99  # of a channel's variance lies below the frequency that is told
 PANELS = 6  # channels on a sheet
@@ -59,7 +59,7 @@ def _of_raster(r: Raster) -> Iterator[str]:
                 "; ".join(c.remarks),
             )
         )
-    yield from table(rows)
+    yield from aligned(rows)
 
 
 def spectrum(x: Array, step: float) -> tuple[Array, Array]:
@@ -112,7 +112,7 @@ def _of_fmu(path: Path) -> Iterator[str]:
                     v.description,
                 )
             )
-    yield from table(rows)
+    yield from aligned(rows)
     if d.unused:
         yield f"not used, because railfmi takes scalar real variables only: {', '.join(d.unused)}"
     yield from _access(d)

@@ -1,7 +1,7 @@
 """What a record holds: its channels with units, rates and oddities, without an experiment."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -164,9 +164,3 @@ def _remarks(sheet: Sheet, column: str, x: Array) -> Iterator[str]:
         yield f"the unit '{unit}' is not known"
     for note in output_notes(sheet.file.name, column, x[np.isfinite(x)]):
         yield note.sentence.partition(f"column '{column}' ")[2]
-
-
-def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of cells as lines with aligned columns."""
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
