@@ -21,9 +21,9 @@ from scenarios.experiment.conversions import conversion_lines
 from scenarios.output import writable
 
 SHOWN = 0.25  # of the record is drawn, from its beginning
-# simulations of a whole run over the number of candidates, fewest and most, of the demonstration, the motor
-# of the tutorial and the public benchmark EMPS; what is found decides how many it takes
-RUNS_PER_CANDIDATE = (10.0, 100.0)
+# of simulations in a whole run, a third and three times of the 89 that the motor of the tutorial took, since
+# what is found decides how many it takes
+RUNS_PER_CANDIDATE = (30.0, 300.0)
 APART = 2.0  # factor between measured and simulated values beyond which a wrong unit is suspected
 PANELS = 6
 
