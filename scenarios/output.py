@@ -29,6 +29,6 @@ def replaced(folder: Path) -> str:
     more = f" and {len(found) - 1} more" if len(found) > 1 else ""
     name = found[0].relative_to(folder)
     return (
-        f"{folder} holds earlier results ({name}{more}, of {written:%Y-%m-%d %H:%M}), which are replaced; "
+        f"{folder} held earlier results ({name}{more}, of {written:%Y-%m-%d %H:%M}), which were replaced; "
         "give another --out to keep them"
     )

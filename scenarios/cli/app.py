@@ -12,7 +12,7 @@ from pkgutil import iter_modules
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import app, said
+from scenarios.cli.console import NOTICES, app, said, say_notices
 from scenarios.finished import finished_or_said
 
 FOLDER = Path(__file__).parent
@@ -67,7 +67,9 @@ def _listed() -> None:
 def run_safely(arguments: Sequence[str]) -> int:
     """Run a command line; errors in the input become one line and exit code 2."""
     try:
+        NOTICES.clear()
         code = loaded(arguments)(list(arguments), standalone_mode=False)
+        say_notices()
         return code if isinstance(code, int) else 0
     except BadInput as error:
         said.print(f"railfmi: {error}", markup=False, soft_wrap=True)

@@ -38,11 +38,18 @@ Out = Annotated[Path, typer.Option("--out", help="folder to write to", file_okay
 RESULTS = Path("out")  # of each command a folder in it, so that none replaces the results of another
 
 
+NOTICES: list[str] = []  # said when a command has done its work; wrong input gets its one line alone
+
+
 def will_write(folder: Path) -> None:
-    """Say so if a command is about to replace earlier results."""
-    sentence = replaced(folder)
-    if sentence:
-        said.print(f"railfmi: {sentence}", markup=False, soft_wrap=True)
+    """Have it said at the end of a command that it has replaced earlier results."""
+    NOTICES.extend(filter(None, [replaced(folder)]))
+
+
+def say_notices() -> None:
+    """Print what is to be said at the end of a command."""
+    while NOTICES:
+        said.print(f"railfmi: {NOTICES.pop(0)}", markup=False, soft_wrap=True)
 
 
 def show(lines: Sequence[str]) -> None:
