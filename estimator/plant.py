@@ -9,6 +9,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from estimator.record import Array, Run
+from fmus.host.apart.isolation import Isolation
+from fmus.host.apart.room import close_rooms
 from fmus.host.fmu import Fmu
 
 PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
@@ -99,22 +101,27 @@ class Plants:
 
     def __init__(self, most: int = 24) -> None:
         self.most = most
-        self._open: OrderedDict[tuple[Path, tuple[str, ...], tuple[str, ...]], Plant] = OrderedDict()
+        self._open: OrderedDict[tuple[Path, tuple[str, ...], tuple[str, ...], Isolation | None], Plant] = (
+            OrderedDict()
+        )
 
-    def get(self, fmu: Path, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Plant:
-        """The plant of an FMU file with these inputs and outputs."""
-        key = (fmu, inputs, outputs)
+    def get(
+        self, fmu: Path, inputs: tuple[str, ...], outputs: tuple[str, ...], isolation: Isolation | None = None
+    ) -> Plant:
+        """The plant of an FMU file with these inputs and outputs; isolation: see Fmu."""
+        key = (fmu, inputs, outputs, isolation)
         if key not in self._open:
             if len(self._open) >= self.most:
                 self._open.popitem(last=False)[1].fmu.close()
-            self._open[key] = Plant(Fmu(fmu), inputs, outputs)
+            self._open[key] = Plant(Fmu(fmu, isolation), inputs, outputs)
         self._open.move_to_end(key)
         return self._open[key]
 
     def close(self) -> None:
-        """Close all."""
+        """Close all, and the processes in which foreign ones run."""
         while self._open:
             self._open.popitem()[1].fmu.close()
+        close_rooms()
 
 
 PLANTS = Plants()

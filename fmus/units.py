@@ -41,6 +41,7 @@ _FMI_BASE = MappingProxyType(
         "radian": "rad",
     }
 )
+LONGEST = 100  # characters of a unit
 _NOT_PARSED = (pint.PintError, TokenError, ValueError, TypeError, AssertionError, ArithmeticError)
 
 
@@ -68,6 +69,8 @@ def _pint_text(unit: str) -> str:
 
 def base_exponents(unit: str) -> BaseUnit:
     """SI base exponents (only those that are not 0), factor and offset of a unit; BadInput if unknown."""
+    if len(unit) > LONGEST:
+        raise BadInput(f"unit '{unit[:20]}...' has {len(unit)} characters; give one that is known")
     text = _pint_text(unit)
     try:
         if not _GRAMMAR.fullmatch(text):

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from scenarios.closing.several import close_loops
     from scenarios.estimating.estimating import estimate
     from scenarios.experiment.experiment import load_experiment
+    from scenarios.planning.planning import plan
     from scenarios.preparing.initialising import init
     from scenarios.preparing.inspecting import inspect
     from scenarios.preparing.trial import dry_run
@@ -36,12 +37,13 @@ _HOMES = {
     "inspect": "scenarios.preparing.inspecting",
     "kalker": "fmus.contact",
     "load_experiment": "scenarios.experiment.experiment",
+    "plan": "scenarios.planning.planning",
 }
 
 __all__ = [
     "BadInput", "Fmu", "FmuError", "__version__", "close_loop", "close_loops", "contact_table",
     "creep_forces", "dry_run", "equivalent_conicity", "estimate", "hertz", "init", "inspect", "kalker",
-    "load_experiment",
+    "load_experiment", "plan",
 ]  # fmt: skip
 
 

@@ -7,13 +7,15 @@ if TYPE_CHECKING:
     from scenarios.closing.closing import close_loop
     from scenarios.closing.several import close_loops
     from scenarios.estimating.estimating import estimate
+    from scenarios.planning.planning import plan
 
-__all__ = ["close_loop", "close_loops", "estimate"]
+__all__ = ["close_loop", "close_loops", "estimate", "plan"]
 
 _HOMES = {
     "close_loop": "scenarios.closing.closing",
     "close_loops": "scenarios.closing.several",
     "estimate": "scenarios.estimating.estimating",
+    "plan": "scenarios.planning.planning",
 }
 
 

@@ -20,6 +20,7 @@ from estimator.record import Array
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from fmus.host.rows import ALIKE, offers_rows
+from fmus.host.watch import PAGE
 
 
 class Refused(FmuError):
@@ -33,6 +34,8 @@ class Copies:
     set once; free_time: whether a step may begin at any time, so that one instance is enough for all rows.
     Otherwise each row has its own instance, whose time only moves forward.
     """
+
+    SHOWN = ("get",)  # in another process that uses them, see fmus.host.apart.room
 
     def __init__(
         self,
@@ -62,6 +65,7 @@ class Copies:
         """
         values = np.ascontiguousarray(values)  # the compiled loop reads it by its address
         loop, out = self._ready(values, t), np.empty((len(values), len(self.get)))
+        PAGE.stepping(self._fmus[0].instance.who, t)
         failed = loop.run(values, out, self.t0 if self.way is Way.RESUME else t, dt)
         if failed >= 0:
             self._refuse(values[failed // 8], failed // 8, failed % 8, t)

@@ -15,6 +15,7 @@ from estimator.access.copies import Refused
 from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
+from fmus.host.watch import PAGE
 from fmus.integrators.rk4 import slopes, weighted
 
 
@@ -25,6 +26,8 @@ class Exchange:
     the classical Runge-Kutta method in `parts` equal parts. Raises BadInput if the FMU does not support model
     exchange or has other states.
     """
+
+    SHOWN = ("get", "states", "parts")  # in another process that uses it, see fmus.host.apart.room
 
     def __init__(
         self,
@@ -50,6 +53,8 @@ class Exchange:
         self._rest = [i for i, n in enumerate(self.put) if n not in self.states]
         self._tunes = any(variables[self.put[i]].causality == "parameter" for i in self._rest)
         self._dots, self._refs = [d for d, _ in pairs], [s for _, s in pairs]
+        self._who = PAGE.enrolled(archive.path.name, archive.description.fmi_version.startswith("3"))
+        PAGE.calling(self._who, "the start for model exchange")
         kind = _Fmi3 if archive.description.fmi_version.startswith("3") else _Fmi2
         rest, read = ([variables[n].reference for n in some] for some in (self._others(), self.get))
         self._fmu = kind(archive, told, rest, read, len(self._x))
@@ -88,6 +93,7 @@ class Exchange:
         return np.array(row[self._x])
 
     def _row(self, row: Array, t: float, dt: float) -> Array:
+        PAGE.calling(self._who, f"a step by model exchange from t = {t:.9g} s")
         x = self._prepared(row, t)
         h = dt / self.parts
         for part in range(self.parts if dt else 0):
@@ -100,6 +106,7 @@ class Exchange:
         return np.asarray(weighted(k) / 6)
 
     def _slopes(self, row: Array, t: float, dt: float) -> tuple[Array, Array]:
+        PAGE.calling(self._who, f"the derivatives of a step by model exchange from t = {t:.9g} s")
         x, h = self._prepared(row, t), dt / self.parts
         n = len(x)
         self._fmu.derivatives(x, t)

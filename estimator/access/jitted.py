@@ -12,6 +12,7 @@ from estimator.access.pointers import Functions
 from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 from fmus.host.jitted import BOOL, INT, REAL, WARNING, WHOLE, advance, external, numba, transfer
+from fmus.host.watch import PAGE
 
 SET, GET, STEP, RESET, SETUP, ENTER, EXIT, RESTORE = range(8)  # in order of pointers.ROLES
 # arguments after the address; pointers and sizes are passed as 64-bit integers
@@ -34,15 +35,16 @@ def _initialise(fmi3, fn, component, t0):  # type: ignore[no-untyped-def]
     return status
 
 
-def _run(fmi3, way, fn, components, saved, set_refs, get_refs, values, out, t, dt):  # type: ignore[no-untyped-def]
-    """The loop; see Loop.run."""
-    told = np.zeros(4, np.int64)  # event, ends, early, reached
+def _run(fmi3, way, fn, components, saved, set_refs, get_refs, values, out, t, dt, told):  # type: ignore[no-untyped-def]
+    """The loop; see Loop.run. told: see fmus.host.jitted.march."""
     n, m = values.shape[1], out.shape[1]
     answers = told.ctypes.data
     into, read = set_refs.ctypes.data, get_refs.ctypes.data
     rows, found = values.ctypes.data, out.ctypes.data
     for i in range(values.shape[0]):
         c = components[i]
+        told[1] = told[2] = 0
+        told[4] += 1
         status = np.int32(0)
         if way == 1:
             status = restore(fn[RESTORE], (c, saved[i]))
@@ -90,4 +92,4 @@ class JittedLoop:
             rows = self._rows[: len(values)]
             rows[:, : self._n] = values
             values = rows
-        return int(run(*self._fixed, values, out, float(t), float(dt)))
+        return int(run(*self._fixed, values, out, float(t), float(dt), PAGE.told))

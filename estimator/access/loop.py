@@ -18,6 +18,7 @@ from estimator.record import Array
 from fmus.host.fmu import Fmu
 from fmus.host.instance import WARNING
 from fmus.host.rows import Rows, base_of
+from fmus.host.watch import PAGE, TOLD
 
 STILL = np.zeros(1)  # s: no step
 
@@ -91,6 +92,7 @@ class _Copy:
     def run(self, row: Array, out: Array, t: float, dt: float) -> int:
         self._mine[:] = row
         self._time = t
+        PAGE.cells[TOLD + 4] += 1
         status = self._prepare()
         if status <= WARNING and dt > 0:
             status = self._step(t, dt)

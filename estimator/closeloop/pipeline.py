@@ -24,6 +24,7 @@ from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.outcome import Outcome
+from estimator.closeloop.planning.advice import next_experiment
 from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
@@ -134,6 +135,11 @@ class Chain:
         baseline, singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
         self.tell("test", "checking the answer on the test part")
         judgement = confirmed_on_test(baseline, judgement).after(before)
+        if judgement.verdict == "ambiguous":
+            self.tell("next experiment", "simulating what would tell the effects apart")
+            members = judgement.members
+            words = self.stages.done("next experiment", lambda: next_experiment(baseline, members))
+            judgement = replace(judgement, next_experiment=words)
         found = replace(
             found, baseline=baseline, singles=tuple(singles), pairs=tuple(pairs), judgement=judgement
         )

@@ -55,7 +55,9 @@ def share_within(found: Array, freedom: Array, probability: float = 0.95) -> flo
     """
     if len(found) == 0:
         return np.nan
-    low, high = (chi2.ppf(p, freedom) for p in ((1 - probability) / 2, (1 + probability) / 2))
+    some, which = np.unique(freedom, return_inverse=True)
+    ends = ((1 - probability) / 2, (1 + probability) / 2)
+    low, high = (np.asarray(chi2.ppf(p, some))[which] for p in ends)
     return float(np.mean((found >= low) & (found <= high)))
 
 

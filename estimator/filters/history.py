@@ -10,6 +10,7 @@ import numpy as np
 from estimator.filters.algebra import compiled
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.record import Array, BoolArray
+from fmus.aside import blocks, by_rows, joined, set_aside
 
 EVEN = 1e-6  # relative difference of time steps that is attributed to the rounding of printed times
 ROUNDING = 8.0  # units in the last place of a time, below which a difference of times is rounding
@@ -61,18 +62,27 @@ def samples(t: Array, u: Array, y: Array, every: int = 1, parts: int = 1) -> Sam
     """
     at = np.arange(0, len(t), every)
     share = np.arange(parts) / parts
-    edges = np.append((t[at[:-1], None] + np.diff(t[at])[:, None] * share).ravel(), t[at[-1]])
-    means = np.diff(_area(t, u, edges), axis=0) / np.diff(edges)[:, None]
-    return Samples(t[at], u[at], means.reshape(len(at) - 1, parts, u.shape[1]), y[at])
-
-
-def _area(t: Array, u: Array, edges: Array) -> Array:
-    """Integral (M, n_u) from t[0] to edges (M,) of inputs (N, n_u) that are linear between times (N,)."""
-    slope = np.diff(u, axis=0) / np.diff(t)[:, None]
     area = np.vstack([np.zeros(u.shape[1]), np.cumsum((u[1:] + u[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
+
+    def means(rows: slice) -> Array:
+        here = t[at[rows.start : rows.stop + 1]]
+        edges = np.append((here[:-1, None] + np.diff(here)[:, None] * share).ravel(), here[-1])
+        found = np.diff(_area(t, u, area, edges), axis=0) / np.diff(edges)[:, None]
+        return np.asarray(found.reshape(-1, parts, u.shape[1]))
+
+    held = by_rows((len(at) - 1, parts, u.shape[1]), means)
+    return Samples(t[at], u[at], held, y[at])
+
+
+def _area(t: Array, u: Array, area: Array, edges: Array) -> Array:
+    """Integral (M, n_u) from t[0] to edges (M,) of inputs (N, n_u) that are linear between times (N,).
+
+    area: (N, n_u) that integral to each of the times.
+    """
     k = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, len(t) - 2)
     since = (edges - t[k])[:, None]
-    found: Array = area[k] + u[k] * since + slope[k] * since**2 / 2
+    slope = (u[k + 1] - u[k]) / (t[k + 1] - t[k])[:, None]
+    found: Array = area[k] + u[k] * since + slope * since**2 / 2
     return found
 
 
@@ -121,23 +131,36 @@ class _Rows:
     """Rows of a history: time, NIS, log likelihood, degrees of freedom, x, std, innovations, gated."""
 
     def __init__(self, most: int, n: int, m: int) -> None:
-        self._rows, self._ends, self._k = np.empty((most, 4 + 2 * n + 2 * m)), np.cumsum([4, n, n, m]), 0
+        width = 4 + 2 * n + 2 * m
+        self._at_once = blocks(most, 8 * width)[0].stop
+        self._full: list[Array] = []
+        self._rows, self._ends, self._k = np.empty((self._at_once, width)), np.cumsum([4, n, n, m]), 0
         self._unknown = np.full((m, m), np.nan)
 
     def add(self, e: Estimate) -> None:
+        if self._k == self._at_once:
+            self._full.append(set_aside(self._rows.copy()))
+            self._k = 0
         row, S = self._rows[self._k], e.S if e.S.size else self._unknown
         row[0], row[1], row[2] = e.t, e.nis, e.log_likelihood
         note(e.x, e.P, e.innovation, S, e.used, e.gated, row[3:])
         self._k += 1
 
+    def _columns(self, of: slice) -> Array:
+        """Some columns of all rows."""
+        return joined([rows[:, of] for rows in (*self._full, self._rows[: self._k])])
+
     def history(
         self, names: tuple[str, ...], last: Estimate, broken: str, kept: Sequence[Estimate]
     ) -> History:
-        facts, x, std, innovation, gated = np.split(self._rows[: self._k], self._ends, axis=1)
-        t, nis, likelihood, freedom = facts.T
+        begins = [*range(4), *self._ends.tolist()]
+        ends = [*begins[1:], self._rows.shape[1]]
+        t, nis, likelihood, freedom, x, std, innovation, gated = (
+            self._columns(slice(a, b)) for a, b in zip(begins, ends, strict=True)
+        )
         return History(
-            names, t, x, std, innovation, nis, freedom, gated > 0, float(likelihood.sum()),
-            last, broken, tuple(kept),
+            names, t[:, 0], x, std, innovation, nis[:, 0], freedom[:, 0], gated > 0,
+            float(likelihood[:, 0].sum()), last, broken, tuple(kept),
         )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.record import Array
+from fmus.aside import blocks, set_aside
 
 NUDGE = 1e-3  # finite difference, as share of the prior standard deviation
 INFORMED = 0.9  # ratio of posterior to prior deviation, below which the data determine an unknown
@@ -51,9 +52,11 @@ def information(simulate: Callable[[Array], Array], z: Array, std: Array, noise:
         away = np.zeros(len(z))
         away[i] = NUDGE * s
         slope = (simulate(z + away) - simulate(z - away)) / (2 * NUDGE * s)
-        columns.append(np.nan_to_num(slope / noise).ravel())
-    J = np.column_stack(columns)
-    found: Array = J.T @ J
+        columns.append(set_aside(np.nan_to_num(slope / noise).ravel()))
+    found: Array = np.zeros((len(z), len(z)))
+    for rows in blocks(len(columns[0]), 8 * len(columns)):
+        J = np.column_stack([column[rows] for column in columns])
+        found += J.T @ J
     return found
 
 

@@ -163,8 +163,8 @@ class Joint:
         told = self._put, self._get, self._fixed
         access = self.access
         if access.way is not Way.EXCHANGE:
-            access = by_exchange(self.archive, *told, self._first, self._t0, self._dt)
-        return Exchange(self.archive, *told, self._t0, access.parts)
+            access = self.archive.called(by_exchange, *told, self._first, self._t0, self._dt)
+        return self.archive.made(Exchange, *told, self._t0, access.parts)
 
     def owns(self, close: Callable[[], None]) -> None:
         """Register a function to call when this object is closed."""
@@ -220,7 +220,7 @@ class Joint:
         self._first_carried = np.array([first[n] for n in self.others])
         constants = self._fixed = {n: v for n, v in self._constants.items() if n not in put}
         self._t0, self._dt, self._first = t0, dt, first
-        self.access: Access = probe(self.archive, put, get, constants, first, t0, dt, compiled)
+        self.access: Access = self.archive.called(probe, put, get, constants, first, t0, dt, compiled)
         late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
         if late:
             raise BadInput(
@@ -228,7 +228,7 @@ class Joint:
                 "leave it out of [outputs] or measure a state"
             )
         if way is Way.EXCHANGE:
-            self.access = by_exchange(self.archive, put, get, constants, first, t0, dt)
+            self.access = self.archive.called(by_exchange, put, get, constants, first, t0, dt)
         chosen = self.access.way if way is None else way
         self._put, self._get = tuple(put), tuple(get)
         self.copies: Copies | Exchange
@@ -237,9 +237,8 @@ class Joint:
             self._stack.callback(self.copies.close)
             return
         free = self.access.free_time if chosen is self.access.way else False
-        self.copies = self._stack.enter_context(
-            Copies(self.archive, chosen, put, get, constants, t0, free, compiled)
-        )
+        self.copies = self.archive.made(Copies, chosen, put, get, constants, t0, free, compiled)
+        self._stack.callback(self.copies.close)
 
     def _check(self, put: list[str], get: list[str]) -> None:
         d = self.archive.description

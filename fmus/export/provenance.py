@@ -18,6 +18,7 @@ from markupsafe import Markup
 
 from fmus.effects.effect import Effect
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import Isolation
 from fmus.model import Model
 from fmus.variables import Parameter
 
@@ -126,6 +127,20 @@ def altered(fmu: str | Path) -> list[str]:
         names = [n for n in packed.namelist() if n != PLACE and not n.endswith("/")]
         now = {name: sha256(packed.read(name)).hexdigest() for name in names}
     return sorted(name for name in {*said, *now} if said.get(name) != now.get(name))
+
+
+def isolation_of(fmu: Path, isolation: Isolation | None) -> Isolation | None:
+    """The isolation that an FMU needs: none if it is a build of railfmi's own models, unaltered.
+
+    A record of provenance is no signature: who forges one can have an FMU run in the process of the command.
+    """
+    if isolation is None or not fmu.is_file():
+        return isolation  # who opens it says what is wrong with it
+    try:
+        own = "base" not in provenance(fmu) and not altered(fmu)
+    except BadInput:
+        own = False
+    return None if own else isolation
 
 
 def checksum(file: Path) -> str:

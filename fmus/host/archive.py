@@ -3,10 +3,12 @@
 import shutil
 import tempfile
 import zipfile
+from collections.abc import Callable
+from math import inf
 from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 from xml.etree import ElementTree
 
 import fmpy
@@ -14,16 +16,24 @@ from fmpy.model_description import read_model_description
 from fmpy.validation import validate_fmu
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import Isolation
+from fmus.host.apart.room import Room, room_of
 from fmus.host.description import FmuDescription, FmuVariable
+from fmus.taken import check_packed
+
+Made = TypeVar("Made")
 
 FMI_VERSIONS = ("2.0", "3.0")
 
 
 class Archive:
-    """An unpacked FMU; several instances can run from one. BadInput where it cannot be used here."""
+    """An unpacked FMU; several instances can run from one. BadInput where it cannot be used here.
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+    isolation: limits of the process of its own in which its instances run; None: they run in this process.
+    """
+
+    def __init__(self, path: str | Path, isolation: Isolation | None = None) -> None:
+        self.path, self.isolation = Path(path), isolation
         names = _checked_names(self.path)
         self.folder = Path(tempfile.mkdtemp(prefix="railfmi_fmu_"))
         # goes with the object or the process, worker processes included, which skip atexit
@@ -36,9 +46,26 @@ class Archive:
             self.close()
             raise
 
+    @property
+    def room(self) -> Room | None:
+        """The process in which its instances run, if that is not this one."""
+        return None if self.isolation is None else room_of(self.isolation)
+
+    def made(self, kind: Callable[..., Made], *args: Any) -> Made:
+        """kind(archive, *args), made where the instances run."""
+        return kind(self, *args) if self.room is None else self.room.make(kind, self, *args)
+
+    def called(self, function: Callable[..., Made], *args: Any) -> Made:
+        """function(archive, *args), called where the instances run."""
+        return function(self, *args) if self.room is None else self.room.call(function, self, *args)
+
     def close(self) -> None:
         """Delete the folder."""
         self._delete()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """In another process it stands for the same folder, which stays this one's, and runs there."""
+        return _unpacked, (self.path, self.folder, self.description)
 
     def __enter__(self) -> Self:
         return self
@@ -47,6 +74,12 @@ class Archive:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _unpacked(path: Path, folder: Path, description: FmuDescription) -> Archive:
+    archive = Archive.__new__(Archive)
+    archive.path, archive.folder, archive.description, archive.isolation = path, folder, description, None
+    return archive
 
 
 def describe(path: str | Path) -> FmuDescription:
@@ -65,8 +98,11 @@ def _checked_names(path: Path) -> list[str]:
         raise BadInput(f"{path}: no such FMU file; build one with 'railfmi build' or mend the path")
     try:
         with zipfile.ZipFile(path) as packed:
+            check_packed(packed, path)
             names = packed.namelist()
             broken = packed.testzip()
+    except BadInput:
+        raise
     except Exception as error:  # damage shows as errors of zipfile, zlib, struct, codecs and others
         raise BadInput(f"{path}: not a readable zip file, so no FMU ({error}); get it again") from error
     if broken:
@@ -105,16 +141,25 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         raise BadInput(f"{path}: is FMI {model.fmiVersion}; FMI {' and '.join(FMI_VERSIONS)} are read here")
     if model.coSimulation is None:
         raise BadInput(f"{path}: is not for co-simulation; export it again as a co-simulation FMU")
+    try:
+        return _reduced(model)
+    except ValueError as error:
+        raise BadInput(f"{path}: its modelDescription.xml cannot be read ({error})") from error
+
+
+def _reduced(model: Any) -> FmuDescription:
+    """What is used of FMPy's description; ValueError for a number that is none."""
     unused = {v.name: kind for v in model.modelVariables if (kind := _unused(v))}
     variables = {v.name: _variable(v) for v in model.modelVariables if v.name not in unused}
     kind, usual = model.coSimulation, model.defaultExperiment
+    step = _number(usual.stepSize) if usual else None
     return FmuDescription(
         name=model.modelName,
         fmi_version=model.fmiVersion,
         identifier=kind.modelIdentifier,
         guid=model.guid or model.instantiationToken,
         variables=variables,
-        step_size=_number(usual.stepSize) if usual else None,
+        step_size=step if step is not None and 0 < step < inf else None,
         saves_state=kind.canGetAndSetFMUstate,
         serialises_state=kind.canSerializeFMUstate,
         once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,

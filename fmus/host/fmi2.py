@@ -19,6 +19,7 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 from fmus.host.instance import Instance, heard
+from fmus.host.watch import PAGE
 
 
 @cache
@@ -38,6 +39,7 @@ class Fmi2Instance(Instance):
     def _started(self, **identity: str) -> Any:
         slave = FMU2Slave(**identity)
         _let_go_in_time(slave.dll._name)
+        PAGE.calling(self.who, "fmi2Instantiate")
         slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
         return slave
 

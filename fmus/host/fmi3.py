@@ -11,6 +11,7 @@ from typing import Any
 from fmpy.fmi3 import FMU3Slave
 
 from fmus.host.instance import WARNING, Instance, heard
+from fmus.host.watch import PAGE
 
 
 class Fmi3Instance(Instance):
@@ -26,6 +27,7 @@ class Fmi3Instance(Instance):
             heard(name, status, message)
 
         slave = FMU3Slave(**identity)
+        PAGE.calling(self.who, "fmi3InstantiateCoSimulation")
         slave.instantiate(loggingOn=True, eventModeUsed=False, earlyReturnAllowed=False, logMessage=log)
         return slave
 

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from fmus.errors import BadInput, did_you_mean
+from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
 from fmus.host.fmi2 import Fmi2Instance
@@ -17,27 +18,35 @@ from fmus.host.rows import AT_ONCE, Inputs, Rows, base_of, offers_rows
 
 
 class FmuError(RuntimeError):
-    """An FMU refused a call; the sentence says which and what it gave as the reason."""
+    """An FMU refused a call; the sentence says which and what it gave as the reason.
+
+    so_far: the Recording of a run until then.
+    """
+
+    so_far: Any = None
 
 
 class Fmu:
     """An instance of a co-simulation FMU.
 
     source: an FMU file, or an Archive that stays open while its instances live.
-    BadInput where the file cannot be used, FmuError where the running FMU refuses a call.
+    isolation: for a file, limits of the process in which it runs; None: it runs in this process.
+    BadInput where the file cannot be used, FmuError where the running FMU refuses a call, FmuEnded where it
+    ends the process in which it runs.
     """
 
-    def __init__(self, source: str | Path | Archive) -> None:
-        self._own = None if isinstance(source, Archive) else Archive(source)
+    def __init__(self, source: str | Path | Archive, isolation: Isolation | None = None) -> None:
+        self._own = None if isinstance(source, Archive) else Archive(source, isolation)
         archive = source if isinstance(source, Archive) else self._own
         if archive is None:
             raise BadInput("no FMU given")
         self.description: FmuDescription = archive.description
         self.name = archive.path.name
         self.time = 0.0
+        self._sent: tuple[Array, Array] | None = None  # times and inputs that an instance apart has
         try:
             kind = Fmi3Instance if self.description.fmi_version == "3.0" else Fmi2Instance
-            self._instance: Instance = self._safely(kind, archive, self.description.name)
+            self._instance: Instance = self._safely(archive.made, kind, self.description.name)
         except BaseException:
             if self._own:
                 self._own.close()
@@ -72,20 +81,39 @@ class Fmu:
         return values
 
     def simulate(
-        self, t: Array, inputs: Mapping[str, Array], outputs: Sequence[str], start: Mapping[str, float]
-    ) -> Array:
+        self, t: Array, inputs: Mapping[str, Array], outputs: Sequence[str], start: Mapping[str, float],
+        every: int = 1,
+    ) -> Array:  # fmt: skip
         """Restart at t[0] and run freely through t; outputs (N, n_y), the first row at t[0].
 
         t: (N,) s, increasing. inputs: (N,) samples each: over a step the mean of both ends acts, which is
         exact to second order for signals sampled from continuous ones, and outputs are read with the
-        sample of their time; or (N-1,), the value held over each step.
+        sample of their time; or (N-1,), the value held over each step. every: of the rows, only each so
+        manyth is returned, ((N - 1) // every + 1, n_y).
         """
         first, u = _driving(t, inputs)
-        self.restart(float(t[0]), **{**start, **first})
-        y0 = self.read(outputs)
-        y = self._safely(self._instance.run, t, u, self.references(inputs), self.references(outputs))
+        begin = {**start, **first}
+        read, driven = self.references(outputs), self.references(inputs)
+        times, held = (t, u) if isinstance(self._instance, Instance) else self._news(t, u)
+        y: Array = self._safely(
+            self._instance.simulate,
+            self.references(begin),
+            list(begin.values()),
+            times,
+            held,
+            driven,
+            read,
+            every,
+        )
         self.time = float(t[-1])
-        return np.vstack([y0, y])
+        return y
+
+    def _news(self, t: Array, u: Array) -> tuple[Array | None, Array | None]:
+        """Times and inputs to send to another process; None if they are those of the last simulation."""
+        if self._sent and all(map(np.array_equal, self._sent, (t, u))):
+            return None, None
+        self._sent = t.copy(), u.copy()
+        return t, u
 
     @property
     def at_once(self) -> int:
@@ -106,7 +134,7 @@ class Fmu:
         if not offers_rows(self._instance):
             return None
         first, u = _driving(t, inputs)
-        acting, ends = ((u[1:] + u[:-1]) / 2, u[1:]) if len(u) == len(t) else (u, None)
+        acting, ends = (_means(u), u[1:]) if len(u) == len(t) else (u, None)
         names = [name for name in starts[0] if name not in first]
         put, get, driven = (np.array(self.references(n), dtype=np.uint32) for n in (names, outputs, inputs))
         rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
@@ -167,6 +195,13 @@ class Fmu:
             return call(*args)
         except CallFailed as error:
             raise FmuError(f"{self.name}: {error}") from error
+
+
+def _means(u: Array) -> Array:
+    """Means (N-1, n_u) of the values at both ends of each step; u: (N, n_u)."""
+    means: Array = u[1:] + u[:-1]
+    means /= 2
+    return means
 
 
 def _driving(t: Array, inputs: Mapping[str, Array]) -> tuple[dict[str, float], Array]:

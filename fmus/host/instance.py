@@ -9,6 +9,7 @@ from contextlib import suppress
 from ctypes import c_double, c_uint, c_void_p, cast
 from functools import cache
 from itertools import count
+from math import nan
 from pathlib import Path
 from threading import Lock
 from typing import Any, ClassVar
@@ -17,7 +18,9 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
+from fmus.aside import blocks
 from fmus.host.archive import Archive
+from fmus.host.watch import GETTING, LOOPING, PAGE, SETTING, WHAT
 
 Array = NDArray[np.float64]
 LONG = 500  # steps, from which a compiled loop is worth its start
@@ -48,6 +51,9 @@ class Instance(ABC):
         self._fatal = ""  # why no call may be made any more, not even to free it
         self._new, self._running = True, False  # instantiated and nothing else; initialised and not failed
         self.final = True  # no state before the end of a step will come back
+        self._given: tuple[Array, Array] = (np.zeros(1), np.empty((0, 0)))  # of the last simulation
+        self.who = PAGE.enrolled(archive.path.name, self.FMI3)
+        PAGE.calling(self.who, "loading its library")
         with STARTING:
             path, here = sys.path.copy(), Path.cwd()
             try:
@@ -169,6 +175,25 @@ class Instance(ABC):
         """What failed and why, for a raw call whose status is above WARNING."""
         return self._failed(what, status)
 
+    def simulate(
+        self, start_refs: Sequence[int], start: Sequence[float], t: Array | None, u: Array | None,
+        set_refs: Sequence[int], get_refs: Sequence[int], every: int = 1,
+    ) -> Array:  # fmt: skip
+        """Initialise at t[0] with start values, then `run`, in blocks: outputs, the first row at t[0].
+
+        t, u: None for those of the last simulation; every: see Fmu.simulate.
+        """
+        t, u = self._given = self._given if t is None or u is None else (t, u)
+        self.initialise(start_refs, start, float(t[0]))
+        found = np.empty(((len(t) - 1) // every + 1, len(get_refs)))
+        found[0] = self.get(get_refs)
+        more = len(u) - len(t) + 1
+        for rows in blocks(len(t) - 1, 8 * (len(get_refs) + u.shape[1]), every):
+            given = t[rows.start : rows.stop + 1], u[rows.start : rows.stop + more]
+            y = self.run(*given, set_refs, get_refs)[every - 1 :: every]
+            found[rows.start // every + 1 :][: len(y)] = y
+        return found
+
     def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
         """Step from t[0] through t (N,); outputs (N-1, n_y).
 
@@ -188,15 +213,20 @@ class Instance(ABC):
         (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
         times, steps = t.tolist(), np.diff(t).tolist()
         into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
+        cells, setting, getting = PAGE.cells, self.who + SETTING, self.who + GETTING
         for k, dt in enumerate(steps):
             into[:] = rows[k]
+            cells[WHAT] = setting
             status = push() if n_u else OK
             if status <= WARNING:
+                PAGE.stepping(self.who, times[k])
                 status = step(times[k], dt)
             if status <= WARNING and last is not None:
                 into[:] = last[k]
+                cells[WHAT] = setting
                 status = push()
             if status <= WARNING:
+                cells[WHAT] = getting
                 status = pull()
             if status > WARNING:
                 raise CallFailed(self._failed(f"step at t = {times[k]:g} s", status))
@@ -214,7 +244,9 @@ class Instance(ABC):
         y: Array,
     ) -> None:
         """The same loop compiled, into y."""
-        told = np.zeros(4, dtype=np.int64)
+        told = PAGE.told
+        told[:] = 0
+        PAGE.cells[WHAT] = self.who + LOOPING
         k, status = march(
             self.FMI3,
             tuple(cast(getattr(self.library, name), c_void_p).value for name in self.CALLS),
@@ -226,11 +258,12 @@ class Instance(ABC):
             np.array(get_refs, dtype=np.uint32),
             y,
             told,
+            PAGE.now,
             self.final,
         )
         if k >= 0:
             if status <= WARNING:
-                reached = float(told[3:].view(np.float64)[0])
+                reached = float(told[3:4].view(np.float64)[0])
                 self._refuse_to_stop(float(t[k]), bool(told[1]), bool(told[2]), reached)
             raise CallFailed(self._failed(f"step at t = {t[k]:g} s", status))
 
@@ -247,17 +280,24 @@ class Instance(ABC):
             with suppress(CallFailed):  # it is done with all the same
                 self._call(self._slave.terminate)
         if not self._fatal:
+            PAGE.calling(self.who, self._named("freeInstance"))
             self._slave.freeInstance()
         MESSAGES.pop(self._name, None)
 
     def _call(self, function: Any, *args: Any, **kwargs: Any) -> Any:
         self._refuse_after_fatal()
+        name = function.__name__
+        PAGE.calling(self.who, self._named(name), float(args[0]) if name == "doStep" else nan)
         try:
             return function(*args, **kwargs)
         except FMICallException as error:
             raise CallFailed(self._failed(str(error).rstrip("."), error.status)) from error
         except OSError as error:
             raise CallFailed(self._reason(str(error).rstrip("."))) from error
+
+    def _named(self, function: str) -> str:
+        """The name of FMI's function behind one of FMPy's."""
+        return f"fmi{3 if self.FMI3 else 2}{function[0].upper()}{function[1:]}"
 
     def _refuse_after_fatal(self) -> None:
         """A call after a fatal status can end the process, so none is made."""
@@ -303,4 +343,6 @@ def address_of(pointer: Any) -> int:
 def heard(instance: str, status: int, message: bytes | None) -> None:
     """Keep what an instance logs of anything that did not go well."""
     if status > OK:
-        MESSAGES[instance].append(" ".join((message or b"").decode("utf-8", "replace").split()))
+        line = " ".join((message or b"").decode("utf-8", "replace").split())
+        MESSAGES[instance].append(line)
+        PAGE.heard(line)

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from fmus.host.watch import GETTING, SETTING, STEPPING
+
 # by name because both come without types
 numba: Any = import_module("numba")
 ir: Any = import_module("llvmlite.ir")
@@ -61,7 +63,7 @@ def _advance(fmi3, address, component, t, dt, told, final):  # type: ignore[no-u
 transfer, advance = (numba.njit(cache=True)(function) for function in (_transfer, _advance))
 
 
-def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told, final):  # type: ignore[no-untyped-def]
+def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told, now, final):  # type: ignore[no-untyped-def]
     """Steps through t; (-1, 0), or the step that failed and its status or STOPPED."""
     push, step, pull = calls
     n, m = u.shape[1], y.shape[1]
@@ -72,15 +74,21 @@ def _march(fmi3, calls, component, t, u, ends, set_refs, get_refs, y, told, fina
     settles = n > 0 and ends.shape[0] > 0
     for k in range(t.shape[0] - 1):
         status = np.int32(0)
+        now[0] = t[k]
+        told[4] = k
         if n > 0:
+            told[5] = SETTING
             status = transfer(fmi3, push, component, into, n, rows + 8 * n * k)
         if status <= WARNING:
+            told[5] = STEPPING
             status = advance(fmi3, step, component, t[k], t[k + 1] - t[k], answers, final)
             if fmi3 and status <= WARNING and (told[1] | told[2]) != 0:
                 return k, np.int32(STOPPED)
         if status <= WARNING and settles:
+            told[5] = SETTING
             status = transfer(fmi3, push, component, into, n, last + 8 * n * k)
         if status <= WARNING:
+            told[5] = GETTING
             status = transfer(fmi3, pull, component, read, m, found + 8 * m * k)
         if status > WARNING:
             return k, status
@@ -92,8 +100,10 @@ def march() -> Callable[..., tuple[int, int]]:
     """The compiled loop with the arguments of _march; it lets other threads run.
 
     calls: addresses of the functions that set, step and get; u: (N-1, n_u) acts over a step; ends: (N-1, n_u)
-    is set after it, (0, n_u) for none; told: (4,) int64, all 0, becomes what the last step of an FMI 3.0 FMU
-    answered: event, ends, early, the time that it reached; final: whether no earlier state will come back.
+    is set after it, (0, n_u) for none; told: (6,) int64, all 0, becomes what the last step of an FMI 3.0 FMU
+    answered (event, ends, early, the time that it reached), the number of the step and what is done in it;
+    now: (1,) becomes the time of the step, s. Both lie on the page that another process may watch.
+    final: whether no earlier state will come back.
     """
     compiled: Callable[..., tuple[int, int]] = numba.njit(cache=True, nogil=True)(_march)
     return compiled

@@ -84,7 +84,7 @@ class Rows:
 
 def offers_rows(instance: Instance) -> bool:
     """Whether the FMU's library has the call."""
-    return hasattr(instance.library, NAME)
+    return isinstance(instance, Instance) and hasattr(instance.library, NAME)
 
 
 def base_of(description: FmuDescription, start: Mapping[str, float]) -> Array:

@@ -1,6 +1,7 @@
 """The command `railfmi`; exit codes: 0 done, 1 a check failed, 2 wrong input, with one error line."""
 
 import ast
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -13,15 +14,19 @@ import typer
 
 from fmus.errors import BadInput
 from scenarios.cli.console import NOTICES, app, said, say_notices
-from scenarios.finished import finished_or_said
+from scenarios.cli.supervision import INTERRUPTED, supervised
 
 FOLDER = Path(__file__).parent
-NO_COMMANDS = ("__main__", "app", "console", "build_options")
+NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision")
 COMMANDS = {  # module by the name of its command
     module.name.replace("_", "-"): module.name
     for module in iter_modules([str(FOLDER)])
     if module.name not in NO_COMMANDS
 }
+
+UNWRITABLE = (  # errors of a disk or a folder
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM,
+)  # fmt: skip
 
 # libraries' worker processes would each use every core for small matrices
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -31,9 +36,7 @@ def main() -> None:
     """Entry of the console command."""
     for name in THREADS:
         os.environ.setdefault(name, "1")
-    with finished_or_said():
-        code = run_safely(sys.argv[1:])
-    sys.exit(code)
+    sys.exit(supervised(run_safely, sys.argv[1:]))
 
 
 def loaded(arguments: Sequence[str] = tuple(COMMANDS)) -> typer.Typer:
@@ -66,12 +69,17 @@ def _listed() -> None:
 
 def run_safely(arguments: Sequence[str]) -> int:
     """Run a command line; errors in the input become one line and exit code 2."""
+    INTERRUPTED.told = False
     try:
         NOTICES.clear()
         code = loaded(arguments)(list(arguments), standalone_mode=False)
+        if code == 130 and not INTERRUPTED.told:  # typer made an exit code of the exception
+            return _interrupted()
         say_notices()
         return code if isinstance(code, int) else 0
     except BadInput as error:
+        if INTERRUPTED.came:  # and was taken for a fault of what was being read
+            return _interrupted()
         said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
         return 2
     except BrokenProcessPool:
@@ -85,9 +93,19 @@ def run_safely(arguments: Sequence[str]) -> int:
         return _interrupted()
     except KeyboardInterrupt:
         return _interrupted()
+    except OSError as error:
+        if error.errno not in UNWRITABLE:
+            raise
+        where = error.filename or "a file"
+        said.print(
+            f"railfmi: {where}: cannot be written ({error.strerror}); free space, or name another folder",
+            markup=False, soft_wrap=True,
+        )  # fmt: skip
+        return 2
     except Exception as error:
-        host = sys.modules.get("fmus.host.fmu")  # loads NumPy, which help does without
-        if host and isinstance(error, host.FmuError):
+        if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
+            return _interrupted()
+        if _is_of_fmu(error):
             said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
             return 2
         shown = getattr(error, "format_message", None)  # click's own errors of usage
@@ -98,6 +116,16 @@ def run_safely(arguments: Sequence[str]) -> int:
         return 2
 
 
+def _is_of_fmu(error: Exception) -> bool:
+    """Whether an FMU refused a call or ended its process; the modules load NumPy, which help does without."""
+    kinds = {"fmus.host.fmu": "FmuError", "fmus.host.apart.isolation": "FmuEnded"}
+    return any(
+        isinstance(error, getattr(sys.modules[module], kind))
+        for module, kind in kinds.items()
+        if module in sys.modules
+    )
+
+
 def _interrupted() -> int:
-    said.print("railfmi: interrupted; nothing was written")
+    said.print("railfmi: interrupted; files that were finished before are kept")
     return 130

@@ -1,11 +1,30 @@
 """`railfmi close-loop`: find the effect that a model lacks, from one experiment or several."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
+from fmus import limits
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    interrupted,
+    said,
+    show,
+    will_write,
+)
+from scenarios.cli.supervision import INTERRUPTED
+
+if TYPE_CHECKING:
+    from fmus.host.apart.isolation import Isolation
+
+RESUME = "run the same command with --resume to continue from here"
 
 
 @app.command("close-loop")
@@ -22,27 +41,42 @@ def close_loop(
         bool,
         typer.Option("--dry-run", help="only show the mapping, a first simulation, and the expected time"),
     ] = False,
+    trust_fmu: Trust = False,
+    call_limit: CallLimit = limits.CALL,
+    run_limit: RunLimit = limits.RUN,
+    memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
     """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
 
     Several experiments get a folder each and a common table. If they use the same FMU, each effect found is
     tested on the other records and fitted to all of them. Ctrl-C keeps the experiments that are finished.
     """
+    from fmus.host.apart.isolation import FmuEnded, Isolation
+
+    isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     if dry_run:
-        _try(experiments, out, data, jobs)
+        _try(experiments, out, data, jobs, isolation)
         return
+    from fmus.host.fmu import FmuError
     from scenarios.closing.lines import lines_of, table_of
 
     will_write(out)
     if len(experiments) == 1:
+        from scenarios.closing.closing import STAGES
         from scenarios.closing.closing import close_loop as run
 
         try:
             with said.status("reading the experiment") as status:
-                result = run(experiments[0], out, data, status.update, jobs, seed, resume, show)
+                result = run(experiments[0], out, data, status.update, jobs, seed, resume, isolation, show)
         except KeyboardInterrupt:
-            said.print("railfmi: interrupted; run the same command with --resume to continue from here")
-            raise typer.Exit(130) from None
+            raise interrupted(RESUME) from None
+        except FmuError as error:
+            if not INTERRUPTED.came:  # an FMU in Python takes the exception for a failure of its own
+                raise
+            raise interrupted(RESUME) from error
+        except FmuEnded as error:
+            kept = "; --resume continues from the checkpoints" if (out / STAGES).is_dir() else ""
+            raise FmuEnded(f"{error}{kept}") from error
         for line in lines_of(result):
             typer.echo(line)
         typer.echo(f"report: {out / 'report.html'}")
@@ -59,6 +93,7 @@ def close_loop(
             jobs,
             seed,
             resume,
+            isolation,
             show,
         )
     if found.results:
@@ -66,19 +101,21 @@ def close_loop(
             typer.echo(line)
         typer.echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
     if found.interrupted:
-        said.print(
-            f"railfmi: interrupted; {len(found.results)} of {len(experiments)} experiments are finished; "
+        raise interrupted(
+            f"{len(found.results)} of {len(experiments)} experiments are finished; "
             "the same command with --resume goes on from here"
         )
-        raise typer.Exit(130)
 
 
-def _try(experiments: list[Path], out: Path, data: Path | None, jobs: int | None) -> None:
+def _try(
+    experiments: list[Path], out: Path, data: Path | None, jobs: int | None, isolation: "Isolation | None"
+) -> None:
     """Show for each experiment what a run would do."""
     from scenarios.preparing.trial import dry_run as tried
 
     for experiment in experiments:
         with said.status("simulating the record once"):
-            trial = tried(experiment, out if len(experiments) == 1 else out / experiment.stem, data, jobs)
+            folder = out if len(experiments) == 1 else out / experiment.stem
+            trial = tried(experiment, folder, data, jobs, isolation)
         for line in trial.lines():
             typer.echo(line)

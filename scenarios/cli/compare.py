@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, will_write
+from fmus import limits
+from scenarios.cli.console import RESULTS, CallLimit, MemoryLimit, Out, RunLimit, app, said, will_write
 
 
 @app.command()
@@ -20,13 +21,18 @@ def compare(
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
+    call_limit: CallLimit = limits.CALL,
+    run_limit: RunLimit = limits.RUN,
+    memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
     """Simulate two FMUs and report their differences; exit 1 if one is larger than the tolerance."""
+    from fmus.host.apart.isolation import Isolation
     from scenarios.comparing.comparing import compare as side_by_side
 
+    isolation = Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
     with said.status("reading the experiment") as status:
-        found = side_by_side(a, b, experiment, out, tolerance, data, tell=status.update)
+        found = side_by_side(a, b, experiment, out, tolerance, data, status.update, isolation)
     for line in found.lines():
         typer.echo(line)
     if not found.ok:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from scenarios.cli.supervision import INTERRUPTED
 from scenarios.output import replaced
 
 app = typer.Typer(
@@ -32,6 +33,22 @@ def railfmi(
 
 
 said = Console(stderr=True, highlight=False)
+
+
+def interrupted(sentence: str) -> typer.Exit:
+    """Say that the command was interrupted, and what can be done; the exception that ends it."""
+    said.print(f"railfmi: interrupted; {sentence}", markup=False, soft_wrap=True)
+    INTERRUPTED.told = True
+    return typer.Exit(130)
+
+
+Trust = Annotated[
+    bool,
+    typer.Option("--trust-fmu", help="run foreign FMUs in the process of the command, without any limit"),
+]
+CallLimit = Annotated[float, typer.Option(min=0.1, help="s, that one call of a foreign FMU may take")]
+RunLimit = Annotated[float, typer.Option(min=0.1, help="s, that one simulation of a foreign FMU may take")]
+MemoryLimit = Annotated[float, typer.Option(min=0.1, help="GB of memory that foreign FMUs may use")]
 
 
 Out = Annotated[Path, typer.Option("--out", help="folder to write to", file_okay=False)]

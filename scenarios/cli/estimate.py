@@ -5,7 +5,19 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
+from fmus import limits
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    said,
+    show,
+    will_write,
+)
 
 
 @app.command()
@@ -15,13 +27,19 @@ def estimate(
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
+    trust_fmu: Trust = False,
+    call_limit: CallLimit = limits.CALL,
+    run_limit: RunLimit = limits.RUN,
+    memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
     """Estimate states, parameters and unknown inputs of an FMU; exit 1 if the filter fails its tests."""
+    from fmus.host.apart.isolation import Isolation
     from scenarios.estimating.estimating import estimate as filtered
 
+    isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
     with said.status("reading the experiment") as status:
-        result = filtered(experiment, out, data, tell=status.update, show=show)
+        result = filtered(experiment, out, data, tell=status.update, isolation=isolation, show=show)
     for line in result.lines():
         typer.echo(line)
     typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")

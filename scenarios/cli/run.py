@@ -5,7 +5,19 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, will_write
+from fmus import limits
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    interrupted,
+    said,
+    will_write,
+)
 
 
 @app.command("run")
@@ -13,8 +25,13 @@ def run_scenarios(
     scenarios: Annotated[list[Path], typer.Argument(help="scenario files; several get a contact sheet")],
     out: Out = RESULTS / "run",
     watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
+    trust_fmu: Trust = False,
+    call_limit: CallLimit = limits.CALL,
+    run_limit: RunLimit = limits.RUN,
+    memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
     """Run scenarios and check their expectations; exit 1 if one is not met. Ctrl-C keeps the recording."""
+    from fmus.host.apart.isolation import Isolation
     from scenarios.simulating import Result, run_all
 
     def done(result: Result) -> None:
@@ -31,9 +48,10 @@ def run_scenarios(
 
     will_write(out)
     with said.status("reading the scenarios") as status:
-        results = run_all(scenarios, out, status.update if watch else (lambda _: None), done)
+        isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
+        results = run_all(scenarios, out, status.update if watch else (lambda _: None), done, isolation)
     typer.echo(f"results: {out}")
     if any(r.interrupted_at is not None for r in results):
-        raise typer.Exit(130)
+        raise interrupted("the recording up to then is kept")
     if not all(r.ok for r in results):
         raise typer.Exit(1)

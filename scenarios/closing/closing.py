@@ -20,18 +20,21 @@ from estimator.closeloop.pipeline import trace
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
+from estimator.record import Record
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
-from fmus.export.provenance import Origin, checksum
+from fmus.export.provenance import Origin, checksum, isolation_of
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
+from fmus.host.grading.honest import check_honest
 from scenarios.closing.result import Result, result_of
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 Tell = Callable[[str], None]
 
@@ -50,6 +53,7 @@ def close_loop(
     jobs: int | None = None,
     seed: int = 0,
     resume: bool = False,
+    isolation: Isolation | None = ISOLATED,
     show: Show = lambda _: None,
     data: pd.DataFrame | None = None,
 ) -> Result:
@@ -61,14 +65,15 @@ def close_loop(
     jobs: number of processes, by default one per core.
     seed: seed of the random numbers.
     resume: continue from the checkpoints that an interrupted run left in `out`.
+    isolation: limits of the processes in which a foreign FMU runs; None runs it in this process.
     show: gets the table of conversions as lines, before anything is simulated.
     data: the record, in place of the data file; units by column in data.attrs["units"].
-    Raises BadInput if the experiment is wrong.
+    Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit.
     """
     begun = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
         declared = with_test_part(given(experiment, data_dir, data, Path(work)))
-        posed = Posed.of(declared, Path(work))
+        posed = Posed.of(declared, Path(work), isolation)
         show(conversion_lines(posed.problem.record))
         folder = None if out is None else writable(Path(out))
         stages = stages_of(declared, folder, seed, resume)
@@ -86,9 +91,11 @@ class Posed:
     problem: Problem
 
     @classmethod
-    def of(cls, declared: Experiment, work: Path) -> "Posed":
+    def of(cls, declared: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> "Posed":
         """The question of an experiment; work: folder for the builds of its FMU."""
-        builder = builder_for(declared, work)
+        builder = builder_for(declared, work, isolation)
+        if declared.fmu_path:
+            check_honest(declared.fmu_path, isolation or ISOLATED)
         return cls(declared, builder, pose(declared, builder))
 
 
@@ -145,16 +152,17 @@ def closed(
     if folder is None:
         return found, result_of(e.id, problem, found, time.monotonic() - begun, ())
     tell("building the augmented FMU and writing the report")
-    augmented = augment(posed.builder, e, problem, found, folder, tell)
-    result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
-    from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
+    with written_at_once(folder) as part:
+        augmented = augment(posed.builder, e, problem, found, part, tell)
+        result = result_of(e.id, problem, found, time.monotonic() - begun, augmented)
+        from scenarios.closing.report import write_report  # Matplotlib is loaded when the answer is known
 
-    write_report(folder, problem, found, result)
-    result.write(folder / "result.json")
+        write_report(part, problem, found, result)
+        result.write(part / "result.json")
     return found, result
 
 
-def builder_for(e: Experiment, work: Path) -> Builder:
+def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> Builder:
     """The builder of the experiment's FMUs: from one of our models, or from a foreign FMU."""
     if e.model is not None:
         return ModelBuilder(e.model, work)
@@ -164,13 +172,20 @@ def builder_for(e: Experiment, work: Path) -> Builder:
     ports = tuple(
         PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity)) for p in e.ports
     )
-    return ForeignBuilder(e.fmu_path, ports, work)
+    return ForeignBuilder(e.fmu_path, ports, work, isolation_of(e.fmu_path, isolation))
 
 
 def pose(e: Experiment, builder: Builder) -> Problem:
     """The problem to be solved: the FMU, the record, and the parameters to calibrate."""
+    return problem_of(e, builder, load_record)
+
+
+def problem_of(
+    e: Experiment, builder: Builder, load: Callable[[Experiment, FmuDescription], Record]
+) -> Problem:
+    """The problem of an experiment, whose record is read by `load`."""
     description = describe(e.fmu_path or builder(()))
-    record = load_record(e, description)
+    record = load(e, description)
     form = {n: bounds for n, bounds in builder.form.items() if n not in e.parameters}
     calibrate = {**form, **e.calibrate}
     declared = {**_starts(description, calibrate), **e.parameters, **e.initial}

@@ -15,6 +15,7 @@ from estimator.closeloop.several.transfer import Traced, transfers
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.provenance import checksum
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from scenarios.closing.closing import (
     Posed,
     Tell,
@@ -50,6 +51,7 @@ def close_loops(
     jobs: int | None = None,
     seed: int = 0,
     resume: bool = False,
+    isolation: Isolation | None = ISOLATED,
     show: Show = lambda _: None,
 ) -> Results:
     """Run `railfmi close-loop` on several experiments; see close_loop for a single one.
@@ -57,14 +59,14 @@ def close_loops(
     The results of each experiment are written to `out`/ID; index.html, table.csv and results.json, which
     cover all experiments, are written to `out`. If experiments use the same FMU, each effect found is tested
     on the other records and fitted jointly to all records that show it.
-    done: called with each result as soon as it is finished.
+    done: called with each result as soon as it is finished. isolation: see close_loop.
     After Ctrl-C, the finished results are kept, and `interrupted` is set in the result.
     Raises BadInput if an experiment is wrong, before the first one is run.
     """
     declared = [experiment_of(e, data_dir) for e in experiments]
     _check_ids(declared)
     with tempfile.TemporaryDirectory(prefix="railfmi_loops_") as work:
-        posed = [_posed(e, Path(work) / f"{i}") for i, e in enumerate(declared)]
+        posed = [_posed(e, Path(work) / f"{i}", isolation) for i, e in enumerate(declared)]
         for p in posed:
             show([f"{p.declared.id}:", *conversion_lines(p.problem.record)])
         campaign = _Campaign(posed, None if out is None else writable(Path(out)), jobs or cpu_count())
@@ -97,11 +99,11 @@ def _check_ids(declared: Sequence[Experiment]) -> None:
         files[e.id] = e.file
 
 
-def _posed(e: Experiment, work: Path) -> Posed:
+def _posed(e: Experiment, work: Path, isolation: Isolation | None) -> Posed:
     """Read all files of an experiment; experiments with the same model share one folder of builds."""
     folder = work if e.model is None else work.parent / e.model
     folder.mkdir(exist_ok=True)
-    return Posed.of(e, folder)
+    return Posed.of(e, folder, isolation)
 
 
 def fmu_of(e: Experiment) -> str:

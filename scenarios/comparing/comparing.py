@@ -10,7 +10,8 @@ import numpy as np
 from estimator.record import Array, Record, Run
 from fmus.errors import BadInput
 from fmus.export.provenance import checksum
-from fmus.host.apart import FreeRun, simulate_apart
+from fmus.host.apart.free_run import FreeRun, simulate_apart
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, FmuVariable
 from fmus.units import conversion
@@ -23,7 +24,7 @@ from scenarios.comparing.result import (
 )
 from scenarios.experiment.experiment import Experiment, check_names, load_experiment
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 Tell = Callable[[str], None]
 TOLERANCE = 1e-9  # relative, of builds of one model: see docs/native.md
@@ -38,6 +39,7 @@ def compare(
     tolerance: float = TOLERANCE,
     data_dir: str | Path | None = None,
     tell: Tell = lambda _: None,
+    isolation: Isolation = ISOLATED,
 ) -> Comparison:
     """Run `railfmi compare`; returns the result that is written to `out`/result.json with its figure.
 
@@ -45,7 +47,9 @@ def compare(
     declared noise are used. A measured state that is not declared starts at its first sample, any other state
     at the FMU's own start value.
     tolerance: limit of the largest difference divided by the rms of the output of `a`.
-    Raises BadInput if the input is wrong, FmuError if an FMU refuses a call.
+    isolation: limits of the processes in which the FMUs run.
+    Raises BadInput if the input is wrong, FmuError if an FMU refuses a call, FmuEnded if one crashes or
+    passes a limit.
     """
     if not (isfinite(tolerance) and tolerance >= 0):
         raise BadInput(f"tolerance {tolerance:g}: give a number of 0 or more")
@@ -59,8 +63,8 @@ def compare(
     names, unfit = _common(*about, f"{a} and {b}")
     tell(f"running {Path(a).name} and {Path(b).name}, the second FMU, over {_length(record):g} s")
     with ThreadPoolExecutor(2) as pool:  # each thread waits for a process
-        files = zip((a, b), about, strict=True)
-        asked = [pool.submit(_simulated, Path(f), own, about[0], record, declared, names) for f, own in files]
+        files, given = zip((a, b), about, strict=True), (about[0], record, declared, names, isolation)
+        asked = [pool.submit(_simulated, Path(f), own, *given) for f, own in files]
         both = [answer.result() for answer in asked]
     outputs = _differences(record, names, both, about[0], tolerance)
     found = Comparison(
@@ -78,8 +82,9 @@ def compare(
     )
     if folder is not None:
         tell("drawing")
-        found.write(folder / "result.json")
-        difference_plot(found, record, names, both).write(folder)
+        with written_at_once(folder) as part:
+            found.write(part / "result.json")
+            difference_plot(found, record, names, both).write(part)
     return found
 
 
@@ -123,8 +128,9 @@ def _scale(source: FmuDescription, target: FmuDescription, name: str) -> tuple[f
 
 
 def _simulated(
-    file: Path, own: FmuDescription, of: FmuDescription, record: Record, e: Experiment, names: list[str]
-) -> Array:
+    file: Path, own: FmuDescription, of: FmuDescription, record: Record, e: Experiment, names: list[str],
+    isolation: Isolation,
+) -> Array:  # fmt: skip
     """Free simulations of all runs of a record, one after the other, (N, n), in the units of `of`."""
     scales = np.array([_scale(of, own, n) for n in record.inputs]).reshape(-1, 2)
     runs = []
@@ -135,7 +141,7 @@ def _simulated(
             start[name] = factor * value + offset
         u = run.u * scales[:, 0] + scales[:, 1]
         runs.append(FreeRun(run.t, {n: u[:, j] for j, n in enumerate(record.inputs)}, start))
-    found = np.concatenate(simulate_apart(file, runs, names))
+    found = np.concatenate(simulate_apart(file, runs, names, isolation))
     back = np.array([_scale(own, of, n) for n in names])
     into: Array = found * back[:, 0] + back[:, 1]
     return into

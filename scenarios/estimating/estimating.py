@@ -12,7 +12,11 @@ from estimator.filters.consistency import checks
 from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import build_quick
+from fmus.export.provenance import isolation_of
+from fmus.host.apart.isolation import ISOLATED, Isolation
+from fmus.host.apart.room import closing_rooms
 from fmus.host.archive import Archive
+from fmus.host.grading.honest import check_honest
 from fmus.models import model_class
 from scenarios.estimating.findings import (
     Findings,
@@ -38,7 +42,7 @@ from scenarios.experiment.declaration import Options
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 
 def estimate(
@@ -48,6 +52,7 @@ def estimate(
     tell: Tell = lambda _: None,
     options: Options | None = None,
     truth: Mapping[str, tuple[Array, Array]] | None = None,
+    isolation: Isolation | None = ISOLATED,
     show: Show = lambda _: None,
     data: pd.DataFrame | None = None,
 ) -> EstimateResult:
@@ -58,13 +63,14 @@ def estimate(
     data_dir: folder of the data files, by default the folder of the experiment.
     options: replace the options of the experiment.
     truth: true values by name as (times, values), for errors and figures.
+    isolation: limits of the process in which a foreign FMU runs; None runs it in this process.
     show: gets the table of conversions as lines, before anything is estimated.
     data: the record, in place of the data file; units by column in data.attrs["units"].
-    Raises BadInput if the experiment is wrong. If the filter diverges, the result contains the estimates up
-    to that time, and `diverged` and `reason` are set.
+    Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit. If the
+    filter diverges, the result contains the estimates up to that time, and `diverged` and `reason` are set.
     """
     begun = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work:
+    with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work, closing_rooms():
         e = given(experiment, data_dir, data, Path(work))
         if e.estimate is None:
             raise BadInput(
@@ -73,7 +79,10 @@ def estimate(
         chosen = options or e.estimate.options
         folder = None if out is None else writable(Path(out))
         tell("opening the FMU and the record")
-        with Archive(fmu_of(e, Path(work))) as archive:
+        fmu = fmu_of(e, Path(work))
+        if e.model is None:
+            check_honest(fmu, isolation or ISOLATED)
+        with Archive(fmu, isolation_of(fmu, isolation) if e.model is None else None) as archive:
             record = load_record(e, archive.description, missing=True)
             show(conversion_lines(record))
             setup = set_up(e, chosen, record, archive)
@@ -201,14 +210,8 @@ def rms_errors(found: Findings, truth: Mapping[str, tuple[Array, Array]]) -> dic
 def _write(
     folder: Path, found: Findings, result: EstimateResult, truth: Mapping[str, tuple[Array, Array]]
 ) -> None:
-    """Write all files to a temporary folder first, then move them, result.json last.
-
-    An error while writing thus leaves no incomplete set of files.
-    """
-    with tempfile.TemporaryDirectory(prefix=".writing_", dir=folder) as part:
-        made = Path(part)
+    """Write all files."""
+    with written_at_once(folder) as made:
         write_csv(made / "estimate.csv", found.history.names, found.history.t, found.value, found.std)
         write_page(made, found, result, truth)
         result.write(made / "result.json")
-        for file in sorted(made.iterdir(), key=lambda f: f.name == "result.json"):
-            file.replace(folder / file.name)

@@ -25,6 +25,7 @@ from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
 from estimator.filters.ukf import Spread
 from estimator.record import Array
+from fmus.aside import all_set_aside
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.form import LEARNT, Form, begun_again, consistent, leading, widened
@@ -71,7 +72,7 @@ def find(s: Setup, archive: Archive, tell: Tell) -> Findings:
         if i != best:
             run.joint.close()
     found, history = runs[best], widened([run.history for run in runs], best, among, s.asked)
-    value, std = found.joint.values(history.x, history.std)
+    value, std = all_set_aside(found.joint.values(history.x, history.std))
     forms = tuple(
         Form(choice, run.history.log_likelihood, consistent(run.history), last_values(run, s.asked))
         for choice, run in zip(s.choices, runs, strict=True)
@@ -109,7 +110,7 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
         history = filtered(filter, s.samples, lambda done: tell(f"filtering, {done:.0%} done"), keep)
         if keep:
             history = _smoothed(history)
-        value, std = joint.values(history.x, history.std)
+        value, std = all_set_aside(joint.values(history.x, history.std))
         unknown = len(joint.names) - len(s.states)
         learnt = afterwards(joint.names, start.P, history.last.P, unknown) if unknown else None
     except BaseException:
@@ -173,8 +174,9 @@ def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:
             values = dict(zip(names[:n], at[:n].tolist(), strict=True))
             for p, coordinate in zip(s.parameters, at[n:], strict=True):
                 values[p.name] = float(p.transform.theta(coordinate))
-            y = fmu.simulate(t, inputs, s.outputs, {**s.constants, **values})[::parts]
-            return np.where(np.isfinite(s.samples.y), y, np.nan)
+            y = fmu.simulate(t, inputs, s.outputs, {**s.constants, **values}, every=parts)
+            y[~np.isfinite(s.samples.y)] = np.nan
+            return y
 
         try:
             return before(names, information(simulate, z, std, s.noise), std, len(s.parameters))

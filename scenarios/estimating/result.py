@@ -22,6 +22,7 @@ from estimator.filters.history import History
 from estimator.filters.identifiability import Identifiability
 from estimator.filters.system import Joint
 from estimator.record import Array
+from fmus.aside import blocks, let_go
 from scenarios.experiment.declaration import Alarm, Options
 from scenarios.shown import Shown, axes_or_new
 
@@ -277,6 +278,10 @@ def finite(value: float) -> float | None:
 
 def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: Array) -> None:
     """Write the columns time, then NAME and NAME_std of each quantity."""
-    columns = np.column_stack([t, np.stack([value, std], axis=2).reshape(len(t), 2 * len(names))])
     header = ",".join(["time", *(c for n in names for c in (n, f"{n}_std"))])
-    np.savetxt(path, columns, fmt="%.9g", delimiter=",", header=header, comments="")
+    with path.open("w", encoding="latin1") as stream:
+        stream.write(f"{header}\n")
+        for rows in blocks(len(t), 8 * (1 + 2 * len(names))):
+            both = np.stack([value[rows], std[rows]], axis=2).reshape(-1, 2 * len(names))
+            np.savetxt(stream, np.column_stack([t[rows], both]), fmt="%.9g", delimiter=",")
+            let_go()

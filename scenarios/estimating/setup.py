@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.unknown_input import UnknownInput
 from estimator.noise import white_noise
 from estimator.record import Array, Record
+from fmus.aside import mean_square, set_aside
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
@@ -172,7 +174,7 @@ def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: R
     first = [values.get(n, d.variables[n].start or 0.0) for n in states]
     constants = {n: v for n, v in values.items() if n not in put}
     get = [*states, *(n for n in record.outputs if n not in states)]
-    with Copies(archive, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
+    with archive.made(Copies, Way.RESTART, put, get, constants, float(s.t[0])) as copies:
         row = np.array([*first, *s.u[0].tolist()])
         return tuple(needed(copies, row, states, record.outputs, scale, float(s.t[0]), s.step))
 
@@ -191,11 +193,16 @@ def _fine_enough(
     while parts is None and found.held.shape[1] < MOST_PARTS:
         finer = samples(run.t, run.u, run.y, every, 2 * found.held.shape[1])
         other = _free_run(archive, values, finer, record, states)
-        off = np.sqrt(np.mean((other - free)[:, : len(noise)] ** 2, axis=0))
-        if not np.any(off > TOLD_APART * noise):
+        if not np.any(_apart(free, other, len(noise)) > TOLD_APART * noise):
             break
         found, free = finer, other
     return found, free
+
+
+def _apart(one: Array, other: Array, n: int) -> Array:
+    """Root mean square (n,) of the difference of the first columns of two arrays (N, k)."""
+    difference = partial(lambda a, b, rows: b[rows, :n] - a[rows, :n], one, other)
+    return np.asarray(np.sqrt(mean_square(difference, len(one), 8 * n)))
 
 
 def _free_run(
@@ -205,10 +212,9 @@ def _free_run(
     names, parts = [*record.outputs, *states], s.held.shape[1]
     with Fmu(archive) as fmu:
         try:
-            found = fmu.simulate(*finely(s, record.inputs), names, dict(values))
+            return set_aside(fmu.simulate(*finely(s, record.inputs), names, dict(values), every=parts))
         except FmuError:
             return np.full((len(s.t), len(names)), np.nan)
-    return found[::parts]
 
 
 def finely(s: Samples, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:

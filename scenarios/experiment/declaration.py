@@ -228,6 +228,22 @@ def _data(value: object) -> str | DataFile:
     raise ValueError(f"must be a file name in quotes, or a table {{file = ..., option = ...}}, not {value!r}")
 
 
+class Plan(Table):
+    """What `plan` assumes of a record that is not taken yet.
+
+    ratio: size of the effects to be told apart, as rms of the residual over the noise where that is largest;
+    power: probability with which they must be; noise_share: noise of outputs for which none is declared, as
+    share of their rms; sensors: noise, in the FMU's unit, of outputs that could be measured, by default of
+    all outputs of the FMU; inputs: those that may be changed, by default all of [inputs].
+    """
+
+    ratio: Positive = 1.0
+    power: Share = 0.8
+    noise_share: Positive = 0.01
+    sensors: dict[str, Positive] = {}
+    inputs: tuple[str, ...] | None = None
+
+
 class Declaration(Table):
     """The keys of experiment.toml."""
 
@@ -246,6 +262,7 @@ class Declaration(Table):
     derived: dict[str, Derived] = {}
     ports: tuple[Port, ...] = ()
     estimate: Estimate | None = None
+    plan: Plan = Plan()
 
     @property
     def data_file(self) -> str | None:

@@ -43,7 +43,7 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
 
     Raises BadInput with one line that names the file, the key and the way out.
     """
-    file = Path(path)
+    file = Path(path).absolute()  # an FMU may change the working directory
     declared = read_file(Declaration, file, "an experiment.toml")
     return placed(declared, file, data_dir)
 
@@ -52,7 +52,8 @@ def placed(declared: Declaration, file: Path, data_dir: str | Path | None = None
     """A declaration as the experiment of a file, which need not exist; data_dir: see load_experiment."""
     if declared.model is not None:
         _check_model(file, declared.model)
-    place: dict[str, Any] = {"file": file, "data_dir": file.parent if data_dir is None else Path(data_dir)}
+    data = file.parent if data_dir is None else Path(data_dir)
+    place: dict[str, Any] = {"file": file, "data_dir": data.absolute()}
     return Experiment.model_construct(**{**dict(declared), **place})
 
 
@@ -95,6 +96,7 @@ def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
     yield "[initial]", e.initial, states, "a state whose start can be set"
     yield "[inputs]", e.inputs, fmu.inputs, "an input"
     yield "[outputs]", e.outputs, fmu.outputs, "an output"
+    yield "[plan.sensors]", e.plan.sensors, fmu.outputs, "an output"
     for port in e.ports:
         yield f"[[ports]] '{port.name}' force", [port.force], fmu.inputs, "an input"
         motion = [name for name in (port.velocity, port.displacement) if name]

@@ -1,6 +1,7 @@
 """Measured data: from the files of an experiment to a checked Record in the FMU's units."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ CHOOSE = 0.2  # share of the identify part that becomes the part to choose, if n
 PIECES = 5  # number of pieces in which these samples lie
 GRID = 15  # samples; pieces begin at multiples of it, so that screening can average 3 or 5 samples
 MIN_SAMPLES = 50  # samples in each part; with fewer, an error is within its own scatter
+LARGEST = 1e100  # of a measured number
 MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
 
 
@@ -44,7 +46,7 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
     """
     check_names(experiment, description)
     conversions, notes = _conversions(experiment, description)
-    scale = np.array([(c.factor, c.offset) for c in conversions])
+    scale = np.array([(c.factor, c.offset) for c in conversions]).reshape(-1, 2)
     runs = []
     for part, file in enumerate(experiment.data_files):
         run, found, inputs = _run(experiment, description, part, file, scale, missing)
@@ -59,6 +61,32 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
         noise_std=np.array(std) * np.abs(scale[:, 0]),
         notes=tuple(notes),
         conversions=tuple(conversions),
+    )
+
+
+def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
+    """The inputs of an experiment that is planned, checked; its outputs are not read and need not exist.
+
+    Without [split], all samples belong to the part to identify. The noise is that of the declared outputs.
+    """
+    check_names(experiment, description)
+    conversions, _ = _conversions(experiment, description)
+    needed = {c.column for c in experiment.input_columns.values()}
+    for name, made in reversed(experiment.derived.items()):
+        if name in needed:
+            needed.add(made.derivative)
+    derived = {name: made for name, made in experiment.derived.items() if name in needed}
+    inputs_alone = experiment.model_copy(update={"outputs": {}, "derived": derived})
+    record = load_record(inputs_alone, description)
+    std = [
+        (output.noise_std or np.nan) * abs(c.factor)
+        for output, c in zip(experiment.outputs.values(), conversions, strict=True)
+    ]
+    return replace(
+        record,
+        outputs=tuple(experiment.outputs),
+        noise_std=np.array(std),
+        conversions=(*conversions, *record.conversions),
     )
 
 
@@ -103,7 +131,8 @@ def _run(
     u = np.empty((t.size, len(e.inputs)))
     for j, name in enumerate(e.inputs):
         u[:, j] = given[name]
-    outputs = np.column_stack([data[output.column] for output in e.outputs.values()])
+    measured = [data[output.column] for output in e.outputs.values()]
+    outputs = np.column_stack(measured) if measured else np.empty((t.size, 0))  # of an experiment planned
     y = outputs * scale[:, 0] + scale[:, 1]
     return Run(t, u, y, fit, choose, test), [*notes, *stated.notes], converted
 
@@ -171,6 +200,11 @@ def _checked(e: Experiment, file: Path, data: dict[str, Array]) -> list[Note]:
         check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
         if np.isfinite(values).sum() < MIN_MEASURED:
             raise BadInput(f"{file}: column '{column}' has almost no numbers; leave its output out")
+        if np.nanmax(np.abs(values)) > LARGEST:
+            raise BadInput(
+                f"{file}: column '{column}' holds numbers above {LARGEST:g}, whose squares cannot be summed; "
+                "mend the column or leave it out"
+            )
     notes = list(time_notes(file.name, t))
     for column in measured:
         notes += output_notes(file.name, column, data[column][np.isfinite(data[column])])

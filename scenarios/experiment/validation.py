@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from fmus.errors import BadInput, did_you_mean
+from fmus.taken import check_file
 from scenarios.experiment.declaration import Table
 
 T = TypeVar("T", bound=Table)
@@ -30,12 +31,15 @@ SAID = MappingProxyType(
 
 def read_toml(file: Path, kind: str) -> dict[str, Any]:
     """The top table of a TOML file; `kind` is the word for the file in messages, "an experiment.toml"."""
+    check_file(file)
     try:
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise BadInput(f"{file}: cannot be read ({error.strerror}); give the path of {kind}") from error
     except UnicodeDecodeError as error:
         raise BadInput(f"{file}: is not UTF-8 text; save it as UTF-8") from error
+    except RecursionError as error:
+        raise BadInput(f"{file}: its tables are nested too deeply; write them flatter") from error
     except ValueError as error:  # TOMLDecodeError, or a number too long for Python
         raise BadInput(f"{file}: is not valid TOML: {error}") from error
 

@@ -13,6 +13,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
 from estimator.record import Array
 from estimator.sensor_faults import FAULTS
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from scenarios.closing.closing import Posed, experiment_of
 from scenarios.drawing.sheet import BEFORE, INK, Plot, envelope, legend, name_axes, sheet, sheets
@@ -78,14 +79,16 @@ def dry_run(
     out: str | Path | None = None,
     data_dir: str | Path | None = None,
     jobs: int | None = None,
+    isolation: Isolation | None = ISOLATED,
 ) -> Trial:
     """Read everything, simulate the record with the declared values, and estimate what a run would cost.
 
-    The arguments are those of close_loop. Raises BadInput if the experiment is wrong.
+    The arguments are those of close_loop. Raises BadInput if the experiment is wrong, FmuEnded if a foreign
+    FMU crashes or passes a limit.
     """
     declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_trial_") as work:
-        problem = Posed.of(declared, Path(work)).problem
+        problem = Posed.of(declared, Path(work), isolation).problem
         try:
             theta = {**problem.declared, **_first_states(problem)}
             problem.simulate(theta)  # the first one also builds and loads the FMU

@@ -11,12 +11,14 @@ import numpy as np
 from estimator.record import Array
 from fmus.contact.forces.conditions import CONDITIONS
 from fmus.errors import BadInput, did_you_mean
+from fmus.export.provenance import isolation_of
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import Archive
 from fmus.host.master.connections import Connection
 from fmus.host.master.master import Master
 from fmus.host.master.recording import TIME, Recording
 from scenarios.simulating.building import Builder, beside
-from scenarios.simulating.declaration import Declaration, Geometry, Moment
+from scenarios.simulating.declaration import Declaration, Geometry, Member, Moment
 from scenarios.simulating.expression import Expression
 from scenarios.simulating.given import sources
 from scenarios.simulating.value import Value
@@ -60,12 +62,20 @@ class Case(Protocol):
 
 
 def prepared(
-    d: Declaration, file: Path, wanted: Iterable[Expression], builder: Builder, stack: ExitStack
+    d: Declaration,
+    file: Path,
+    wanted: Iterable[Expression],
+    builder: Builder,
+    stack: ExitStack,
+    isolation: Isolation | None = ISOLATED,
 ) -> Case:
-    """A variant in which all names have been checked; wanted: its formulas, with names without variant."""
+    """A variant in which all names have been checked; wanted: its formulas, with names without variant.
+
+    isolation: limits of the process in which foreign FMUs run; None runs them in this process.
+    """
     if d.contact is not None:
         return _TableCase(d.contact, file.parent, wanted)
-    return _MotionCase(d, file, wanted, builder, stack)
+    return _MotionCase(d, file, wanted, builder, stack, isolation)
 
 
 class _TableCase:
@@ -100,14 +110,15 @@ class _MotionCase:
     """FMUs that are simulated together."""
 
     def __init__(
-        self, d: Declaration, file: Path, wanted: Iterable[Expression], builder: Builder, stack: ExitStack
-    ) -> None:
+        self, d: Declaration, file: Path, wanted: Iterable[Expression], builder: Builder, stack: ExitStack,
+        isolation: Isolation | None,
+    ) -> None:  # fmt: skip
         if d.duration is None or d.step is None:
             raise BadInput("keys 'duration' and 'step' are missing")
         self.duration: float | None = d.duration
         self._length, self._seed = d.duration, d.seed
         archives = {
-            name: stack.enter_context(Archive(builder.path(member, f"fmus.{name}", file)))
+            name: stack.enter_context(_archive(member, builder.path(member, f"fmus.{name}", file), isolation))
             for name, member in d.fmus.items()
         }
         fmus = {name: archive.description for name, archive in archives.items()}
@@ -162,6 +173,10 @@ class _MotionCase:
             for name, unit in units.items()
         }
         return Run(recording, found, Recording(readings, {TIME: "s", **units}))
+
+
+def _archive(member: Member, fmu: Path, isolation: Isolation | None) -> Archive:
+    return Archive(fmu, isolation_of(fmu, isolation) if member.model is None else None)
 
 
 def _reading(times: Array, reading: Array, unit: str | None) -> Value:

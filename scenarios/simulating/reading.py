@@ -30,7 +30,7 @@ class Scenario:
 
 def load_scenario(path: str | Path) -> Scenario:
     """Read the scenario in a file; a BadInput names the file, the key and the way out."""
-    file = Path(path)
+    file = Path(path).absolute()  # an FMU may change the working directory
     with of_file(file):
         table = read_toml(file, "a scenario")
         declared = read_table(Declaration, table)

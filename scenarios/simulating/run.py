@@ -8,9 +8,12 @@ from pathlib import Path
 from time import perf_counter
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import ISOLATED, FmuEnded, Isolation
+from fmus.host.apart.room import closing_rooms
 from fmus.host.fmu import FmuError
+from fmus.host.master.recording import Recording
 from scenarios.experiment.validation import of_file
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 from scenarios.simulating.asking import (
     Asked,
     asked,
@@ -37,46 +40,64 @@ Done = Callable[[Result], None]
 
 
 def run(
-    scenario: str | Path, out: str | Path, tell: Tell = lambda _: None, builder: Builder | None = None
+    scenario: str | Path,
+    out: str | Path,
+    tell: Tell = lambda _: None,
+    builder: Builder | None = None,
+    isolation: Isolation | None = ISOLATED,
 ) -> Result:
     """Run one scenario as `railfmi run` does; writes result.json, recordings and figures to `out`.
 
     tell: called from time to time with a line on the progress, the simulated time and the speed.
     builder: builder of the FMUs, if several scenarios share it.
     After Ctrl-C, the recordings are kept, the result is marked as interrupted, and no expectation is checked.
-    Raises BadInput if the scenario is wrong, FmuError if an FMU refuses a call.
+    isolation: limits of the process in which foreign FMUs run; None runs them in this process.
+    Raises BadInput if the scenario is wrong, FmuError if an FMU refuses a call, FmuEnded if a foreign FMU
+    crashes or passes a limit; what was recorded until then is written.
     """
     begun = perf_counter()
     read = load_scenario(scenario)
     folder = writable(Path(out))
     with ExitStack() as stack:
+        stack.enter_context(closing_rooms())
         if builder is None:
             builder = Builder(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_run_"))))
         with of_file(read.file):
             questions = asked(read)
-            cases = _all_prepared(read, questions, builder, stack, tell)
+            cases = _all_prepared(read, questions, builder, stack, tell, isolation)
             runs, summaries = _run_all(cases, read, folder, tell)
             result = _judged(read, questions, runs, summaries, folder, begun)
-            result.write(folder / "result.json")  # written before the figures, which may fail
+            _write(result)  # before the figures, which may fail
             if result.interrupted_at is not None:
                 return result
             from scenarios.simulating.drawing import write_figure  # loads Matplotlib
 
             tell(f"{read.id}: drawing")
             pictures = enumerate(read.declared.figure)
-            figures = tuple(write_figure(p, i, questions, runs, folder) for i, p in pictures)
+            with written_at_once(folder) as part:
+                drawn = [write_figure(p, i, questions, runs, part).name for i, p in pictures]
+    figures = tuple(folder / name for name in drawn)
     result = replace(result, figures=figures, wall_seconds=perf_counter() - begun)
-    result.write(folder / "result.json")
+    _write(result)
     return result
 
 
+def _write(result: Result) -> None:
+    with written_at_once(result.folder) as part:
+        result.write(part / "result.json")
+
+
 def run_all(
-    files: Sequence[str | Path], out: str | Path, tell: Tell = lambda _: None, done: Done = lambda _: None
+    files: Sequence[str | Path],
+    out: str | Path,
+    tell: Tell = lambda _: None,
+    done: Done = lambda _: None,
+    isolation: Isolation | None = ISOLATED,
 ) -> list[Result]:
     """Run scenarios one after the other; each of several gets a folder named by its id in `out`.
 
     Several scenarios also get a contact sheet of their figures, `out`/contact-sheet.png.
-    done: called with each result as soon as it is finished.
+    done: called with each result as soon as it is finished. isolation: see run.
     All files are read before the first scenario is run. After Ctrl-C, no further scenario is run.
     """
     if not files:
@@ -91,14 +112,15 @@ def run_all(
         builder = Builder(Path(built))
         for scenario in read:
             target = folder if len(read) == 1 else folder / scenario.id
-            results.append(run(scenario.file, target, tell, builder))
+            results.append(run(scenario.file, target, tell, builder, isolation))
             done(results[-1])
             if results[-1].interrupted_at is not None:
                 break
     if len(results) > 1:
         from scenarios.simulating.contact_sheet import write_contact_sheet  # loads a library of pictures
 
-        write_contact_sheet(results, folder / "contact-sheet.png")
+        with written_at_once(folder) as part:
+            write_contact_sheet(results, part / "contact-sheet.png")
     return results
 
 
@@ -107,15 +129,16 @@ def _called(variant: str, scenario: Scenario) -> str:
 
 
 def _all_prepared(
-    scenario: Scenario, questions: Asked, builder: Builder, stack: ExitStack, tell: Tell
-) -> dict[str, Case]:
+    scenario: Scenario, questions: Asked, builder: Builder, stack: ExitStack, tell: Tell,
+    isolation: Isolation | None,
+) -> dict[str, Case]:  # fmt: skip
     """All variants, checked before the first one runs."""
     cases: dict[str, Case] = {}
     for name, declared in scenario.variants.items():
         tell(f"{scenario.id}: preparing {_called(name, scenario)}")
         formulas = wanted(questions, name, scenario)
         try:
-            cases[name] = prepared(declared, scenario.file, formulas, builder, stack)
+            cases[name] = prepared(declared, scenario.file, formulas, builder, stack, isolation)
         except BadInput as error:
             said = str(error).removeprefix(f"{scenario.file}: ")
             which = f"variant '{name}': " if scenario.declared.variants else ""
@@ -133,13 +156,25 @@ def _run_all(
         begun = perf_counter()
         try:
             runs[name] = case.run(_progress(case, name, scenario, tell))
-        except FmuError as error:
-            raise FmuError(f"{scenario.file}: {_called(name, scenario)}: {error}") from error
+        except (FmuError, FmuEnded) as error:
+            kept = _kept(error.so_far, name, case, scenario, folder, perf_counter() - begun)
+            raise type(error)(f"{scenario.file}: {_called(name, scenario)}: {error}{kept}") from error
         took = perf_counter() - begun
         summaries[name] = _written(runs[name], name, case, scenario, folder, took)
         if summaries[name].interrupted_at is not None:
             break
     return runs, summaries
+
+
+def _kept(
+    so_far: Recording | None, name: str, case: Case, scenario: Scenario, folder: Path, took: float
+) -> str:
+    """Write what a broken run had recorded, and say so."""
+    if so_far is None or so_far.data.empty:
+        return ""
+    summary = _written(Run(so_far, {}), name, case, scenario, folder, took)
+    until = so_far.interrupted_at or 0.0
+    return f"; what was recorded until t = {until:.9g} s is in {folder / summary.recording}"
 
 
 def _progress(case: Case, name: str, scenario: Scenario, tell: Tell) -> Progress:
@@ -154,15 +189,15 @@ def _progress(case: Case, name: str, scenario: Scenario, tell: Tell) -> Progress
 def _written(run: Run, name: str, case: Case, scenario: Scenario, folder: Path, took: float) -> RunSummary:
     """Write a variant's recording and the readings of its sensors."""
     ending = scenario.variants[name].record.format
-    target = folder / f"{name}.{ending}"
-    recording, measured = run.recording, None
-    (recording.to_csv if ending == "csv" else recording.to_parquet)(target)
-    if run.measured is not None:
-        measured = f"{name}-measured.{ending}"
-        (run.measured.to_csv if ending == "csv" else run.measured.to_parquet)(folder / measured)
+    file, measured = f"{name}.{ending}", None if run.measured is None else f"{name}-measured.{ending}"
+    recording = run.recording
+    with written_at_once(folder) as part:
+        (recording.to_csv if ending == "csv" else recording.to_parquet)(part / file)
+        if run.measured is not None and measured is not None:
+            (run.measured.to_csv if ending == "csv" else run.measured.to_parquet)(part / measured)
     stopped = recording.interrupted_at
     simulated = case.duration if stopped is None else stopped
-    return RunSummary(target.name, measured, simulated, took, stopped)
+    return RunSummary(file, measured, simulated, took, stopped)
 
 
 def _judged(

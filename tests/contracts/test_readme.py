@@ -12,7 +12,8 @@ from tests.helpers.paths import ROOT
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 [BLOCK] = re.findall(r"```sh\n(.*?)```", README, re.S)
 COMMANDS = [shlex.split(line, comments=True)[1:] for line in BLOCK.splitlines()]
-LONG = ("--platform", "--kind", "run", "export-ssp", "compare", "close-loop")  # compiles, or takes minutes
+# compiles, or takes minutes
+LONG = ("--platform", "--kind", "run", "export-ssp", "compare", "plan", "close-loop")
 
 
 def expanded(arguments: list[str]) -> list[str]:

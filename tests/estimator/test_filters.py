@@ -23,6 +23,7 @@ from estimator.filters.linear import Linear, linearised
 from estimator.filters.rls import Rls
 from estimator.filters.smoother import smoothed
 from estimator.filters.ukf import Spread, Ukf
+from fmus import aside
 
 NAMES, OUTPUTS = ("position", "speed", "load"), ("seen", "felt")
 DT = 0.1
@@ -381,3 +382,18 @@ def _made(function, arguments):
     given = [np.copy(a) if isinstance(a, np.ndarray) else a for a in arguments]
     result = function(*given)
     return [*(result if isinstance(result, tuple) else (0.0 if result is None else result,)), *given]
+
+
+@pytest.mark.parametrize("n", [37, 60])  # the last block is full or not
+def test_the_history_of_a_long_record_is_that_of_a_short_one(n, monkeypatch):
+    rng = np.random.default_rng(3)
+    made, start, Q, R = system(rng)
+    _, u, Y = record(made, start, Q, R, rng, n, missing=0.2)
+    s = samples(DT * np.arange(n), u, Y)
+    whole = filtered(Kf(made, start, Q, R, DT), s)
+    monkeypatch.setattr(aside, "LONG", 1)
+    monkeypatch.setattr(aside, "BLOCK", 20 * 8 * 14)  # twenty rows of three states and two outputs
+    parts = filtered(Kf(made, start, Q, R, DT), s)
+    assert not parts.x.flags.writeable
+    for name in ("t", "x", "std", "innovation", "nis", "freedom", "gated", "log_likelihood"):
+        assert_array_equal(getattr(parts, name), getattr(whole, name))

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from estimator.filters.history import samples
+from fmus import aside
 
 
 @given(
@@ -21,3 +22,13 @@ def test_the_rounding_of_times_does_not_show_in_their_step(step, begin, n):
         assert np.all(found.steps == step)
     else:
         assert found.step == pytest.approx(step, rel=0.01)
+
+
+@pytest.mark.parametrize("parts", [1, 3])
+def test_means_in_blocks_are_those_of_the_whole_record(parts, monkeypatch):
+    rng = np.random.default_rng(0)
+    t, u = np.cumsum(rng.uniform(0.5, 1.5, 1000)), rng.standard_normal((1000, 2))
+    whole = samples(t, u, u, 2, parts)
+    monkeypatch.setattr(aside, "BLOCK", 1024)
+    assert np.array_equal(samples(t, u, u, 2, parts).held, whole.held)
+    assert whole.held.shape == (499, parts, 2)

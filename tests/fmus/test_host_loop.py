@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fmus import aside
 from fmus.drive.model import Drive
 from fmus.export.builders.native.build import build_native
 from fmus.host import instance
@@ -33,6 +34,17 @@ def test_both_loops_give_the_same_to_the_bit(drive, kind, monkeypatch):
         plain = fmu.simulate(T, INPUTS[kind], NAMES, {"q_dot": 0.5})
     assert np.array_equal(compiled, plain)
     assert np.ptp(plain[:, 0]) > 0.01
+
+
+@pytest.mark.parametrize("every", [1, 7])
+@pytest.mark.parametrize("kind", INPUTS)
+def test_a_simulation_in_blocks_is_one_simulation(drive, kind, every, monkeypatch):
+    with Fmu(drive) as fmu:
+        whole = fmu.simulate(T, INPUTS[kind], NAMES, {"q_dot": 0.5})
+        monkeypatch.setattr(aside, "BLOCK", 2048)
+        parts = fmu.simulate(T, INPUTS[kind], NAMES, {"q_dot": 0.5}, every=every)
+    assert len(aside.blocks(len(T), 8 * 5)) > 5
+    assert np.array_equal(parts, whole[::every])
 
 
 def test_both_loops_say_where_an_input_was_refused(drive, monkeypatch):

@@ -93,7 +93,7 @@ def test_upright_wheels_stand_where_the_vertical_distance_is_least(left, right, 
         nearest = place[np.nanargmin(gap)] - sign * y
         found = table[f"eta_{side}"].iloc[1]
         # at an equal distance either place is right; on conforming arcs 1 pm of distance is 10 um of place
-        assert gap[np.nanargmin(gap)] >= float(wheel.height(found) - rail.height(found + sign * y)) - 1e-12
+        assert gap[np.nanargmin(gap)] >= float(wheel.height(found) - rail.height(found + sign * y)) - 2e-8
         if abs(found - nearest) < 1e-4:
             assert_allclose(table[f"r_{side}"].iloc[1], r0 - wheel.height(nearest), atol=2e-6)
     assert (table["phi"] == 0).all()
@@ -134,7 +134,7 @@ def test_unlike_cones_have_their_mean_conicity(left, more, taller):
 
 def test_default_shifts_reach_beyond_both_flanges():
     table = contact_table((WHEELS[0], WHEELS[1]), **NORM, r0=(0.459, 0.46))
-    assert len(table) == 401
+    assert len(table) == 1001
     assert min(table["delta_left"].max(), table["delta_right"].max()) > 1.0
     wide = contact_table((WHEELS[0], WHEELS[1]), **{**NORM, "gauge": 1.445})
     assert wide.index[-1] > 0.0135

@@ -15,9 +15,11 @@ import numpy as np
 from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.fitted import Fit, stacked
+from estimator.closeloop.hypotheses.hypothesis import Part
 from estimator.closeloop.screening.regressors import Calibration
 from estimator.record import Array
+from fmus.aside import let_go, set_aside
 
 LIKENESS = "likeness to an effect"
 ROWS_AT_ONCE = 2000  # rows of all regressors that are brought together in one array
@@ -67,8 +69,7 @@ def detect(
     observed = _figures(left, limits.slow_blocks)
     slopes = _sensitivities(baseline)
     n = len(slopes)
-    early = np.array([baseline.in_noise(slope, "fit").ravel() for slope in slopes]).T
-    late = np.array([baseline.in_noise(slope, "unseen").ravel() for slope in slopes]).T
+    early, late = (_columns(baseline, slopes, part) for part in ("fit", "unseen"))
     # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if n else np.zeros((0, 0))
     copies = []
@@ -97,21 +98,38 @@ def _sensitivities(baseline: Baseline) -> list[list[Array]]:
     here, fit = baseline.hypothesis.residuals, baseline.hypothesis.fit
     aside = [{**fit.theta, u.name: fit.theta[u.name] + STEP * u.scale} for u in fit.unknowns]
     moved = zip(fit.unknowns, baseline.problem.several_residuals(aside), strict=True)
-    return [[(r - at) / (STEP * u.scale) for r, at in zip(there, here, strict=True)] for u, there in moved]
+    return [
+        [set_aside((r - at) / (STEP * u.scale)) for r, at in zip(there, here, strict=True)]
+        for u, there in moved
+    ]
+
+
+def _columns(baseline: Baseline, slopes: Sequence[Sequence[Array]], part: Part) -> Array:
+    """Derivatives on a part of the record in units of the noise, (m, n)."""
+    made = [set_aside(baseline.in_noise(slope, part).ravel()) for slope in slopes]
+    return stacked(made) if made else np.empty((0, 0))
 
 
 def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
     """Products (k,) of the residual with the regressors, projected and of length 1, and of these (k, k)."""
     q = Calibration.of(screened).basis
-    within = np.vstack([g.T @ q for g in regressors])
+    within = np.vstack([_products(g, q) for g in regressors])
     along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
     for first in range(0, len(q), ROWS_AT_ONCE):
         rows = slice(first, first + ROWS_AT_ONCE)
         left = np.vstack([g[rows].T for g in regressors]) - within @ q[rows].T
         along += left @ screened.residual[rows]
         gram += left @ left.T
+        let_go()
     size = np.sqrt(np.diag(gram)) + 1e-300
     return along / size, gram / size[:, None] / size
+
+
+def _products(g: Array, q: Array) -> Array:
+    """Products (k, n) of columns g (m, k) with columns q (m, n)."""
+    found: Array = g.T @ q
+    let_go()
+    return found
 
 
 def _likeness_of_noise(cosines: Array, replicates: int, rng: np.random.Generator) -> Array:

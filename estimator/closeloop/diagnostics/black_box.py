@@ -19,6 +19,7 @@ from estimator.record import (
     Record,
     Run,
 )
+from fmus.aside import blocks, by_rows
 
 ORDERS = (0, 1, 2, 4, 8)  # numbers of poles that are tried
 PREFILTERINGS = 6  # iterations of prefiltering
@@ -74,7 +75,7 @@ def black_box(record: Record, residuals: Sequence[Array], size: Array) -> BlackB
     model = _chosen(parts)
     shown = [np.zeros_like(part.e) for part in parts] if model is None else model.shown
     left = tuple(
-        r - size * _between(part.t, e, run.t)
+        _left(run.t, r, part.t, size * e)
         for run, r, part, e in zip(record.runs, residuals, parts, shown, strict=True)
     )
     held_out = np.concatenate([r[run.test] for r, run in zip(left, record.runs, strict=True)])
@@ -92,11 +93,20 @@ def _part(run: Run, residual: Array, size: Array, every: int) -> _Part:
     n = len(run.t) // every * every
 
     def means(x: Array | BoolArray) -> Array:
-        return np.asarray(x[:n].reshape(-1, every, *x.shape[1:]).mean(axis=1))
+        return np.asarray(x.reshape(-1, every, *x.shape[1:]).mean(axis=1))
 
-    z = means(np.hstack([run.u, run.y - residual]))
-    fitted: BoolArray = means(run.fit) > 1 - 0.5 / every  # all samples of the group are fitted
-    return _Part(means(run.t), z, means(residual / size), fitted)
+    def both(rows: slice) -> Array:
+        given = np.hstack([run.u[rows], run.y[rows] - residual[rows]])
+        return np.hstack([means(given), means(residual[rows] / size)])
+
+    groups = blocks(n // every, 8 * every * (run.u.shape[1] + run.y.shape[1]))
+    z, e = np.split(
+        np.vstack([both(slice(g.start * every, g.stop * every)) for g in groups]),
+        [run.u.shape[1] + run.y.shape[1]],
+        axis=1,
+    )
+    fitted: BoolArray = means(run.fit[:n]) > 1 - 0.5 / every  # all samples of the group are fitted
+    return _Part(means(run.t[:n]), z, e, fitted)
 
 
 def _scaled(parts: Sequence[_Part]) -> list[_Part]:
@@ -115,9 +125,14 @@ def _scaled(parts: Sequence[_Part]) -> list[_Part]:
     ]
 
 
-def _between(t: Array, e: Array, at: Array) -> Array:
-    """Values e (n, n_y) at times t (n,), interpolated linearly at other times (N,)."""
-    return np.column_stack([np.interp(at, t, column) for column in e.T])
+def _left(t: Array, residual: Array, at: Array, e: Array) -> Array:
+    """A residual (N, n_y) at times t (N,) minus values e (n, n_y) at times `at` (n,), linear between them."""
+
+    def part(rows: slice) -> Array:
+        found: Array = residual[rows] - np.column_stack([np.interp(t[rows], at, x) for x in e.T])
+        return found
+
+    return by_rows(residual.shape, part)
 
 
 def _chosen(parts: Sequence[_Part]) -> _Model | None:

@@ -5,12 +5,15 @@ between outputs are kept (Prichard and Theiler, Physical Review Letters 73 (1994
 more gain than a decoy is not significant.
 """
 
+from itertools import islice
+
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.screening.regressors import RIDGE, Calibration, Changes, is_wave
 from estimator.record import Array
+from fmus.aside import let_go, set_aside
 
 FAMILIES = 12  # leading effects from which decoys are made
 BROAD = 8.0  # effective spectral lines, above which random phases give a different regressor
@@ -26,7 +29,8 @@ def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generato
     calibration = Calibration.of(base)
     residual = calibration.without(base.residual)
     spectra = [
-        np.fft.rfft(g.reshape(-1, outputs, g.shape[1]), axis=0) for g in leading(base, change, outputs)
+        set_aside(np.fft.rfft(g.reshape(-1, outputs, g.shape[1]), axis=0))
+        for g in leading(base, change, outputs)
     ]
     if not spectra:
         return 0.0
@@ -48,12 +52,13 @@ def leading(base: Fit, change: Changes, outputs: int) -> list[Array]:
     for c, g in change:
         if is_wave(c):
             continue
-        left = calibration.without(g)
-        reached = gain(residual, left)
+        reached = gain(residual, calibration.without(g))
         if c.label not in best or reached > best[c.label][0]:
-            best[c.label] = reached, left
+            best[c.label] = reached, g
+        let_go()
     order = sorted(best.values(), key=lambda found: -found[0])
-    return [g for _, g in order if lines(g, outputs) >= BROAD][:FAMILIES]
+    projected = (set_aside(calibration.without(g)) for _, g in order)
+    return list(islice((g for g in projected if lines(g, outputs) >= BROAD), FAMILIES))
 
 
 def decoy(spectrum: NDArray[np.complex128], samples: int, rng: np.random.Generator) -> Array:

@@ -107,12 +107,12 @@ def _sizes(
         return [("amplitude", float(needed / shown) if shown > 0 else np.inf)]
     sizes = np.where(left > 0, needed * scale / np.where(left > 0, left, 1.0), np.inf)
     return [
-        (_name(c, u), float(size) if size <= _most(c, u, room) else np.inf)
+        (_name(c, u), float(size) if size <= largest(c, u, room) else np.inf)
         for u, size in zip(c.amplitudes, sizes, strict=True)
     ]
 
 
-def _most(c: Candidate, u: Unknown, room: Mapping[str, float]) -> float:
+def largest(c: Candidate, u: Unknown, room: Mapping[str, float]) -> float:
     """The largest amplitude within bounds and limits for which the first order is accurate enough.
 
     For the change of a parameter by its own size, for instance, it is not.

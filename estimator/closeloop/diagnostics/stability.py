@@ -13,6 +13,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
 from estimator.closeloop.screening.regressors import NOTHING, RIDGE, Changes
 from estimator.record import Array
+from fmus.aside import let_go
 
 PAIRS = 25  # pairs of complementary halves
 LEADING = 10  # number of effects that count as leading, each with its best shape
@@ -45,6 +46,7 @@ def stability(
         across = np.einsum("hb,bnk->hnk", halves, np.array([jacobian[e].T @ g[e] for e in edges]))
         found = _gains(c, mine, own, across, inverse, halves)
         gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
+        let_go()
     if not gains:
         return {}
     table = np.array(list(gains.values()))

@@ -18,6 +18,7 @@ from estimator.closeloop.hypotheses.fitted import (
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 from estimator.weighting import Weighting
+from fmus.aside import set_aside
 from fmus.host.fmu import FmuError
 
 GAIN = 1e-6  # relative reduction of the sum of squares, below which the fit ends
@@ -54,7 +55,7 @@ def several_weighted(
     found = problem.identify_residuals(thetas)
     if found is None:
         return [_alone(problem, theta, weighting) for theta in thetas]
-    return [_limited(problem, residual, weighting) for residual in found]
+    return [_limited(problem, found.pop(0), weighting) for _ in thetas]
 
 
 def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Array:
@@ -67,7 +68,8 @@ def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -
 
 def _limited(problem: Problem, residual: Array, weighting: Weighting) -> Array:
     found = weighting.of(residual, problem.record.stretches("fit")).ravel()
-    return np.nan_to_num(np.clip(found, -REFUSED, REFUSED), nan=REFUSED)
+    np.clip(found, -REFUSED, REFUSED, out=found)
+    return set_aside(np.nan_to_num(found, copy=False, nan=REFUSED))
 
 
 def fit(
@@ -115,7 +117,8 @@ def fit(
     if np.any(middle != x) and np.sum(slopes.residual(middle) ** 2) < r @ r + len(x):
         x, r = middle, slopes.residual(middle)
     found = tuple(
-        column if known is None else known for column, known in zip(jacobian.T.copy(), given, strict=True)
+        set_aside(column.copy()) if known is None else known
+        for column, known in zip(jacobian.T, given, strict=True)
     )
     return Fit(tuple(unknowns), x, sandwich(r, jacobian, scale, high - low), r, found, converged)
 
@@ -184,7 +187,7 @@ def _middle(x: Array, jacobian: Array, scale: Array, low: Array, high: Array) ->
     bounded = high - low < WIDE * scale
     away = np.zeros(len(x))
     away[bounded] = ((low[bounded] + high[bounded]) / 2 - x[bounded]) / scale[bounded]
-    inverse, prior = _inverse(jacobian * scale, scale, high - low)
+    inverse, prior = _inverse(jacobian, scale, high - low)
     shift = inverse @ (prior * away)
     if np.all(np.abs(shift) < SLIGHT * np.sqrt(np.diag(inverse))):
         return x

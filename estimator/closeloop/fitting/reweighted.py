@@ -21,6 +21,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.noise import Noise
 from estimator.record import Array
 from estimator.weighting import Weighting
+from fmus.aside import set_aside
 
 
 def reweighted(
@@ -53,7 +54,7 @@ def rescaled(
 
     def turned(column: Array) -> Array:
         residual = before.back(column.reshape(-1, len(before)), stretches)
-        return after.of(residual, stretches).ravel()
+        return set_aside(after.of(residual, stretches).ravel())
 
     shared = {id(column): column for h in found for column in h.fit.slopes}
     done = {key: turned(column) for key, column in shared.items()}

@@ -8,7 +8,9 @@ from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
+from estimator.closeloop.hypotheses.fitted import stacked
 from estimator.record import Array
+from fmus.aside import by_rows, set_aside
 
 STEP = 1e-2  # scales: step of finite differences, large against the tolerance of the FMU's solver
 FINE_STEP = 1e-6  # scales: step of finite differences if the sum of squares has narrow minima
@@ -44,7 +46,7 @@ class Slopes:
         """The residual (m,) at x; what is simulated in the same time is kept for the Jacobian there."""
         if x.tobytes() not in self._whole:
             free = [i for i, known in enumerate(self._known) if known is None and i not in self._parts]
-            self._simulated([x, *(self._aside(i, x)[1] for i in free[: self._at_once - 1])], 1.0)
+            self._simulated([x, *(self._beside(i, x)[1] for i in free[: self._at_once - 1])], 1.0)
         return self._whole[x.tobytes()]
 
     def _simulated(self, xs: Sequence[Array], share: float) -> list[Array]:
@@ -57,7 +59,7 @@ class Slopes:
             self._whole = dict(list(kept.items())[-most:])
         return [kept[x.tobytes()] for x in xs]
 
-    def _aside(self, i: int, x: Array) -> tuple[float, Array]:
+    def _beside(self, i: int, x: Array) -> tuple[float, Array]:
         """The step of a finite difference at x, and the x that it leads to."""
         h = float(self._step[i] if x[i] + self._step[i] <= self._high[i] else -self._step[i])
         return h, x + h * np.eye(len(x))[i]
@@ -74,7 +76,7 @@ class Slopes:
         columns |= self._differences([i for i in range(len(x)) if i not in columns], x, r)
         for i in self._parts:
             self._parts[i] = faded(columns[i])
-        jacobian: Array = np.column_stack([columns[i] for i in range(len(x))])
+        jacobian = stacked([columns[i] for i in range(len(x))])
         self._last = x.copy(), r, jacobian
         return jacobian
 
@@ -85,10 +87,11 @@ class Slopes:
         parts = {i: min(self._parts.get(i, PARTS) + 1, PARTS) for i in wanted}
         while left := sorted((i for i in wanted if i not in found), key=lambda i: -parts[i])[: self._at_once]:
             longest = parts[left[0]]
-            aside = [self._aside(i, x) for i in left]
-            some = self._simulated([there for _, there in aside], longest / PARTS)
-            for i, (h, _), begun in zip(left, aside, some, strict=True):
+            moved = [self._beside(i, x) for i in left]
+            some = self._simulated([there for _, there in moved], longest / PARTS)
+            for i, (h, _), begun in zip(left, moved, some, strict=True):
                 column = np.append((begun - r[: len(begun)]) / h, np.zeros(len(r) - len(begun)))
+                column = set_aside(column)
                 if longest == PARTS or faded(column) < longest:
                     found[i] = column
                 parts[i] = PARTS
@@ -102,8 +105,15 @@ class Slopes:
         step = (x - before) / self._scale
         if (length := float(step @ step)) > SHORT**2:
             r = self.residual(x)
-            missed = r - r_before - jacobian @ (x - before)
-            jacobian = jacobian + np.outer(missed, step / self._scale / length)
+            jacobian = by_rows(
+                jacobian.shape,
+                lambda rows: (
+                    jacobian[rows]
+                    + np.outer(
+                        r[rows] - r_before[rows] - jacobian[rows] @ (x - before), step / self._scale / length
+                    )
+                ),
+            )
             self._last, self.exact = (x.copy(), r, jacobian), False
         return jacobian
 

@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.fitting.fit import several_weighted
-from estimator.closeloop.hypotheses.fitted import sandwich
+from estimator.closeloop.hypotheses.fitted import sandwich, stacked
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
 from estimator.weighting import Weighting
+from fmus.aside import set_aside
 
 
 def within_error(built: Problem, h: Hypothesis, weighting: Weighting) -> Hypothesis:
@@ -31,7 +32,7 @@ def within_error(built: Problem, h: Hypothesis, weighting: Weighting) -> Hypothe
     ]
     scale = np.array([u.scale for u in h.fit.unknowns])
     width = np.array([u.high - u.low for u in h.fit.unknowns])
-    covariance = sandwich(h.fit.residual, np.column_stack(slopes), scale, width)
+    covariance = sandwich(h.fit.residual, stacked(slopes), scale, width)
     return replace(h, fit=replace(h.fit, slopes=tuple(slopes), covariance=covariance))
 
 
@@ -44,4 +45,4 @@ def _slope(built: Problem, h: Hypothesis, u: Unknown, column: Array, weighting: 
     error = 1 / max(float(np.linalg.norm(column)), 1 / u.scale)
     low, high = max(now - error, u.low), min(now + error, u.high)
     below, above = several_weighted(built, [{**h.theta, u.name: x} for x in (low, high)], weighting)
-    return np.asarray((above - below) / (high - low))
+    return set_aside((above - below) / (high - low))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag, pinvh
 
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array
+from fmus.aside import blocks, by_rows, let_go
 
 WIDE = 1e3  # scales: width of the prior of an unknown without bounds
 
@@ -40,7 +42,14 @@ class Fit:
     @property
     def jacobian(self) -> Array:
         """Derivatives of the residual with respect to the unknowns, (m, n)."""
-        return np.column_stack(self.slopes) if self.slopes else np.empty((len(self.residual), 0))
+        return stacked(self.slopes) if self.slopes else np.empty((len(self.residual), 0))
+
+    @cached_property
+    def cost(self) -> float:
+        """Weighted sum of squares."""
+        found = float(self.residual @ self.residual)
+        let_go()
+        return found
 
     @property
     def theta(self) -> dict[str, float]:
@@ -60,7 +69,7 @@ class Fit:
     @property
     def beyond_noise(self) -> float:
         """Sum of squares minus its expectation for pure noise."""
-        return float(self.residual @ self.residual) - len(self.residual)
+        return self.cost - len(self.residual)
 
     def extended(self, other: Fit, names: Collection[str]) -> Fit:
         """This fit, extended by the named unknowns of another fit with their values and covariance."""
@@ -105,10 +114,18 @@ def loose(fit: Fit) -> Fit:
     )
 
 
-def _inverse(j: Array, scale: Array, width: Array) -> tuple[Array, Array]:
+def stacked(columns: Sequence[Array]) -> Array:
+    """Columns (m,) side by side, (m, n)."""
+    shape = len(columns[0]), len(columns)
+    return by_rows(shape, lambda rows: np.column_stack([column[rows] for column in columns]))
+
+
+def _inverse(jacobian: Array, scale: Array, width: Array) -> tuple[Array, Array]:
     """Covariance (n, n) for white residuals, in scales, and the information that the bounds add, (n,)."""
     prior = 12 * (scale / np.minimum(width, WIDE * scale)) ** 2
-    return np.asarray(pinvh(j.T @ j + np.diag(prior))), prior
+    parts = (jacobian[rows] * scale for rows in blocks(len(jacobian), 8 * len(scale)))
+    information = sum((j.T @ j for j in parts), np.zeros((len(scale),) * 2))
+    return np.asarray(pinvh(information + np.diag(prior))), prior
 
 
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:
@@ -119,11 +136,9 @@ def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Ar
     width: (n,) distance between the bounds. The bounds act as a uniform prior; without bounds its width is
     WIDE scales, so that an unknown without influence gets a large standard error.
     """
-    j = jacobian * scale
-    inverse, _ = _inverse(j, scale, width)
-    scores = np.array(
-        [b.T @ a for a, b in zip(*(np.array_split(v, BLOCKS) for v in (residual, j)), strict=True)]
-    )
+    inverse, _ = _inverse(jacobian, scale, width)
+    pieces = zip(*(np.array_split(v, BLOCKS) for v in (residual, jacobian)), strict=True)
+    scores = np.array([(j * scale).T @ r for r, j in pieces])
     whole = scores.sum(axis=0)
     robust = inverse @ (scores.T @ scores + np.outer(whole, whole)) @ inverse
     grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(inverse), 1e-300), 1.0))

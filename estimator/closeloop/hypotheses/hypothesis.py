@@ -11,6 +11,7 @@ from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import key, label
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array
+from fmus.aside import let_go
 
 Part = Literal["fit", "choose", "test", "unseen"]  # parts of a record, named as the masks of a Run
 
@@ -66,6 +67,7 @@ class Hypothesis:
 
     def of(self, problem: Problem, part: Part) -> Array:
         """Residual on a part of the record, (m, n_y)."""
+        let_go()
         return problem.record.of(self.residuals, part)
 
     def significance(self, base: "Hypothesis | None" = None) -> list[float]:
@@ -95,7 +97,7 @@ class Hypothesis:
 
 def cost(h: Hypothesis) -> float:
     """Weighted sum of squares on the part to identify."""
-    return float(h.fit.residual @ h.fit.residual)
+    return h.fit.cost
 
 
 def mean_square(h: Hypothesis) -> float:

@@ -71,7 +71,11 @@ def includes(h: Hypothesis, other: Hypothesis) -> bool:
     """Whether h changes a group of parameters and `other` one parameter of that group in the same way."""
     if len(h.candidates) != 1 or len(other.candidates) != 1 or h is other:
         return False
-    (group,), (c,) = h.candidates, other.candidates
+    return groups_with(h.candidates[0], other.candidates[0])
+
+
+def groups_with(group: Candidate, c: Candidate) -> bool:
+    """Whether a candidate changes a group of parameters, of which c changes one in the same way."""
     names = [u.name.removeprefix(group.prefix).partition("_")[2] for u in group.amplitudes]
     return group.kind == c.kind and c.location in names
 

@@ -15,7 +15,9 @@ from estimator.closeloop.question.input_noise import InputNoise
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
 from estimator.sensor_faults import faulty
+from fmus.aside import set_aside
 from fmus.export.around.outside import Outside
+from fmus.host.apart.isolation import Isolation
 from fmus.host.description import PortNames
 
 START_SAMPLES = 20  # first samples from which the start value of a measured state is estimated
@@ -55,6 +57,10 @@ class Builder(Protocol):
     def quick(self) -> bool:
         """Whether an FMU with effects simulates as fast as one without."""
 
+    @property
+    def isolation(self) -> Isolation | None:
+        """Limits of the process in which the FMUs run; None: the process that uses them."""
+
     def outside(self) -> Outside:
         """Ports, parameters and inputs of the FMU at which effects can be placed."""
 
@@ -91,7 +97,12 @@ class Problem:
     @property
     def plant(self) -> Plant:
         """The FMU as a function of inputs and parameters; one instance per process."""
-        return PLANTS.get(self.builder(self.effects), self.record.inputs, self.record.outputs)
+        return self.plant_with(self.record.outputs)
+
+    def plant_with(self, outputs: tuple[str, ...]) -> Plant:
+        """The same with other outputs."""
+        builder = self.builder
+        return PLANTS.get(builder(self.effects), self.record.inputs, outputs, builder.isolation)
 
     @property
     def at_once(self) -> int:
@@ -109,7 +120,7 @@ class Problem:
 
     def residuals(self, theta: Mapping[str, float]) -> list[Array]:
         """Measured minus simulated outputs of each run, (N, n_y)."""
-        return [run.y - self._run(run, theta, ()) for run in self.record.runs]
+        return [set_aside(self._residual(run, theta)) for run in self.record.runs]
 
     def several_residuals(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
         """As `residuals` for each of several unknowns with the same names, some of them simulated at once."""
@@ -117,12 +128,12 @@ class Problem:
             some = thetas[first : first + self.at_once]
             by_run = [self._rows(run, some) for run in self.record.runs]
             for i, theta in enumerate(some):
-                found = [rows[i] for rows in by_run if rows is not None]
+                found = [set_aside(rows[i]) for rows in by_run if rows is not None]
                 yield found if len(found) == len(by_run) else self.residuals(theta)
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the part to identify, (m, n_y)."""
-        return np.concatenate([(run.y - self._run(run, theta, ()))[run.fit] for run in self._identified])
+        return np.concatenate([self._residual(run, theta)[run.fit] for run in self._identified])
 
     def identify_residuals(self, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """As `identify_residual` for several unknowns with the same names; None if not all at once."""
@@ -171,13 +182,17 @@ class Problem:
         y = self.plant.simulate(run, self._start(run, theta), more, finer=self.finer)
         return faulty(y, run.t, self.record.outputs, theta)
 
+    def _residual(self, run: Run, theta: Mapping[str, float]) -> Array:
+        """Measured minus simulated outputs of a run, (N, n_y)."""
+        return _missed(run, self._run(run, theta, ()))
+
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """Measured minus simulated outputs of a run for each of several unknowns; None if not all at once."""
         rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas], self.finer)
         if rows is None:
             return None
         outputs = self.record.outputs
-        return [run.y - faulty(y, run.t, outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
+        return [_missed(run, faulty(y, run.t, outputs, theta)) for y, theta in zip(rows, thetas, strict=True)]
 
     def _start(self, run: Run, theta: Mapping[str, float]) -> dict[str, float]:
         """Start values of the FMU for a run; free states of a run that is not fitted are guessed from it."""
@@ -204,6 +219,11 @@ def smooth_start(t: Array, y: Array) -> np.polynomial.Polynomial:
         left = float(np.sum((y - curve(t)) ** 2)) + np.finfo(float).tiny
         tried[degree] = n * np.log(left / n) + 2 * free * n / max(n - free - 1, 1), curve
     return min(tried.values(), key=lambda found: found[0])[1]
+
+
+def _missed(run: Run, y: Array) -> Array:
+    """Measured minus simulated outputs y (N, n_y), in their place if they are no part of other samples."""
+    return np.subtract(run.y, y, out=y) if y.flags.c_contiguous else run.y - y
 
 
 def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:

@@ -11,6 +11,7 @@ import numpy as np
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
+from fmus.aside import all_set_aside
 
 GROUPS = (5, 3)  # possible group sizes, odd so that a group has a middle sample
 LOST = 0.01  # largest variance within groups, as share of an output's variance
@@ -51,5 +52,5 @@ def grouped(columns: Array, n_y: int, n: int) -> Array:
 
 def grouped_fit(fit: Fit, n_y: int, n: int) -> Fit:
     """A fit with residual and Jacobian averaged over groups."""
-    slopes = tuple(grouped(column, n_y, n) for column in fit.slopes)
-    return replace(fit, residual=grouped(fit.residual, n_y, n), slopes=slopes)
+    residual, *slopes = all_set_aside([grouped(x, n_y, n) for x in (fit.residual, *fit.slopes)])
+    return replace(fit, residual=residual, slopes=tuple(slopes))

@@ -20,6 +20,7 @@ from fmus.sampled import Row
 from fmus.variables import Expr
 
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
+SAMPLES_AT_ONCE = 50_000  # samples whose steps CasADi makes in one call, which takes memory for each
 ROUNDING, MOST = 1e-6, 100  # tolerance of the step count; largest number of steps between two samples
 
 
@@ -40,7 +41,7 @@ class Course:
     def rows(self) -> list[Row]:
         """`given` by columns; those that do not change as numbers."""
         same = np.ptp(self.given, axis=0) == 0
-        return [float(v[0]) if still else v for v, still in zip(self.given.T.copy(), same, strict=True)]
+        return [float(v[0]) if still else v.copy() for v, still in zip(self.given.T, same, strict=True)]
 
 
 def shifts(made: Around, course: Course, moved: Mapping[str, float]) -> dict[str, Array]:
@@ -62,13 +63,17 @@ def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
     if set(names) <= set(known):
         return np.array([known[name] for name in names]).reshape(len(names), len(course.t))
     n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / LONGEST_STEP - ROUNDING)))
-    run, seen = _run(made, (len(course.t) - 1) * n)
-    start = np.array([s.start for s in made.states])
-    w = np.array([np.broadcast_to((m if i == 0 else z)[row], len(course.t)) for i, row in seen])
-    at = np.arange((len(course.t) - 1) * n + 1) / n
-    t, w = (_between(at, rows) for rows in (course.t[None, :], w))
-    x = run(start, w[:, :-1], w[:, 1:], np.diff(t)).full()
-    return np.column_stack([start, x[:, n - 1 :: n]])
+    x = np.empty((len(names), len(course.t)))
+    x[:, 0] = [s.start for s in made.states]
+    for first in range(0, len(course.t) - 1, SAMPLES_AT_ONCE):
+        last = min(first + SAMPLES_AT_ONCE, len(course.t) - 1)
+        run, seen = _run(made, (last - first) * n)
+        part, at = slice(first, last + 1), np.arange((last - first) * n + 1) / n
+        here = [np.broadcast_to((m if i == 0 else z)[row], len(course.t))[part] for i, row in seen]
+        t, w = (_between(at, rows) for rows in (course.t[None, part], np.array(here)))
+        stepped = run(x[:, first], w[:, :-1], w[:, 1:], np.diff(t)).full()
+        x[:, first + 1 : last + 1] = stepped[:, n - 1 :: n]
+    return x
 
 
 def _between(at: Array, rows: Array) -> Array:
@@ -93,8 +98,3 @@ def _run(made: Around, steps: int) -> tuple[cs.Function, list[tuple[int, int]]]:
 
     step = cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, dt, straight(w0, w1))])
     return step.mapaccum(steps), seen
-
-
-def names_of(levers: Sequence[Mapping[str, Array]]) -> list[str]:
-    """Names of all inputs and parameters that are changed, each once."""
-    return list(dict.fromkeys(name for moved in levers for name in moved))

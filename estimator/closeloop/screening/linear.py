@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from estimator.closeloop.question.problem import Problem
 from estimator.filters.algebra import compiled
-from estimator.plant import PLANTS
 from estimator.record import Array
+from fmus.aside import blocks, set_aside
 from fmus.host.description import FmuVariable
 
 LINEARISATIONS = 200  # at most this many linearisations along the run
@@ -74,7 +74,7 @@ def linearise(
     levers: inputs; more: further outputs, beside those of the record.
     """
     record, run = problem.record, problem.record.runs[0]
-    plant = PLANTS.get(problem.builder(problem.effects), record.inputs, (*record.outputs, *more))
+    plant = problem.plant_with((*record.outputs, *more))
     index = np.unique(np.linspace(0, len(keep) - 2, min(LINEARISATIONS, len(keep) - 1)).astype(int))
     start, known = problem.start(theta), plant.fmu.description.variables
     nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))
@@ -122,17 +122,28 @@ def influences(
     inputs = [name for name in levers if name in plant.fmu.description.inputs]
     local = linearise(problem, theta, x, keep, inputs)
     near = local.near(len(keep))
-    found = {name: Influence(local.B[near, :, i], local.D[near, :, i]) for i, name in enumerate(inputs)}
+    found = {
+        name: Influence(set_aside(local.B[near, :, i]), set_aside(local.D[near, :, i]))
+        for i, name in enumerate(inputs)
+    }
     run, start = problem.record.runs[0].part(0, keep[-1] + 1), problem.start(theta)
-    n_y, a, c = len(plant.outputs), local.A[near[:-1]], local.C[near]
+    n_y, n = len(plant.outputs), len(plant.states)
     before = plant.simulate(run, start, plant.states)[keep]
     for name in (n for n in levers if n not in found):
         h = LEVER_NUDGE * _size(known[name], start)
         after = plant.simulate(run, {**start, name: _value(known[name], start) + h}, plant.states)[keep]
         dy, dx = np.split((after - before) / h, (n_y,), axis=1)
-        steps = dx[1:] - np.einsum("kmn,kn->km", a, dx[:-1])
+        steps, shown = np.empty((len(keep), n)), np.empty((len(keep), n_y))
+        for rows in blocks(len(keep), 8 * n * (n + n_y)):
+            at, now = near[rows], dx[rows]
+            shown[rows] = dy[rows] - np.einsum("kyn,kn->ky", local.C[at], now)
+            then = dx[rows.start + 1 : rows.stop + 1]
+            steps[rows.start : rows.start + len(then)] = then - np.einsum(
+                "kmn,kn->km", local.A[at[: len(then)]], now[: len(then)]
+            )
         steps[0] = dx[1]  # a change of the start state is not part of a step
-        found[name] = Influence(np.vstack([steps, steps[-1:]]), dy - np.einsum("kyn,kn->ky", c, dx))
+        steps[-1] = steps[-2]
+        found[name] = Influence(set_aside(steps), set_aside(shown))
     return local, found
 
 

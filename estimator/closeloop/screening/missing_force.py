@@ -56,7 +56,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
         whole = run.y[:last] - y[:last]
         pushes = [pushed(problem, theta, port, whole, noise) for port in problem.ports]
         return [
-            MissingForce(p, run.t[keep], f[keep], s[keep], *_motion(p, i, run.t[keep], motion[keep]))
+            MissingForce(p, run.t[keep], f[keep], s[keep], *motion_of(p, i, run.t[keep], motion[keep]))
             for i, (p, (f, s)) in enumerate(zip(problem.ports, pushes, strict=True))
         ]
     local = linearise(problem, theta, x, keep, [port.force for port in problem.ports], names)
@@ -64,12 +64,14 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     seen = local.of(slice(n_y, None)).C[local.near(len(keep))]
     moved = motion[keep] + np.einsum("kmn,kn->km", seen, found.together)
     return [
-        MissingForce(p, run.t[keep], found.force[i], found.std[i], *_motion(p, i, run.t[keep], moved), moved)
+        MissingForce(
+            p, run.t[keep], found.force[i], found.std[i], *motion_of(p, i, run.t[keep], moved), moved
+        )
         for i, p in enumerate(problem.ports)
     ]
 
 
-def _motion(port: PortNames, i: int, t: Array, motion: Array) -> tuple[Array, Array]:
+def motion_of(port: PortNames, i: int, t: Array, motion: Array) -> tuple[Array, Array]:
     """Displacement and velocity (n,) of port number i out of the motion (n, 2 n_ports) of all.
 
     A displacement that no output gives is the integral of the velocity, from 0 at the start.

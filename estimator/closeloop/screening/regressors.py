@@ -9,11 +9,13 @@ import numpy as np
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.record import Array
+from fmus.aside import let_go
 
 Changes = Sequence[tuple[Candidate, Array]]  # candidates with their changes (m, k) of the weighted residual
 NOTHING = 1e-6  # share of a regressor's length after projection, below which only rounding is left
 RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
-COLUMNS_AT_ONCE = 64  # columns per batch; copies of hundreds of long columns would not fit into memory
+COLUMNS_AT_ONCE = 64  # largest number of columns per batch
+BATCH = 1 << 26  # bytes of a batch; copies of hundreds of long columns would not fit into memory
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,10 @@ def batches(change: Changes) -> Iterator[tuple[slice, Array]]:
     for _, g in change:
         held.append(g)
         width += g.shape[1]
-        if width >= COLUMNS_AT_ONCE:
+        if width >= COLUMNS_AT_ONCE or width * len(g) * g.itemsize >= BATCH:
             yield slice(first, first + width), np.hstack(held)
             first, held, width = first + width, [], 0
+            let_go()
     if held:
         yield slice(first, first + width), np.hstack(held)
 

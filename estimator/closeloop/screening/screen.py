@@ -6,9 +6,10 @@ FMU has hidden states. The columns of the calibrated parameters are projected ou
 the candidates; the joint fits decide.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.grouped import group_size, grouped, grouped_fit
-from estimator.closeloop.screening.levers import Course, names_of, shifts
+from estimator.closeloop.screening.levers import Course, shifts
 from estimator.closeloop.screening.linear import (
     Influence,
     Linearised,
@@ -31,6 +32,7 @@ from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array
 from estimator.sensor_faults import faulty
 from estimator.weighting import Weighting
+from fmus.aside import all_set_aside, let_go, set_aside
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 
@@ -43,7 +45,10 @@ NEARLY_PARALLEL = 1e-2  # ridge, as share of a regressor's length; nearly equal 
 TRUSTED = 5.0  # scales: largest change for which the linear regression is trusted
 
 
-CHANGES_AT_ONCE = 32  # number of responses that are computed together
+CHANGES_AT_ONCE = 32  # largest number of responses that are computed together
+
+
+TOGETHER = 1 << 27  # bytes of the outputs that belong to them
 
 
 RUNAWAY = 1e9  # weighted residual above which the linearised response is taken as diverged
@@ -61,7 +66,7 @@ class Screening:
         self, problem: Problem, base: Fit, weighting: Weighting, forces: Sequence[MissingForce] = ()
     ) -> None:
         self.problem, self.theta, self.weighting, self.forces = problem, base.theta, weighting, forces
-        self._shown = problem.simulate(self.theta)
+        self._shown = all_set_aside(problem.simulate(self.theta))
         # prediction errors change from sample to sample, so that they have no means over groups
         self.group = group_size(problem, self._shown[0]) if weighting.is_white else 1
         self.fit = grouped_fit(base, len(weighting), self.group)
@@ -71,11 +76,24 @@ class Screening:
     def changes(self, candidates: Sequence[Candidate]) -> list[Array]:
         """Change of the residual of `fit` by each candidate's amplitudes at their scales, (m, k) each."""
         physical = [c for c in candidates if not c.is_fault]
-        moved = {c: self._moved(c) for c in physical}
-        columns = iter(self._answers([change for c in physical for change in moved[c]]))
-        own = {c: np.column_stack([next(columns) for _ in moved[c]]) for c in physical}
-        own |= {c: self._fault(c) for c in candidates if c.is_fault}
+        columns = self._columns(physical)
+        own = {c: set_aside(np.column_stack([next(columns) for _ in c.amplitudes])) for c in physical}
+        own |= {c: set_aside(self._fault(c)) for c in candidates if c.is_fault}
         return [own[c] for c in candidates]
+
+    def _columns(self, physical: Sequence[Candidate]) -> Iterator[Array]:
+        """Change of the residual by each amplitude, one candidate after the other, (m,) each."""
+        levers = list(dict.fromkeys(name for c in physical for name in self._around(c).told))
+        moved = (change for c in physical for change in self._moved(c))
+        at_once = TOGETHER // (8 * len(self.weighting) * len(self.samples))
+        while some := list(islice(moved, min(max(1, at_once), CHANGES_AT_ONCE))):
+            yield from self._answers(some, levers)
+
+    def prepare(self, candidates: Sequence[Candidate]) -> None:
+        """Linearise the FMU for all candidates at once, so that their changes can be asked for in parts."""
+        levers = dict.fromkeys(n for c in candidates if not c.is_fault for n in self._around(c).told)
+        if levers and self._states is not None:
+            self._linearised(list(levers), self._states)
 
     @property
     def length(self) -> float:
@@ -84,13 +102,17 @@ class Screening:
 
     def _moved(self, c: Candidate) -> list[dict[str, Array]]:
         """Changes of the inputs and parameters of the FMU by each amplitude of a candidate."""
+        made, course = self._around(c), self._courses.get(c.location, self._free)
+        return [shifts(made, course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
+
+    def _around(self, c: Candidate) -> Around:
+        """The equations of a candidate's effect."""
         if c.label not in self._made:
             self._made[c.label] = around(self.problem.builder.outside(), [(c.kind, c.location)])
-        course = self._courses.get(c.location, self._free)
-        return [shifts(self._made[c.label], course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
+        return self._made[c.label]
 
     @cached_property
-    def _at(self) -> NDArray[np.intp]:
+    def samples(self) -> NDArray[np.intp]:
         """Index of the middle sample of each group, up to the end of the part to identify."""
         return np.arange(self.group // 2, _last(self.problem) - self.group // 2, self.group)
 
@@ -101,7 +123,7 @@ class Screening:
     @cached_property
     def _free(self) -> Course:
         """The simulation of the first run of the record."""
-        problem, theta, at = self.problem, self.theta, self._at
+        problem, theta, at = self.problem, self.theta, self.samples
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
         plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
@@ -110,11 +132,13 @@ class Screening:
         known = plant.fmu.description.variables
         start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
         columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
-        given = [columns.get(n, np.full(last, start[n])) for n in names]
+        given = np.empty((len(at), len(names)))
+        for i, n in enumerate(names):
+            given[:, i] = columns[n][at] if n in columns else start[n]
         t = run.t[:last] - run.t[0]
         speed = columns.get(SPEED, np.zeros(last))
         way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
-        return Course(t[at], full[at, len(plant.outputs) :], np.column_stack(given)[at], way[at])
+        return Course(t[at], full[at, len(plant.outputs) :], given, way[at])
 
     @cached_property
     def _courses(self) -> dict[str, Course]:
@@ -129,28 +153,25 @@ class Screening:
         x: Array = full[: _last(self.problem), len(plant.outputs) :]
         return x if shows_its_state(self.problem, self.theta, x) else None
 
-    def _answers(self, moved: Sequence[Mapping[str, Array]]) -> list[Array]:
-        """Change of the weighted residual on the part to identify by each change of levers, (m,) each."""
-        if not moved:
-            return []
+    def _answers(self, moved: Sequence[Mapping[str, Array]], levers: list[str]) -> list[Array]:
+        """Change of the weighted residual on the part to identify by each change of levers, (m,) each.
+
+        levers: names of the levers that these changes and later ones move.
+        """
         if self._states is None:
             return [self._simulated(change) for change in moved]
-        local, levers = self._linearised(names_of(moved), self._states)
-        fit, scale = self.problem.record.runs[0].fit[self._at], -np.sqrt(self.group)
-        found: list[Array] = []
-        for i in range(0, len(moved), CHANGES_AT_ONCE):
-            some = moved[i : i + CHANGES_AT_ONCE]
-            with np.errstate(over="ignore", invalid="ignore"):
-                shown = responses(local, levers, some, len(self._at))[:, fit]
-                columns = np.array([scale * self.weighting.of(y, self._stretches).ravel() for y in shown])
-                sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
-            # the linearised response of a model with stick and slip may diverge, so that it is simulated
-            found += [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, some, strict=True)]
-        return found
+        local, influence = self._linearised(levers, self._states)
+        fit, scale = self.problem.record.runs[0].fit[self.samples], -np.sqrt(self.group)
+        with np.errstate(over="ignore", invalid="ignore"):
+            shown = responses(local, influence, moved, len(self.samples))[:, fit]
+            columns = np.array([scale * self.weighting.of(y, self._stretches).ravel() for y in shown])
+            sound = (columns.max(axis=1) < RUNAWAY) & (columns.min(axis=1) > -RUNAWAY)
+        # the linearised response of a model with stick and slip may diverge, so that it is simulated
+        return [c if ok else self._simulated(m) for c, ok, m in zip(columns, sound, moved, strict=True)]
 
     def _linearised(self, levers: list[str], x: Array) -> tuple[Linearised, dict[str, Influence]]:
         if self._local is None or not set(levers) <= set(self._local[1]):
-            self._local = influences(self.problem, self.theta, x, self._at, levers)
+            self._local = influences(self.problem, self.theta, x, self.samples, levers)
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:
@@ -161,7 +182,7 @@ class Screening:
         push = {}
         for name, samples in change.items():
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
-            push[name] = rest + np.interp(np.arange(len(run.t)), self._at, samples)
+            push[name] = rest + np.interp(np.arange(len(run.t)), self.samples, samples)
         moved = plant.simulate(run, start, push=push) - self._unchanged
         return self._weighted(moved[run.fit])
 
@@ -197,11 +218,15 @@ def _last(problem: Problem) -> int:
     return int(np.flatnonzero(problem.record.runs[0].fit)[-1]) + 1
 
 
-def screen(base: Fit, sets: Sequence[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
+def screen(base: Fit, sets: Iterable[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
     """The promise of each set of candidates from its changes (m, k) by linear regression, best first."""
     basis = np.linalg.qr(base.jacobian)
     r = base.residual - basis[0] @ (basis[0].T @ base.residual)
-    return sorted((_promise(base, *basis, r, c, raw) for c, raw in sets), key=lambda p: -p.gain)
+    found = []
+    for candidates, raw in sets:
+        found.append(_promise(base, *basis, r, candidates, raw))
+        let_go()
+    return sorted(found, key=lambda p: -p.gain)
 
 
 def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:

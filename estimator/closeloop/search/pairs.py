@@ -102,11 +102,11 @@ def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:
     order = screen(base, [((c,), g) for c, g in physical])
     by_candidate = dict(physical)
     leading = [p.candidates[0] for p in order[: problem.policy.search.partners]]
-    sets = [
+    sets = (
         ((a, b), np.hstack([by_candidate[a], by_candidate[b]]))
         for a, b in combinations(leading, 2)
         if a.label != b.label
-    ]
+    )
     return distinct(screen(base, sets))[: problem.policy.search.pairs]
 
 

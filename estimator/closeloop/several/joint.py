@@ -29,7 +29,7 @@ class Together:
     @property
     def costs(self) -> tuple[float, ...]:
         """Sum of squares of each record on its part to identify."""
-        return tuple(float(h.fit.residual @ h.fit.residual) for h in self.parts)
+        return tuple(h.fit.cost for h in self.parts)
 
 
 class _Stack:

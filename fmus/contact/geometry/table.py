@@ -26,6 +26,7 @@ from fmus.errors import BadInput, did_you_mean
 G, NU = 8e10, 0.28  # Pa, 1; steel (thesis Table 3.4, Kalker 1990)
 YOUNG = 2 * G * (1 + NU)  # Pa
 SHIFTS = 401  # of the table by default
+UPRIGHT_SHIFTS = 1001  # without roll: the conicity beside a jump depends on how near it is resolved
 REACH = 0.010  # m, half its range by default, and at least
 BEYOND_FLANGE = 0.003  # m, how much further than flange contact the table goes
 B_MIN = 0.05  # 1/m, least lateral curvature of a patch: surfaces of 10 m radius, flat for a rail of 0.07 m
@@ -58,14 +59,14 @@ def contact_table(
 ) -> pd.DataFrame:
     """Contact of both wheels over the wheelset's lateral shift, indexed by `y`, m, positive to the left.
 
-    wheel, rail: names of exact profiles, paths of point files (see measured.py), or profiles; cant: inward
-    inclination of the rails as a slope; gauge: m, 14 mm below the crown; r0: wheel radius at the tape
-    circle, m; wheel, rail and r0 may each be a pair (left, right). N: normal force in each contact, N;
-    search: "rigid" or "quasi_elastic"; patch: "hertz" or "virtual_penetration"; back_to_back: m between
-    the flange backs; shifts: (n,) m, increasing, by default 401 over 10 mm to both sides or 3 mm beyond
-    flange contact; E, Pa, and nu of both bodies; smoothing: rms, m, that is taken for noise in point files,
-    by default found from the data; roll: whether the wheelset rolls until both wheels touch, or each wheel
-    is lowered upright onto its own rail, as EN 15302 does.
+    wheel, rail: names of exact profiles, paths of point files (see measured.py), or profiles; cant:
+    inward inclination of the rails as a slope; gauge: m, 14 mm below the crown; r0: wheel radius at the
+    tape circle, m; wheel, rail and r0 may each be a pair (left, right). N: normal force in each contact,
+    N; search: "rigid" or "quasi_elastic"; patch: "hertz" or "virtual_penetration"; back_to_back: m
+    between the flange backs; shifts: (n,) m, increasing, by default 401 (without roll 1001) over 10 mm to
+    both sides or 3 mm beyond flange contact; E, Pa, and nu of both bodies; smoothing: rms, m, that is
+    taken for noise in point files, by default found from the data; roll: whether the wheelset rolls until
+    both wheels touch, or each wheel is lowered upright onto its own rail, as EN 15302 does.
 
     Columns, per wheel `_left` and `_right`: r rolling radius, m; delta contact angle, rad, positive where
     the radius grows towards the flange; phi roll, rad, positive with the left wheel up; a, b semi-axes
@@ -107,7 +108,10 @@ def pair_content(pair: Pair) -> tuple[object, ...]:
 
 
 def default_shifts(pair: Pair | Sides, roll: bool = True) -> Array:
-    """401 shifts, m: 10 mm to both sides, or 3 mm beyond flange contact where that is further away."""
+    """Shifts, m, of 10 mm to both sides, or 3 mm beyond flange contact where that is further away.
+
+    401 with roll, and 1001 without, because the conicity by EN 15302 depends on how near a jump is resolved.
+    """
     sides = Sides.of(pair)
     probe = np.arange(0.0, 2.5 * REACH, REACH / 20)
     reach, end = REACH, np.inf
@@ -121,7 +125,7 @@ def default_shifts(pair: Pair | Sides, roll: bool = True) -> Array:
             end = min(end, float(probe[np.argmin(standing.rests)]))
     if end <= reach:
         reach = end - REACH / 20
-    return np.linspace(-reach, reach, SHIFTS)
+    return np.linspace(-reach, reach, SHIFTS if roll else UPRIGHT_SHIFTS)
 
 
 def _columns(sides: Sides, given: Array | None, roll: bool, search: str, patch: str, *load: float) -> Arrays:

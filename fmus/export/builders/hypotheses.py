@@ -20,6 +20,7 @@ from fmus.export.builders.pythonfmu import build_python
 from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
 from fmus.export.provenance import Origin
+from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
 from fmus.model import Model
@@ -37,6 +38,7 @@ class ModelBuilder:
     model: str
     folder: Path
     quick: ClassVar[bool] = True  # with effects as without
+    isolation: ClassVar[Isolation | None] = None  # our own models run where they are used
 
     @property
     def form(self) -> Mapping[str, tuple[float, float]]:
@@ -106,11 +108,12 @@ class ModelBuilder:
 
 @dataclass(frozen=True)
 class ForeignBuilder:
-    """A foreign FMU with effects around it; kept in a folder."""
+    """A foreign FMU with effects around it; kept in a folder. isolation: how its builds run, see Archive."""
 
     fmu: Path
     ports: tuple[PortNames, ...]
     folder: Path
+    isolation: Isolation | None = None
     quick: ClassVar[bool] = False
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
@@ -140,6 +143,7 @@ class ForeignBuilder:
             effects,
             lambda path: build_carrier(self.fmu, self.ports, effects, path),
             lambda path: build_coupled(self.fmu, self.ports, effects, path),
+            self.fmu.name,  # by which messages call it
         )
 
     def final(
@@ -174,13 +178,14 @@ def _described(fmu: Path) -> FmuDescription:
 
 
 def _once(
-    folder: Path, effects: Effects, native: Callable[[Path], Path], python: Callable[[Path], Path]
-) -> Path:
+    folder: Path, effects: Effects, native: Callable[[Path], Path], python: Callable[[Path], Path],
+    file: str = "model.fmu",
+) -> Path:  # fmt: skip
     """The build with these effects, made if it is not there yet: in Python if there is no compiler."""
     name = "+".join(["base", *(f"{k}@{at}" for k, at in effects)])
     if len(name) > LONGEST or not PLAIN.fullmatch(name):  # a slash would lead out of the folder
         name = f"{len(effects)}_effects_{sha256(name.encode()).hexdigest()[:16]}"
-    target = folder / name / "model.fmu"
+    target = folder / name / file
     if not target.exists():
         part = target.with_name(f"{os.getpid()}.fmu")
         _quickest(part, native, python)

@@ -33,6 +33,7 @@ from fmus.export.provenance import (
 )
 from fmus.export.table import STOP, sizes, unit_table, variable_table
 from fmus.export.zipped import entry
+from fmus.files import write_at_once
 from fmus.model import Model, equations
 
 HERE = Path(__file__).parent
@@ -129,7 +130,7 @@ def pack(content: Content, out: Path) -> Path:
             )
         final = Path(folder) / "final.fmu"
         _repack(packed, final, about)
-        target.write_bytes(final.read_bytes())
+        write_at_once(target, final.read_bytes())
     return target
 
 

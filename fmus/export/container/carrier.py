@@ -18,12 +18,13 @@ import fmpy
 from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.around.outside import Laws, laws
-from fmus.export.builders.native.build import NO_TOKEN, identified, packed, write_at_once
+from fmus.export.builders.native.build import NO_TOKEN, identified, packed
 from fmus.export.builders.native.code import STANDARD, Work
 from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description import flag, text
 from fmus.export.builders.native.libraries import library
 from fmus.export.container.coupled import carrying
+from fmus.files import write_at_once
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription, PortNames
 

@@ -20,6 +20,7 @@ from fmus.export.ssp.system import (
     Link,
     System,
 )
+from fmus.taken import check_packed
 
 etree: Any = import_module("lxml.etree")  # by name because it comes without types; FMPy brings it
 Start = tuple[float, str | None]  # a value and its unit
@@ -52,7 +53,10 @@ def read_package(package: str | Path) -> tuple[System, dict[str, bytes]]:
 def _unzipped(path: Path) -> dict[str, bytes]:
     try:
         with zipfile.ZipFile(path) as packed:
+            check_packed(packed, path)
             files = {n: packed.read(n) for n in packed.namelist() if not n.endswith("/")}
+    except BadInput:
+        raise
     except Exception as error:  # damage shows as errors of zipfile, zlib, struct, codecs and others
         raise BadInput(f"{path}: cannot be read as a zip file ({error}); give an .ssp file") from error
     for name in files:

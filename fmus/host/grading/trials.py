@@ -21,6 +21,9 @@ from fmus.host.grading.bench import Bench, difference
 Outcome: TypeAlias = tuple[bool | None, str]
 RESTART = 1e-9  # relative; a restart may round where an uninterrupted run does not
 HALF, END = 50, 100  # steps
+CHANGES = "A run from the same start values does not repeat"
+HIDDEN = "It has a hidden state"
+SHARED = "Instances influence each other"
 SHORT = 20  # steps, of the runs of which there are many
 
 
@@ -43,14 +46,14 @@ def repeats(b: Bench) -> Outcome:
     if gap:
         return (
             False,
-            f"A run from the same start values does not repeat: {gap}; something survives the reset.",
+            f"{CHANGES}: {gap}; something survives the reset.",
         )
     if not np.isfinite(first).all():
         return False, "Its outputs are not finite from its own start values."
     return True, "A restart repeats a run exactly."
 
 
-def restarts_anywhere(b: Bench) -> Outcome:
+def restarts_anywhere(b: Bench, tolerance: float = RESTART) -> Outcome:
     """Restart from the states read in the middle of a run: it goes on as if never interrupted."""
     with b.instance() as fmu:
         b.from_start(fmu, HALF)
@@ -58,7 +61,7 @@ def restarts_anywhere(b: Bench) -> Outcome:
         straight = b.run(fmu, HALF, END)
         fmu.restart(t, **{**b.start, **b.inputs(HALF), **states})
         restarted = b.run(fmu, HALF, END)
-    gap = difference(b.outputs, straight, restarted, RESTART)
+    gap = difference(b.outputs, straight, restarted, tolerance)
     shown = ", ".join(b.states)
     if not b.states and not gap:
         return None, "It shows no state that could be set before a start, and its outputs do not miss one."
@@ -69,7 +72,7 @@ def restarts_anywhere(b: Bench) -> Outcome:
         )
     if not b.states:
         return None, f"It shows no state that could be set before a start; a restart begins anew ({gap})."
-    return False, f"It has a hidden state: restarted from those it shows ({shown}) it differs, {gap}."
+    return False, f"{HIDDEN}: restarted from those it shows ({shown}) it differs, {gap}."
 
 
 def instances_keep_apart(b: Bench) -> Outcome:
@@ -88,7 +91,7 @@ def instances_keep_apart(b: Bench) -> Outcome:
     for number, (expected, found) in enumerate(zip(alone, together, strict=True), 1):
         gap = difference(b.outputs, expected, found)
         if gap:
-            return False, f"Instances influence each other: of three at once, number {number} is off, {gap}."
+            return False, f"{SHARED}: of three at once, number {number} is off, {gap}."
     return True, "Three instances at once do not influence each other."
 
 

@@ -9,6 +9,7 @@ from typing import TypeAlias
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
 from fmus.host.master.connections import Address
+from fmus.limits import STEPS
 
 FINEST = 10**9  # parts of the clock's step that are told apart
 
@@ -49,6 +50,11 @@ class Clock:
         """The instants of a run of `duration`, s; BadInput where a member cannot keep to a time in it."""
         if not (isfinite(duration) and duration > 0):
             raise BadInput(f"a run of {duration:g} s has no length; give a positive duration")
+        if duration / self.step > STEPS:
+            raise BadInput(
+                f"a run of {duration:g} s in steps of {self.step:g} s has more than {STEPS} of them; run "
+                "shorter, or in longer steps"
+            )
         late = [time for time, _ in events if time > duration]
         if late:
             raise BadInput(

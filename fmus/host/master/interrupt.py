@@ -5,13 +5,20 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Protocol
 
+from fmus.host.apart.isolation import FmuEnded
 from fmus.host.fmu import FmuError
-from fmus.host.master.march import March
+
+
+class Stoppable(Protocol):
+    """A run; it comes to an end after `stopped` is set."""
+
+    stopped: bool
 
 
 @contextmanager
-def stopped_by_ctrl_c(march: March) -> Iterator[None]:
+def stopped_by_ctrl_c(march: Stoppable) -> Iterator[None]:
     """End a run at the next instant, as an FMU in Python would take the exception for its own failure.
 
     A second Ctrl-C breaks off a step that does not end.
@@ -30,7 +37,7 @@ def stopped_by_ctrl_c(march: March) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         march.stopped = True
-    except FmuError:
+    except (FmuError, FmuEnded):
         if not march.stopped:
             raise
     finally:

@@ -10,6 +10,7 @@ from fmus.host.master.clock import Plan
 from fmus.host.master.member import Member, StepRefused
 from fmus.host.master.recording import Recorder
 from fmus.host.master.samples import Values
+from fmus.host.watch import PAGE, STOP
 
 Span = tuple[Member, float, float]  # who steps, from when, how far, s
 Saved = list[tuple[Member, Any]]
@@ -75,6 +76,9 @@ class March:
         n, end = 0, len(self.plan.due)
         self._meet(0)
         while n < end and not self.stopped:
+            if PAGE.cells[STOP]:  # asked for by the process that supervises this one
+                self.stopped = True
+                break
             if not self._stiff and n >= self._next_save:
                 self._save(n)
             if self._stepped(n):

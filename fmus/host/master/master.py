@@ -6,21 +6,23 @@ from math import inf, isfinite
 from numbers import Real
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import FmuEnded
 from fmus.host.archive import Archive
-from fmus.host.fmu import Fmu
-from fmus.host.master.clock import Event, clock
+from fmus.host.fmu import Fmu, FmuError
+from fmus.host.master.clock import Event, Plan, clock
 from fmus.host.master.connections import (
     Address,
     Connection,
     Directory,
     links,
 )
+from fmus.host.master.elsewhere import run_elsewhere
 from fmus.host.master.interrupt import stopped_by_ctrl_c
 from fmus.host.master.march import March, Tell
-from fmus.host.master.recording import Recorder, Recording
+from fmus.host.master.recording import Recorder, Recording, SharedCells
 from fmus.host.master.samples import EXTRAPOLATIONS
 from fmus.host.master.signals import Signal, Source, signal
 from fmus.host.master.wiring import Scheme, Wiring
@@ -69,6 +71,13 @@ class Master:
                 "gauss_seidel, extrapolation hold or linear"
             )
         self._own = ExitStack()
+        connections, events = list(connections), list(events)
+        self._options = {
+            "connections": connections, "step": step, "steps": steps, "order": order,
+            "extrapolation": extrapolation, "inputs": inputs or {}, "parameters": parameters,
+            "initial": initial, "events": events, "record": record, "record_step": record_step,
+            "refresh": refresh,
+        }  # fmt: skip
         try:
             self._sources = _opened(fmus, self._own)
             self._descriptions = {name: source.description for name, source in self._sources.items()}
@@ -91,24 +100,45 @@ class Master:
 
         tell(time, speed): called now and then with the simulated time, s, and how many times faster than
         that time passes. Ctrl-C ends the run and keeps what was recorded.
-        Raises FmuError where an FMU refuses a call, with its name, the time and its reason.
+        Raises FmuError where an FMU refuses a call, with its name, the time and its reason; FmuEnded where
+        one ends the process in which it runs. What was recorded until then is their `so_far`.
         """
         plan = self._clock.plan(duration, self._events)
         for s in self._signals.values():
             s.check_span(duration)
         names = [str(a) for a in self._record]
         units = [self._descriptions[a.fmu].variables[a.variable].unit for a in self._record]
+        room = next((s.room for s in self._sources.values() if isinstance(s, Archive) and s.room), None)
+        cells = None if room is None else SharedCells.of((1 + len(names)) * sum(plan.recorded))
+        recorder = Recorder(names, units, cells)
+        try:
+            if room is None or cells is None:
+                stopped_at = self._march(plan, recorder, tell)
+            else:
+                stopped_at = run_elsewhere(
+                    room, marched, self._sources, self._options, duration, recorder, cells, tell
+                )
+        except (FmuError, FmuEnded) as error:
+            error.so_far = recorder.recording(recorder.last)
+            raise
+        return recorder.recording(stopped_at)
+
+    def run_into(self, cells: SharedCells, duration: float, tell: Tell | None) -> float | None:
+        """Run as `run` does, in this process, with the rows into cells; the time of a stop, s."""
+        return self._march(self._clock.plan(duration, self._events), Recorder(self._record, (), cells), tell)
+
+    def _march(self, plan: Plan, recorder: Recorder, tell: Tell | None) -> float | None:
         with ExitStack() as stack:
             fmus = {
                 name: source if isinstance(source, Fmu) else stack.enter_context(Fmu(source))
                 for name, source in self._sources.items()
             }
-            march = March(self._wiring.crew(fmus), plan, Recorder(names, units))
+            march = March(self._wiring.crew(fmus), plan, recorder)
             stack.callback(march.free)
             with stopped_by_ctrl_c(march):
                 march.initialise(self._start)
                 march.run(tell)
-        return march.recorder.recording(march.time if march.stopped and march.time < plan.times[-1] else None)
+        return march.time if march.stopped and march.time < plan.times[-1] else None
 
     def close(self) -> None:
         """Delete unpacked files; Fmus and Archives that were given stay open."""
@@ -183,6 +213,14 @@ class Master:
                 f"{where}: {value:g} is outside {low:g} to {high:g}, the limits that the FMU states"
             )
         return float(value)
+
+
+def marched(
+    fmus: Mapping[str, Archive], options: Mapping[str, Any], duration: float, cells: str, tell: Tell | None
+) -> float | None:
+    """A Master's run in the process of the FMUs: its rows into the cells of that name."""
+    with Master(fmus, **options) as master:
+        return master.run_into(SharedCells.named(cells), duration, tell)
 
 
 def _opened(fmus: Mapping[str, str | Path | Archive | Fmu], own: ExitStack) -> dict[str, Archive | Fmu]:

@@ -15,6 +15,7 @@ from fmus.host.instance import (
 )
 from fmus.host.master.samples import Extrapolation, Samples, Values
 from fmus.host.master.signals import Signal
+from fmus.host.watch import GETTING, PAGE, SETTING, WHAT
 
 Wire = tuple[int, int, float, float]  # input number i = gain * output number j + offset
 
@@ -107,12 +108,14 @@ class Member:
                 else self._given[self._row + ahead].tolist()
             )
             u[-len(signals) :] = given
+        PAGE.cells[WHAT] = self._instance.who + SETTING
         status = self._push()
         if status > WARNING:
             raise self._error("setting inputs", status)
 
     def step(self, t: float, dt: float) -> None:
         """Advance from t by dt, s; StepRefused where a shorter step may do."""
+        PAGE.stepping(self._instance.who, t)
         try:
             status = self._step(t, dt)
         except CallFailed as error:
@@ -126,6 +129,7 @@ class Member:
 
     def look(self) -> Values:
         """Read the outputs that are known right after a step."""
+        PAGE.cells[WHAT] = self._instance.who + GETTING
         status = self._look() if self.layout.early else 0
         if status > WARNING:
             raise self._error("reading outputs", status)
@@ -134,6 +138,7 @@ class Member:
 
     def read(self) -> Values:
         """Read all outputs."""
+        PAGE.cells[WHAT] = self._instance.who + GETTING
         status = self._pull()
         if status > WARNING:
             raise self._error("reading outputs after inputs were set (refresh=False does without)", status)

@@ -5,15 +5,16 @@ from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
-from pyarrow import csv
+from numpy.typing import NDArray
 
 from fmus.errors import BadInput
+from fmus.host.apart.memory import Memory
+
+if TYPE_CHECKING:  # what reads and writes tables is loaded when there is one: FMUs run without it
+    import pandas as pd
 
 TIME = "time"
 UNIT = b"unit"  # key of a Parquet column's metadata
@@ -26,7 +27,7 @@ class Recording:
     units: by column, None where the FMU states none. interrupted_at: s, where the run was broken off.
     """
 
-    data: pd.DataFrame
+    data: "pd.DataFrame"
     units: Mapping[str, str | None]
     interrupted_at: float | None = None
 
@@ -40,6 +41,9 @@ class Recording:
 
     def to_parquet(self, path: str | Path) -> Path:
         """Write a Parquet file whose columns carry their unit as metadata `unit`."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
         target = Path(path)
         fields = [
             pa.field(name, pa.float64(), metadata={UNIT: unit} if (unit := self.units[name]) else None)
@@ -52,6 +56,9 @@ class Recording:
 
 def read_recording(path: str | Path) -> Recording:
     """A recording from a file that one was written to, .csv or .parquet."""
+    import pyarrow.parquet as pq
+    from pyarrow import csv
+
     source = Path(path)
     if not source.is_file():
         raise BadInput(f"{source}: no such recording; run a scenario or mend the path")
@@ -67,12 +74,58 @@ def read_recording(path: str | Path) -> Recording:
     return Recording(data, {name: units.get(name) for name in data.columns})
 
 
-class Recorder:
-    """Collects rows of numbers, compactly."""
+class SharedCells:
+    """The cells of a recorder in memory that the process which made it can read when this one has ended.
 
-    def __init__(self, columns: Sequence[str], units: Sequence[str | None]) -> None:
-        self._columns, self._units = (TIME, *columns), ("s", *units)
-        self._cells = array("d")
+    The first number says how many there are.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
+        self._values = memoryview(memory.map).cast("d")
+
+    @classmethod
+    def of(cls, size: int) -> "SharedCells":
+        """New cells, for at most so many numbers."""
+        return cls(Memory(8 * (size + 1)))
+
+    @classmethod
+    def named(cls, name: str) -> "SharedCells":
+        """The cells that another process has made."""
+        return cls(Memory(name=name))
+
+    @property
+    def name(self) -> str:
+        """The name by which another process finds them."""
+        return self._memory.name
+
+    def extend(self, row: list[float]) -> None:
+        """Add numbers."""
+        n = len(self)
+        self._values[n + 1 : n + 1 + len(row)] = array("d", row)
+        self._values[0] = n + len(row)
+
+    def __len__(self) -> int:
+        return int(self._values[0])
+
+    def __getitem__(self, part: slice) -> list[float]:
+        return [float(value) for value in self._values[1 : len(self) + 1][part]]
+
+    def __delitem__(self, part: slice) -> None:
+        self._values[0] = min(len(self), part.start or 0)
+
+    def __array__(self, *_: Any, **__: Any) -> NDArray[np.float64]:
+        return np.array(self._values[1 : len(self) + 1])
+
+
+class Recorder:
+    """Collects rows of numbers, compactly, by default in memory of this process."""
+
+    def __init__(
+        self, columns: Sequence[object], units: Sequence[str | None], cells: SharedCells | None = None
+    ) -> None:
+        self._columns, self._units = (TIME, *map(str, columns)), ("s", *units)
+        self._cells: array[float] | SharedCells = array("d") if cells is None else cells
 
     def add(self, row: list[float]) -> None:
         """One row: the time, then a value for each column."""
@@ -83,12 +136,20 @@ class Recorder:
         """How many there are; one that was broken off does not count."""
         return len(self._cells) // len(self._columns)
 
+    @property
+    def last(self) -> float:
+        """The time of the last row, s; 0 if there is none."""
+        first = (self.rows - 1) * len(self._columns)
+        return float(self._cells[first : first + 1][0]) if first >= 0 else 0.0
+
     def keep(self, rows: int) -> None:
         """Forget all rows but the first ones."""
         del self._cells[rows * len(self._columns) :]
 
     def recording(self, interrupted_at: float | None) -> Recording:
         """All of it."""
+        import pandas as pd
+
         self.keep(self.rows)
         cells: Any = np.array(self._cells).reshape(-1, len(self._columns))
         data = pd.DataFrame(cells, columns=list(self._columns))

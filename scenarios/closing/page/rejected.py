@@ -123,7 +123,7 @@ def detection_words(problem: Problem, found: Outcome) -> str:
 
 def chance_words(found: Outcome, diagnostics: Diagnostics) -> str:
     """How much decoy regressors explain by chance, and how stable the screening of the finding is."""
-    chi2 = float(found.base.fit.residual @ found.base.fit.residual)
+    chi2 = found.base.fit.cost
     words = "No regressor of this record covers enough frequencies to be compared with random ones."
     if diagnostics.decoy_gain:
         reached = percent(diagnostics.decoy_gain / chi2)

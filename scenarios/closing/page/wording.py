@@ -126,6 +126,13 @@ def _ambiguous(case: Case) -> Story:
 
 
 def _sensor_fault(case: Case) -> Story:
+    if not case.found.judgement.members:  # a sensor that shows one value all the time
+        return Story(
+            f"A sensor is at fault: {case.found.judgement.reason}.",
+            "Nothing was searched for and nothing was added to the model. Check the sensor and its channel "
+            "first.",
+            "No force law was searched for.",
+        )
     return Story(
         f"A sensor is at fault, with {lacks_words(case.best, case.words)}. "
         + gap_words(case, "Correcting the fault closes"),

@@ -7,6 +7,7 @@ from typing import Any
 
 from fmus.errors import BadInput
 from fmus.registry import classes_in
+from fmus.taken import check_file
 from scenarios.experiment.readers.reader import NO_OPTIONS, Reader
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -48,4 +49,5 @@ def read_sheet(
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise BadInput(f"{file}: has no known format; convert it to one of {known}")
+    check_file(file)
     return reader.read(file, time, columns, options)

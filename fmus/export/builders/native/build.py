@@ -2,7 +2,6 @@
 
 import hashlib
 import io
-import os
 import tempfile
 import uuid
 import zipfile
@@ -31,6 +30,7 @@ from fmus.export.provenance import (
     sealed,
 )
 from fmus.export.zipped import entry
+from fmus.files import write_at_once
 from fmus.model import Equations, Model, equations
 
 HERE = Path(__file__).parent
@@ -113,14 +113,3 @@ def packed(files: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> bytes
         for name in sorted(files):
             archive.writestr(entry(name), files[name], compress_type=method)
     return memory.getvalue()
-
-
-def write_at_once(target: Path, data: bytes) -> None:
-    """Write a file at once: a reader sees the old one or the new one."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        part.write_bytes(data)
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from fmus.export.builders.native.build import write_at_once
 from fmus.export.builders.native.compilers import DEFINED, command, compile_library, host
+from fmus.files import write_at_once
 
 KEPT = 300  # libraries on disk, of about 100 kB each
 DIGEST = sha256().digest_size

@@ -3,12 +3,13 @@
 import zipfile
 from pathlib import Path
 
-from fmus.export.builders.native.build import NO_TOKEN, identified, packed, write_at_once
+from fmus.export.builders.native.build import NO_TOKEN, identified, packed
 from fmus.export.builders.native.code import sources
 from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description2 import description2
 from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import table
+from fmus.files import write_at_once
 from fmus.model import Model, equations
 
 CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes.h", "quick.c")

@@ -1,0 +1,1 @@
+"""FMUs in a process of their own, which is supervised: see `room.py`."""

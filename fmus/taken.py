@@ -1,0 +1,31 @@
+"""Checks of what is taken from outside before any of it is read: the numbers stand in `limits`."""
+
+from pathlib import Path
+from zipfile import ZipFile
+
+from fmus import limits
+from fmus.errors import BadInput
+
+GB = 1e9  # bytes
+
+
+def check_file(path: Path) -> None:
+    """Raise BadInput for what is there but no file: reading a device or a pipe may never end."""
+    if "\0" in str(path):
+        raise BadInput(f"the path {str(path)!r} holds a NUL; mend it")
+    if path.exists() and not path.is_file():
+        raise BadInput(f"{path}: is a folder, a device or a pipe; give the path of a file")
+
+
+def check_packed(packed: ZipFile, path: Path) -> None:
+    """Raise BadInput for a zip file of too many files, or too large ones, from its list of contents."""
+    contents = packed.infolist()
+    if len(contents) > limits.ENTRIES:
+        raise BadInput(
+            f"{path}: holds {len(contents)} files, more than {limits.ENTRIES}; pack only what belongs to it"
+        )
+    size = sum(entry.file_size for entry in contents) / GB
+    if size > limits.UNPACKED:
+        raise BadInput(
+            f"{path}: holds {size:.3g} GB, more than {limits.UNPACKED:g} GB; pack only what belongs to it"
+        )

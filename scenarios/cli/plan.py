@@ -1,0 +1,31 @@
+"""`railfmi plan`: what a record could tell apart, before it is taken."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
+
+
+@app.command()
+def plan(
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
+    out: Out = RESULTS / "plan",
+    data: Annotated[
+        Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
+    ] = None,
+) -> None:
+    """Say which effects an experiment could show and tell apart, and what would help.
+
+    Only the time and the inputs are read from the data; the outputs need not exist.
+    """
+    from scenarios.planning.planning import plan as planned
+    from scenarios.planning.result import table_of
+
+    will_write(out)
+    with said.status("reading the experiment") as status:
+        result = planned(experiment, out, data, status.update, show)
+    for line in table_of(result):
+        typer.echo(line)
+    typer.echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")

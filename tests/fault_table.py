@@ -1,0 +1,63 @@
+"""The table of faults in docs/faults.md, from the cases of the tests; run as a module, this writes it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from tests.helpers.misbehaving import DEATHS, ENDLESS, HARMLESS
+from tests.scenarios import test_command_line, test_misbehaving, test_output, test_trials_before
+
+FILE = Path(__file__).parents[1] / "docs" / "faults.md"
+HEAD = """# Faults that the tests try
+
+Written by `python -m tests.fault_table` from the cases of the tests. Misbehaving FMUs are compiled from
+[one C file](../tests/helpers/c/misbehaving.c). A fault in `late` is one in `fmi2DoStep` at t = 0.05 s. "All
+commands" are {commands}.
+
+| fault | command | what happens | test |
+|---|---|---|---|
+"""
+SENTENCE = "one sentence with FMU, call and time, exit code 2"
+KEPT = "; `run` keeps the recording"
+
+
+def rows() -> Iterator[tuple[str, str, str, str]]:
+    """Fault, command, what happens, file of the test."""
+    every = "all commands"
+    file = _file(test_misbehaving)
+    for fault in DEATHS:
+        yield f"`{fault.what}` in {fault.call}", every, SENTENCE + KEPT * (fault.call == "late"), file
+    for fault in ENDLESS:
+        what = "ended after --call-limit, " + SENTENCE + KEPT * (fault.call == "late")
+        yield f"`{fault.what}` in {fault.call}", every, what, file
+    for fault in HARMLESS:
+        yield f"`{fault.what}` in {fault.call}", "run", "nothing: the run is as without it", file
+    for what, words in test_trials_before.WRONG.items():
+        told = f"refused before it is estimated: {words}; exit code 2"
+        yield f"`{what}`", "estimate, close-loop", told, _file(test_trials_before)
+    for what in test_output.SPOILED:
+        yield f"model description with {what}", every, "one line, exit code 2", _file(test_output)
+    for command in ("run", "compare"):
+        for n in range(6):
+            told = "one line, exit code 2, no half file"
+            yield f"disk full from rename {n + 1} on", command, told, _file(test_output)
+    for what in test_command_line.WRONG:
+        told = "one line, exit code 2, nothing written"
+        yield f"experiment: {what}", "close-loop", told, _file(test_command_line)
+    for what, (arguments, _) in test_command_line.USAGE.items():
+        told = "one line, exit code 2, nothing written"
+        yield f"usage: {what}", arguments[0], told, _file(test_command_line)
+
+
+def page() -> str:
+    """The text of docs/faults.md."""
+    lines = [f"| {' | '.join(row)} |\n" for row in rows()]
+    return HEAD.format(commands=", ".join(test_misbehaving.COMMANDS)) + "".join(lines)
+
+
+def _file(module: object) -> str:
+    name = str(module.__name__).rpartition(".")[2]  # type: ignore[attr-defined]
+    return f"`{name}`"
+
+
+if __name__ == "__main__":
+    FILE.write_text(page(), encoding="utf-8")
