@@ -75,7 +75,8 @@ def run_safely(arguments: Sequence[str]) -> int:
         code = loaded(arguments)(list(arguments), standalone_mode=False)
         if code == 130 and not INTERRUPTED.told:  # typer made an exit code of the exception
             return _interrupted()
-        say_notices()
+        if code != 130:
+            say_notices()
         return code if isinstance(code, int) else 0
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read

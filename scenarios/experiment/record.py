@@ -1,6 +1,6 @@
 """Measured data: from the files of an experiment to a checked Record in the FMU's units."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,13 +25,10 @@ from scenarios.experiment.checks import (
     time_notes,
 )
 from scenarios.experiment.experiment import Experiment, check_names
+from scenarios.experiment.parts import MIN_SAMPLES, masks
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.units import SAME, StatedUnits
 
-CHOOSE = 0.2  # share of the identify part that becomes the part to choose, if none is declared
-PIECES = 5  # number of pieces in which these samples lie
-GRID = 15  # samples; pieces begin at multiples of it, so that screening can average 3 or 5 samples
-MIN_SAMPLES = 50  # samples in each part; with fewer, an error is within its own scatter
 LARGEST = 1e100  # of a measured number
 MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
 
@@ -112,10 +109,10 @@ def _run(
     The last item holds the conversions of the inputs.
     """
     data, stated = _read(e, file)
-    masks = _masks(e, part, file, data[e.time])
-    used = slice(int(np.flatnonzero(np.any(masks, axis=0))[-1]) + 1)
+    chosen = masks(e, part, file, data[e.time])
+    used = slice(int(np.flatnonzero(np.any(chosen, axis=0))[-1]) + 1)
     data = {column: values[used] for column, values in data.items()}
-    fit, choose, test = (mask[used] for mask in masks)
+    fit, choose, test = (mask[used] for mask in chosen)
     t = data[e.time]
     notes = _checked(e, file, data)
     if not missing:
@@ -225,64 +222,6 @@ def _source(e: Experiment, column: str) -> tuple[str, int]:
     while column in e.derived:
         column, times = e.derived[column].derivative, times + 1
     return column, times
-
-
-def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray, BoolArray]:
-    """Identify part, part to choose and test part of the samples, t: (N,) s -> (N,) each."""
-    every, none = np.ones(t.size, dtype=np.bool_), np.zeros(t.size, dtype=np.bool_)
-    if e.split is None:
-        _check_enough(e, f"file {file}", every)
-        return every, none, none
-    if e.split.files:
-        _check_enough(e, f"file {file}", every)
-        whole = list(e.split.files)[part]
-        masks = {key: every if key == whole else none for key in ("identify", "choose", "test")}
-    else:
-        masks = {"choose": none} | _windows(e, e.split.windows, file, t)
-    if "choose" not in {**e.split.files, **e.split.windows}:
-        masks["choose"] = spread(masks["identify"])
-    return masks["identify"] & ~masks["choose"], masks["choose"], masks["test"]
-
-
-def spread(identify: BoolArray) -> BoolArray:
-    """The part to choose (N,) if none is declared: the end of each piece of the identify part.
-
-    It is spread over the record, because an effect with a late onset must be visible in both parts. The
-    pieces are few and long, so that neighbouring samples do not correlate the two parts (hold-out of blocks:
-    J. Racine, Journal of Econometrics 99 (2000), 39-61).
-    """
-    index, found = np.flatnonzero(identify), np.zeros_like(identify)
-    whole = GRID if len(index) > 20 * PIECES * GRID else 1  # else rounding would change the share
-    for piece in range(PIECES):
-        first, last = (
-            round((piece + part) * len(index) / PIECES / whole) * whole for part in (1 - CHOOSE, 1)
-        )
-        found[index[first:last]] = True
-    return found
-
-
-def _windows(
-    e: Experiment, windows: Mapping[str, tuple[float, float]], file: Path, t: Array
-) -> dict[str, BoolArray]:
-    """The samples (N,) in each window of one file; a sample on the common edge belongs to the first."""
-    step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
-    masks: dict[str, BoolArray] = {}
-    for key, window in windows.items():
-        if window[0] < t[0] - step or window[1] > t[-1] + step:
-            raise BadInput(
-                f"{e.file}: [split] {key} = {list(window)} leaves the record {file.name}, which runs from "
-                f"{t[0]:.9g} to {t[-1]:.9g} s; keep it within"
-            )
-        slack = 1e-6 * step  # for times printed with few digits
-        mask = (t >= window[0] - slack) & (t <= window[1] + slack)
-        masks[key] = mask & ~np.any([*masks.values()], axis=0) if masks else mask
-        _check_enough(e, f"[split] {key} = {list(window)}", masks[key])
-    return masks
-
-
-def _check_enough(e: Experiment, where: str, mask: BoolArray) -> None:
-    if mask.sum() < MIN_SAMPLES:
-        raise BadInput(f"{e.file}: {where} holds {mask.sum()} samples; at least {MIN_SAMPLES} are needed")
 
 
 def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:

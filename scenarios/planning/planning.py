@@ -19,7 +19,8 @@ from scenarios.closing.closing import Builder, builder_for, problem_of
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.given import Given, given
-from scenarios.experiment.record import load_planned, spread
+from scenarios.experiment.parts import spread
+from scenarios.experiment.record import load_planned
 from scenarios.output import writable
 from scenarios.planning.result import PlanResult, result_of
 

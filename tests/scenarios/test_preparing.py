@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.cli.app import run_safely
-from scenarios.cli.console import say_notices, will_write
+from scenarios.cli.console import interrupted, say_notices, will_write
 from scenarios.experiment.experiment import load_experiment
+from scenarios.output import WRITING, replaced
 from scenarios.preparing.draft import draft, toml_of, with_column
 from scenarios.preparing.initialising import init
 from scenarios.preparing.inspecting import bandwidth, inspect
@@ -283,14 +284,45 @@ def test_a_command_says_what_it_replaces(tmp_path, capsys):
     assert "held earlier results (result.json, of 2" in capsys.readouterr().err.replace("\n", " ")
 
 
+def test_files_that_are_not_complete_are_no_earlier_results(tmp_path):
+    (tmp_path / f"{WRITING}1_x").mkdir()
+    (tmp_path / f"{WRITING}1_x" / "result.json").write_text("{}")
+    assert replaced(tmp_path) == ""
+    (tmp_path / "plan.json").write_text("{}")
+    assert "(plan.json, of 2" in replaced(tmp_path)
+
+
+@pytest.mark.parametrize("code", [0, 1, 130])
+def test_an_interrupted_command_does_not_say_that_it_replaced_results(tmp_path, monkeypatch, capsys, code):
+    def command(_arguments, standalone_mode):
+        will_write(tmp_path)
+        return interrupted("nothing is kept").exit_code if code == 130 else code
+
+    (tmp_path / "result.json").write_text("{}")
+    monkeypatch.setattr("scenarios.cli.app.loaded", lambda _: command)
+    assert run_safely([]) == code
+    assert ("were replaced" in capsys.readouterr().err.replace("\n", " ")) == (code != 130)
+
+
 def test_each_command_has_a_folder_of_its_own():
     from inspect import signature
 
-    from scenarios.cli import close_loop, compare, estimate, import_ssp, row, run
+    from scenarios.cli import (
+        close_loop,
+        compare,
+        conicity,
+        conicity_norm,
+        estimate,
+        import_ssp,
+        inspect,
+        plan,
+        row,
+        run,
+    )
 
     modules = [
         close_loop.close_loop, estimate.estimate, compare.compare, row.rebuild, run.run_scenarios,
-        import_ssp.import_package,
+        import_ssp.import_package, plan.plan, inspect.inspect, conicity.conicity, conicity_norm.conicity_norm,
     ]  # fmt: skip
     folders = [str(signature(command).parameters["out"].default) for command in modules]
     assert len(set(folders)) == len(folders)
