@@ -78,7 +78,11 @@ def record_around(
 
 def rights(model: Model) -> dict[str, str]:
     """Author, copyright and license for a model description: those of a model of railfmi, else none."""
-    return OWN if Path(inspect.getfile(type(model))).is_relative_to(HERE.parent) else {}
+    try:
+        file = inspect.getfile(type(model))
+    except (TypeError, OSError):  # the class stands in no file, but in text that was executed
+        return {}
+    return OWN if Path(file).is_relative_to(HERE.parent) else {}
 
 
 def common(model: str, kind: str, fmi: int) -> dict[str, Any]:

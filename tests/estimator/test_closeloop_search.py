@@ -38,7 +38,7 @@ from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
 from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.native import native
-from tests.helpers.problems import OneByOne, record_with
+from tests.helpers.problems import Always, OneByOne, record_with
 
 FREE = (-np.inf, np.inf)
 
@@ -99,7 +99,7 @@ def test_an_fmu_between_coarse_samples_shows_its_state(hidden):
     every, inputs = np.ones(len(t), bool), ("u_fl", "u_fl_dot")
     run = Run(t, np.column_stack([u, rate]), np.zeros((len(t), 1)), every, ~every, ~every)
     record = Record((run,), inputs, ("z1_ddot",), np.array([np.nan]))
-    problem = Problem(lambda _: native("vehicle7dof"), record, {}, {})
+    problem = Problem(Always(native("vehicle7dof")), record, {}, {})
     x = problem.simulate({}, problem.plant.states)[0][:, 1:]
     if hidden:
         x[:, 3] *= 1.01
@@ -123,7 +123,7 @@ def test_what_a_parameter_changes_is_what_a_simulation_says(lever, share):
     outputs, every = ("z1_ddot", "z2_ddot", "phi_x2_dot"), np.ones(len(t), bool)
     run = Run(t, np.column_stack(columns), np.zeros((len(t), 3)), every, ~every, ~every)
     record = Record((run,), tuple(inputs), outputs, np.ones(3))
-    problem = Problem(lambda _: native("vehicle7dof"), record, {}, {})
+    problem = Problem(Always(native("vehicle7dof")), record, {}, {})
     plant, k = problem.plant, int(share * len(t))
     states = problem.simulate({}, plant.states)[0][:, 3:]
     local, found = influences(problem, {}, states, np.arange(len(t)), [lever])

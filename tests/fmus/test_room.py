@@ -243,7 +243,7 @@ def test_values_come_through_as_they_are(value):
         assert same(value, there.receive())
 
 
-@pytest.mark.parametrize("planted", ["harmful", print, np.load], ids=str)
+@pytest.mark.parametrize("planted", ["harmful", print, np.load], ids=["harmful", "print", "load"])
 def test_what_comes_from_there_runs_nothing(tmp_path, planted):
     mark = tmp_path / "ran"
     with ends() as (here, there):

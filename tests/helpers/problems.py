@@ -1,5 +1,7 @@
 """Problems of tests, which are not simulated by an FMU."""
 
+from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,3 +25,15 @@ class OneByOne:
     def identify_residuals(self, thetas):
         """See Problem."""
         return None
+
+
+@dataclass(frozen=True)
+class Always:
+    """A builder that gives one FMU, whatever the effects; it runs in this process."""
+
+    fmu: Path
+    isolation = None
+
+    def __call__(self, effects: tuple[tuple[str, str], ...]) -> Path:
+        """See Builder."""
+        return self.fmu

@@ -17,12 +17,11 @@ from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, stacked
 from estimator.closeloop.hypotheses.hypothesis import Part
-from estimator.closeloop.screening.regressors import Calibration
+from estimator.closeloop.screening.regressors import directions
 from estimator.record import Array
-from fmus.aside import let_go, set_aside
+from fmus.aside import set_aside
 
 LIKENESS = "likeness to an effect"
-ROWS_AT_ONCE = 2000  # rows of all regressors that are brought together in one array
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ def detect(
         copies.append(_figures(e, limits.slow_blocks))
     references = {name: np.array([c[name] for c in copies]) for name in observed}
     if regressors:
-        along, cosines = _directions(screened, regressors)
+        along, cosines = directions(screened, regressors)
         observed[LIKENESS] = float(np.max(along**2))
         references[LIKENESS] = _likeness_of_noise(cosines, limits.replicates, rng)
     p_values, figures = [], {}
@@ -108,28 +107,6 @@ def _columns(baseline: Baseline, slopes: Sequence[Sequence[Array]], part: Part) 
     """Derivatives on a part of the record in units of the noise, (m, n)."""
     made = [set_aside(baseline.in_noise(slope, part).ravel()) for slope in slopes]
     return stacked(made) if made else np.empty((0, 0))
-
-
-def _directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
-    """Products (k,) of the residual with the regressors, projected and of length 1, and of these (k, k)."""
-    q = Calibration.of(screened).basis
-    within = np.vstack([_products(g, q) for g in regressors])
-    along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
-    for first in range(0, len(q), ROWS_AT_ONCE):
-        rows = slice(first, first + ROWS_AT_ONCE)
-        left = np.vstack([g[rows].T for g in regressors]) - within @ q[rows].T
-        along += left @ screened.residual[rows]
-        gram += left @ left.T
-        let_go()
-    size = np.sqrt(np.diag(gram)) + 1e-300
-    return along / size, gram / size[:, None] / size
-
-
-def _products(g: Array, q: Array) -> Array:
-    """Products (k, n) of columns g (m, k) with columns q (m, n)."""
-    found: Array = g.T @ q
-    let_go()
-    return found
 
 
 def _likeness_of_noise(cosines: Array, replicates: int, rng: np.random.Generator) -> Array:

@@ -16,7 +16,7 @@ from fmus.host.description import FmuVariable
 LINEARISATIONS = 200  # at most this many linearisations along the run
 PROBES = 5  # samples at which a restart is compared with the simulation
 HIDDEN = 1e-3  # share of a state's largest step; a restart that differs by more lacks a hidden state
-SAMPLES_AT_ONCE = 1000  # samples of the influences that are brought together in one array
+INFLUENCES_AT_ONCE = 1000  # samples of the influences that are brought together in one array
 LEVER_NUDGE = 1e-4  # finite difference of an input or parameter (lever), as share of its size
 
 
@@ -158,8 +158,8 @@ def responses(
     now = [change[:samples] for changes in moved for change in changes.values()]
     held = [np.append((w[1:] + w[:-1]) / 2, w[-1:]) for w in now]
     x, found = np.zeros((n, k)), np.empty((k, samples, n_y))
-    for first in range(0, samples, SAMPLES_AT_ONCE):
-        part = slice(first, first + SAMPLES_AT_ONCE)
+    for first in range(0, samples, INFLUENCES_AT_ONCE):
+        part = slice(first, first + INFLUENCES_AT_ONCE)
         m = len(near[part])
         states = np.array([levers[name].states[part] for name in names]).reshape(-1, m, n)
         outputs = np.array([levers[name].outputs[part] for name in names]).reshape(-1, m, n_y)

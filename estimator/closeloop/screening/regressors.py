@@ -15,6 +15,7 @@ Changes = Sequence[tuple[Candidate, Array]]  # candidates with their changes (m,
 NOTHING = 1e-6  # share of a regressor's length after projection, below which only rounding is left
 RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
 COLUMNS_AT_ONCE = 64  # largest number of columns per batch
+ROWS_AT_ONCE = 2000  # rows of all regressors that are brought together in one array
 BATCH = 1 << 26  # bytes of a batch; copies of hundreds of long columns would not fit into memory
 
 
@@ -92,3 +93,25 @@ def alike(calibration: Calibration, change: Changes, rows: int, rng: np.random.G
     s /= np.linalg.norm(s, axis=0) + 1e-300
     cosines: Array = s.T @ s
     return cosines
+
+
+def directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
+    """Products (k,) of the residual with the regressors, projected and of length 1, and of these (k, k)."""
+    q = Calibration.of(screened).basis
+    within = np.vstack([_products(g, q) for g in regressors])
+    along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
+    for first in range(0, len(q), ROWS_AT_ONCE):
+        rows = slice(first, first + ROWS_AT_ONCE)
+        left = np.vstack([g[rows].T for g in regressors]) - within @ q[rows].T
+        along += left @ screened.residual[rows]
+        gram += left @ left.T
+        let_go()
+    size = np.sqrt(np.diag(gram)) + 1e-300
+    return along / size, gram / size[:, None] / size
+
+
+def _products(g: Array, q: Array) -> Array:
+    """Products (k, n) of columns g (m, k) with columns q (m, n)."""
+    found: Array = g.T @ q
+    let_go()
+    return found
