@@ -10,7 +10,8 @@ from pathlib import Path
 
 from fmus.errors import BadInput
 
-RESULTS = ("result.json", "results.json", "plan.json", "*/result.json")  # what commands write, by pattern
+# what commands write, by pattern
+RESULTS = ("result.json", "results.json", "plan.json", "norm.json", "*/result.json")
 WRITING = ".writing_"  # begin of the name of a folder of files that are not complete
 LAST = "result.json"  # moved last, so that a folder that holds it is complete
 

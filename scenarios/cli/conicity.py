@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import RESULTS, Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 Item = TypeVar("Item")
 SIDES = "; given twice (or as LEFT,RIGHT), first the left, then the right one"
@@ -60,6 +60,7 @@ def conicity(
         gauge, back_to_back, roll, search, smoothing,
     )  # fmt: skip
     amplitudes = None if not amplitude else [_number("--amplitude", text) for text in _split(amplitude)]
+    will_write(out)
     with said.status("searching for the contact"):
         found = evaluated(request, amplitudes)
         folder = writable(out)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 
 @app.command("conicity-norm")
@@ -44,6 +44,7 @@ def conicity_norm(
 
     pairs = references(pair)
     instrument = Instrument(reader_of(reader, smoothing), random, grid, spacing, seed)
+    will_write(out)
     folder = writable(out)
     with said.status("step 1") as status:
         exact = [step_1(one, reference) for one in pairs]
