@@ -21,6 +21,21 @@ class Note:
 
 
 @dataclass(frozen=True)
+class Conversion:
+    """How a column becomes a variable of the FMU: value in `model_unit` = factor * value in `unit` + offset.
+
+    A unit is None where nobody states it; the numbers are then taken as they are.
+    """
+
+    variable: str
+    column: str
+    unit: str | None
+    model_unit: str | None
+    factor: float
+    offset: float
+
+
+@dataclass(frozen=True)
 class Run:
     """One uninterrupted stretch of data, which is simulated from its start."""
 
@@ -70,6 +85,7 @@ class Record:
     outputs: tuple[str, ...]  # the columns of y
     noise_std: Array  # (n_y,) in the FMU's units, nan if not declared
     notes: tuple[Note, ...] = ()
+    conversions: tuple[Conversion, ...] = ()
 
     def of(self, values: Sequence[Array], part: str) -> Array:
         """Values of each run (N, k) on a part, named as a mask of Run, one run after the other, (m, k)."""

@@ -21,6 +21,7 @@ class Port:
     forces: gain of the force on each `*_ext` input (virtual work: d(displacement)/d(coordinate)).
     place: whether the displacement keeps to a rest position, turns on, or is only slip added up.
     parts: of a port made by `alike`, the ports at each of which a law acts.
+    has_displacement: whether the displacement is known; if not, only laws over velocity and time act there.
     """
 
     displacement: Expr
@@ -29,6 +30,7 @@ class Port:
     motion: Literal["rotation", "translation"] = "translation"
     place: Literal["rests", "turns", "slips"] = "rests"
     parts: tuple[Port, ...] = ()
+    has_displacement: bool = True
 
     @property
     def acting(self) -> tuple[Port, ...]:

@@ -5,10 +5,13 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 
 from fmus.errors import BadInput
 
+# what commands write, by pattern
+RESULTS = ("result.json", "results.json", "plan.json", "norm.json", "*/result.json")
 WRITING = ".writing_"  # begin of the name of a folder of files that are not complete
 LAST = "result.json"  # moved last, so that a folder that holds it is complete
 
@@ -30,6 +33,25 @@ def writable(folder: Path) -> Path:
         if not _lives(left.name.removeprefix(WRITING).partition("_")[0]):
             shutil.rmtree(left, ignore_errors=True)
     return folder
+
+
+def replaced(folder: Path) -> str:
+    """A sentence on earlier results in a folder, which a command is about to replace; empty if none."""
+    found = [
+        file
+        for pattern in RESULTS
+        for file in sorted(folder.glob(pattern))
+        if not file.parent.name.startswith(WRITING)
+    ]
+    if not found:
+        return ""
+    written = datetime.fromtimestamp(max(file.stat().st_mtime for file in found))
+    more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+    name = found[0].relative_to(folder)
+    return (
+        f"{folder} held earlier results ({name}{more}, of {written:%Y-%m-%d %H:%M}), which were replaced; "
+        "give another --out to keep them"
+    )
 
 
 @contextmanager

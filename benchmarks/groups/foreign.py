@@ -99,7 +99,7 @@ def _rows(
     inputs, outputs = _inputs(foreign, t), foreign.outputs
     held = {name: samples[:-1] for name, samples in inputs.items()}
     first = {name: float(samples[0]) for name, samples in inputs.items()}
-    motion = [name for p in foreign.ports[:1] for name in (p.displacement, p.velocity)]
+    motion = [name for p in foreign.ports[:1] for name in p.motion]
     with Fmu(foreign.fmu) as alone, Fmu(builder(effects)) as fmu:
         found = fmu.simulate(t, held, outputs, {})[1:]
         agreed(found, bare.simulate(alone, t, held, outputs), SAME, f"{foreign.title}, {title}, {CALLS}")

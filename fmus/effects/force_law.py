@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.effects.effect import Effect
+from fmus.errors import BadInput
 from fmus.integrators.rk4 import runge_kutta
 from fmus.port import UNITS, Port
 from fmus.sampled import Sampled
@@ -111,8 +112,26 @@ class ForceLaw(Effect):
         return place.place in cls.places
 
     @classmethod
+    def offered(cls, site: Site, location: str) -> bool:
+        """See Effect.offered: a law over the displacement needs one."""
+        return site.ports()[location].has_displacement or not cls.needs_displacement()
+
+    @classmethod
+    def needs_displacement(cls) -> bool:
+        """Whether the force or its memory depends on the displacement."""
+        return _compiled(cls).of_displacement
+
+    @classmethod
     def build(cls, site: Site, location: str, place: Port) -> None:
-        """See Effect.build: where several ports act alike, each has its own motion and memory."""
+        """See Effect.build: where several ports act alike, each has its own motion and memory.
+
+        BadInput for a law over the displacement at a port that has none.
+        """
+        if not place.has_displacement and cls.needs_displacement():
+            raise BadInput(
+                f"{cls.kind} at '{location}' depends on the displacement, which the port does not name; "
+                "add displacement = ..., an output of the FMU, to the port"
+            )
         shared = {
             p.name: site.add(replace(p, name=cls.name_at(location, p.name)))
             for p in cls.parameters(place.motion)
@@ -149,9 +168,11 @@ class _Compiled:
         values = {name: w[3 + i] for i, name in enumerate(self.parameters)}
         made = law({**values, **memory, "clock": w[0]})
         arguments = [*cs.vertsplit(w), *cs.vertsplit(x)]
-        self.force = Sampled(cs.Function("force", arguments, [made.force(w[1], w[2])]))
-        rates = made.rates(w[1], w[2])
-        f = cs.Function("f", [w, x], [cs.vertcat(*(rates[name] for name in self.states))])
+        force, rates = cs.SX(made.force(w[1], w[2])), made.rates(w[1], w[2])
+        self.force = Sampled(cs.Function("force", arguments, [force]))
+        slopes = cs.vertcat(*(rates[name] for name in self.states))
+        self.of_displacement = bool(cs.depends_on(cs.vertcat(force, slopes), w[1]))
+        f = cs.Function("f", [w, x], [slopes])
         a, b = cs.SX.sym("a", n), cs.SX.sym("b", n)
         after = runge_kutta(f, x, b[0] - a[0], (a, (a + b) / 2, b))
         step = cs.Function("step", [x, a, b], [after])

@@ -9,6 +9,7 @@ from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any, Self, TypeVar
+from xml.etree import ElementTree
 
 import fmpy
 from fmpy.model_description import read_model_description
@@ -127,7 +128,12 @@ def _unpack(path: Path, folder: Path) -> None:
 
 def _description(path: Path, folder: Path) -> FmuDescription:
     try:
-        model = read_model_description(str(folder), validate=False)
+        try:
+            model = read_model_description(str(folder), validate=False)
+        except Exception:
+            if not _mended(folder / "modelDescription.xml"):
+                raise
+            model = read_model_description(str(folder), validate=False)
     except Exception as error:
         line = " ".join(str(error).split())
         raise BadInput(f"{path}: its modelDescription.xml cannot be read ({line[:200]})") from error
@@ -165,6 +171,24 @@ def _reduced(model: Any) -> FmuDescription:
         },
         unused=unused,
     )
+
+
+def _mended(file: Path) -> bool:
+    """Call parameters of an unpacked description fixed that say nothing of their variability.
+
+    Without a word they count as continuous, which no parameter may be; PythonFMU writes them so by default.
+    """
+    tree = ElementTree.parse(file)
+    silent = [
+        v
+        for v in tree.iter("ScalarVariable")
+        if v.get("causality") == "parameter" and v.get("variability") is None
+    ]
+    for v in silent:
+        v.set("variability", "fixed")
+    if silent:
+        tree.write(file, encoding="UTF-8", xml_declaration=True)
+    return bool(silent)
 
 
 def _unused(v: Any) -> str:

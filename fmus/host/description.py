@@ -25,12 +25,22 @@ class FmuVariable:
 
 @dataclass(frozen=True)
 class PortNames:
-    """A location by an FMU's variables: its name, force input, and the outputs conjugate to it."""
+    """A location by an FMU's variables: its name, force input, and the outputs conjugate to it.
+
+    displacement: None if no output gives it; then no law over a displacement can act there.
+    velocity_unit: said where the FMU states none; it tells whether the port turns.
+    """
 
     name: str
     force: str
     velocity: str
-    displacement: str
+    displacement: str | None
+    velocity_unit: str | None = None
+
+    @property
+    def motion(self) -> tuple[str, str]:
+        """Outputs for displacement and velocity; without a displacement the velocity fills its place."""
+        return self.displacement or self.velocity, self.velocity
 
 
 @dataclass(frozen=True)

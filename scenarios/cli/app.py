@@ -13,7 +13,7 @@ from pkgutil import iter_modules
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import app, said
+from scenarios.cli.console import NOTICES, app, said, say_notices
 from scenarios.cli.supervision import INTERRUPTED, supervised
 
 FOLDER = Path(__file__).parent
@@ -71,9 +71,12 @@ def run_safely(arguments: Sequence[str]) -> int:
     """Run a command line; errors in the input become one line and exit code 2."""
     INTERRUPTED.told = False
     try:
+        NOTICES.clear()
         code = loaded(arguments)(list(arguments), standalone_mode=False)
         if code == 130 and not INTERRUPTED.told:  # typer made an exit code of the exception
             return _interrupted()
+        if code != 130:
+            say_notices()
         return code if isinstance(code, int) else 0
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read

@@ -1,13 +1,28 @@
 """`railfmi close-loop`: find the effect that a model lacks, from one experiment or several."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fmus import limits
-from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, interrupted, said
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    interrupted,
+    said,
+    show,
+    will_write,
+)
 from scenarios.cli.supervision import INTERRUPTED
+
+if TYPE_CHECKING:
+    from fmus.host.apart.isolation import Isolation
 
 RESUME = "run the same command with --resume to continue from here"
 
@@ -15,12 +30,16 @@ RESUME = "run the same command with --resume to continue from here"
 @app.command("close-loop")
 def close_loop(
     experiments: Annotated[list[Path], typer.Argument(help="experiment.toml, or its folder; or several")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "close-loop",
     data: Annotated[Path | None, typer.Option(help="folder of the data files, if elsewhere")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; one per core by default")] = None,
     seed: Annotated[int, typer.Option(help="seed of the random numbers")] = 0,
     resume: Annotated[
         bool, typer.Option("--resume", help="continue from the checkpoints of an interrupted run")
+    ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="only show the mapping, a first simulation, and the expected time"),
     ] = False,
     trust_fmu: Trust = False,
     call_limit: CallLimit = limits.CALL,
@@ -33,18 +52,22 @@ def close_loop(
     tested on the other records and fitted to all of them. Ctrl-C keeps the experiments that are finished.
     """
     from fmus.host.apart.isolation import FmuEnded, Isolation
+
+    isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
+    if dry_run:
+        _try(experiments, out, data, jobs, isolation)
+        return
     from fmus.host.fmu import FmuError
     from scenarios.closing.lines import lines_of, table_of
 
-    isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
-
+    will_write(out)
     if len(experiments) == 1:
         from scenarios.closing.closing import STAGES
         from scenarios.closing.closing import close_loop as run
 
         try:
             with said.status("reading the experiment") as status:
-                result = run(experiments[0], out, data, status.update, jobs, seed, resume, isolation)
+                result = run(experiments[0], out, data, status.update, jobs, seed, resume, isolation, show)
         except KeyboardInterrupt:
             raise interrupted(RESUME) from None
         except FmuError as error:
@@ -71,6 +94,7 @@ def close_loop(
             seed,
             resume,
             isolation,
+            show,
         )
     if found.results:
         for line in table_of(found):
@@ -81,3 +105,17 @@ def close_loop(
             f"{len(found.results)} of {len(experiments)} experiments are finished; "
             "the same command with --resume goes on from here"
         )
+
+
+def _try(
+    experiments: list[Path], out: Path, data: Path | None, jobs: int | None, isolation: "Isolation | None"
+) -> None:
+    """Show for each experiment what a run would do."""
+    from scenarios.preparing.trial import dry_run as tried
+
+    for experiment in experiments:
+        with said.status("simulating the record once"):
+            folder = out if len(experiments) == 1 else out / experiment.stem
+            trial = tried(experiment, folder, data, jobs, isolation)
+        for line in trial.lines():
+            typer.echo(line)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, app, said
+from scenarios.cli.console import RESULTS, CallLimit, MemoryLimit, Out, RunLimit, app, said, will_write
 
 
 @app.command()
@@ -16,7 +16,7 @@ def compare(
     experiment: Annotated[
         Path, typer.Argument(help="experiment.toml with the inputs and parameters for both FMUs")
     ],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "compare",
     tolerance: Annotated[float, typer.Option(help="relative difference that is accepted")] = 1e-9,
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
@@ -30,7 +30,7 @@ def compare(
     from scenarios.comparing.comparing import compare as side_by_side
 
     isolation = Isolation(call_limit, run_limit, memory_limit)
-
+    will_write(out)
     with said.status("reading the experiment") as status:
         found = side_by_side(a, b, experiment, out, tolerance, data, status.update, isolation)
     for line in found.lines():

@@ -10,7 +10,7 @@ from typing import Annotated, TypeVar
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 Item = TypeVar("Item")
 SIDES = "; given twice (or as LEFT,RIGHT), first the left, then the right one"
@@ -44,7 +44,7 @@ def conicity(
     smoothing: Annotated[
         float | None, typer.Option(help="noise of point files, m rms, by default found from the data")
     ] = None,
-    out: Out = Path("out"),
+    out: Out = RESULTS / "conicity",
 ) -> None:
     """Find where a pair touches, its radius difference and its conicity; write a page, JSON and CSV."""
     from scenarios.conicity.evaluating import Request, evaluated
@@ -60,6 +60,7 @@ def conicity(
         gauge, back_to_back, roll, search, smoothing,
     )  # fmt: skip
     amplitudes = None if not amplitude else [_number("--amplitude", text) for text in _split(amplitude)]
+    will_write(out)
     with said.status("searching for the contact"):
         found = evaluated(request, amplitudes)
         folder = writable(out)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 
 @app.command("conicity-norm")
@@ -33,7 +33,7 @@ def conicity_norm(
         typer.Option(help="FILE.py:FUNCTION that makes a profile of a path and a kind, by default our own"),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the errors")] = 1,
-    out: Out = Path("out"),
+    out: Out = RESULTS / "conicity-norm",
 ) -> None:
     """Test the calculation, and the reading of points, by EN 15302; exit 1 if a conicity is outside."""
     from scenarios.conicity.norm.measuring import Instrument, reader_of
@@ -44,6 +44,7 @@ def conicity_norm(
 
     pairs = references(pair)
     instrument = Instrument(reader_of(reader, smoothing), random, grid, spacing, seed)
+    will_write(out)
     folder = writable(out)
     with said.status("step 1") as status:
         exact = [step_1(one, reference) for one in pairs]

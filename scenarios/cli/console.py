@@ -1,5 +1,6 @@
 """Parts shared by all commands: the application, the console for progress, common options."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +9,7 @@ import typer
 from rich.console import Console
 
 from scenarios.cli.supervision import INTERRUPTED
+from scenarios.output import replaced
 
 app = typer.Typer(
     name="railfmi", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
@@ -50,3 +52,24 @@ MemoryLimit = Annotated[float, typer.Option(min=0.1, help="GB of memory that for
 
 
 Out = Annotated[Path, typer.Option("--out", help="folder to write to", file_okay=False)]
+RESULTS = Path("out")  # of each command a folder in it, so that none replaces the results of another
+
+
+NOTICES: list[str] = []  # said when a command has done its work; wrong input gets its one line alone
+
+
+def will_write(folder: Path) -> None:
+    """Have it said at the end of a command that it has replaced earlier results."""
+    NOTICES.extend(filter(None, [replaced(folder)]))
+
+
+def say_notices() -> None:
+    """Print what is to be said at the end of a command."""
+    while NOTICES:
+        said.print(f"railfmi: {NOTICES.pop(0)}", markup=False, soft_wrap=True)
+
+
+def show(lines: Sequence[str]) -> None:
+    """Print lines that stay, above the progress."""
+    for line in lines:
+        said.print(line, markup=False, soft_wrap=True)

@@ -6,13 +6,24 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, said
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    said,
+    show,
+    will_write,
+)
 
 
 @app.command()
 def estimate(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "estimate",
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
@@ -26,21 +37,11 @@ def estimate(
     from scenarios.estimating.estimating import estimate as filtered
 
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
-
+    will_write(out)
     with said.status("reading the experiment") as status:
-        result = filtered(experiment, out, data, tell=status.update, isolation=isolation)
-    for name, found in result.estimated.items():
-        spread, unit = found["std_error"], found["unit"] or ""
-        bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
-        typer.echo(f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound)
-    if result.doubt:
-        typer.echo(result.doubt)
-    for alarm in result.alarms:
-        end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
-        likely = f"probability {alarm.probability:.3f}"
-        typer.echo(f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, {likely}")
-    if result.diverged:
-        typer.echo(f"diverged: {result.reason}")
+        result = filtered(experiment, out, data, tell=status.update, isolation=isolation, show=show)
+    for line in result.lines():
+        typer.echo(line)
     typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
     if not result.consistent:
         raise typer.Exit(1)

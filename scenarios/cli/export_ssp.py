@@ -6,13 +6,14 @@ from typing import Annotated
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import app, said
+from scenarios.cli.console import RESULTS, app, said
 
 
 @app.command("export-ssp")
 def export_scenario(
     scenario: Annotated[Path, typer.Argument(help="scenario file")],
-    out: Annotated[Path, typer.Option("--out", help="folder, or a file ending in .ssp")] = Path("out"),
+    out: Annotated[Path, typer.Option("--out", help="folder, or a file ending in .ssp")] = RESULTS
+    / "export-ssp",
     kind: Annotated[str, typer.Option(help="kind of FMUs: native or python")] = "native",
     variant: Annotated[str | None, typer.Option(help="variant of the scenario, by default the first")] = None,
     fmi: Annotated[int, typer.Option(help="FMI version, 2 or 3; 3 is native")] = 2,

@@ -5,12 +5,12 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said
 
 
 @app.command("import-ssp")
 def import_package(
-    package: Annotated[Path, typer.Argument(help="SSP package (.ssp)")], out: Out = Path("out")
+    package: Annotated[Path, typer.Argument(help="SSP package (.ssp)")], out: Out = RESULTS / "import-ssp"
 ) -> None:
     """Read an SSP package and write a scenario folder for `railfmi run`."""
     from scenarios.exchange import import_ssp

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
 
 
 @app.command()
 def plan(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or its folder")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "plan",
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
@@ -23,8 +23,9 @@ def plan(
     from scenarios.planning.planning import plan as planned
     from scenarios.planning.result import table_of
 
+    will_write(out)
     with said.status("reading the experiment") as status:
-        result = planned(experiment, out, data, status.update)
+        result = planned(experiment, out, data, status.update, show)
     for line in table_of(result):
         typer.echo(line)
     typer.echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")

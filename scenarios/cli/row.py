@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 
 @app.command("row")
@@ -20,7 +20,7 @@ def rebuild(
         ),
     ] = None,
     case: Annotated[list[str] | None, typer.Option(help="case of the row, by default all")] = None,
-    out: Out = Path("out"),
+    out: Out = RESULTS / "row",
 ) -> None:
     """Repeat an estimate of the literature; exit 1 if a target is not met. Without a name, list all rows."""
     from scenarios.literature import ROWS, run_row
@@ -29,6 +29,7 @@ def rebuild(
         for row in ROWS.values():
             typer.echo(f"{row.name:<22} {row.title} ({row.source})")
         return
+    will_write(out)
     outcome = run_row(name, out, records, cases=case, tell=lambda line: said.print(line, markup=False))
     for found in outcome.missed:
         typer.echo(f"not met: {found.case}: {found.what} = {found.ours:.4g}, target {found.wanted}")

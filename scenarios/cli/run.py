@@ -6,13 +6,24 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import CallLimit, MemoryLimit, Out, RunLimit, Trust, app, interrupted, said
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    interrupted,
+    said,
+    will_write,
+)
 
 
 @app.command("run")
 def run_scenarios(
     scenarios: Annotated[list[Path], typer.Argument(help="scenario files; several get a contact sheet")],
-    out: Out = Path("out"),
+    out: Out = RESULTS / "run",
     watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
     trust_fmu: Trust = False,
     call_limit: CallLimit = limits.CALL,
@@ -35,6 +46,7 @@ def run_scenarios(
         for finding in result.failed:
             typer.echo(f"  not met: {finding.sentence}; {finding.because}")
 
+    will_write(out)
     with said.status("reading the scenarios") as status:
         isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
         results = run_all(scenarios, out, status.update if watch else (lambda _: None), done, isolation)

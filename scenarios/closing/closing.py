@@ -4,11 +4,13 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
 from math import isfinite
 from pathlib import Path
 
+import pandas as pd
 from joblib import cpu_count
 
 from estimator.closeloop.checkpoints import Stages
@@ -28,7 +30,9 @@ from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
 from fmus.host.grading.honest import check_honest
 from scenarios.closing.result import Result, result_of
+from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment, load_experiment
+from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
 from scenarios.output import writable, written_at_once
 
@@ -42,7 +46,7 @@ STAGES = ".stages"  # folder of the checkpoints, kept when a run is interrupted
 
 
 def close_loop(
-    experiment: str | Path,
+    experiment: Given,
     out: str | Path | None = None,
     data_dir: str | Path | None = None,
     tell: Tell = lambda _: None,
@@ -50,22 +54,27 @@ def close_loop(
     seed: int = 0,
     resume: bool = False,
     isolation: Isolation | None = ISOLATED,
+    show: Show = lambda _: None,
+    data: pd.DataFrame | None = None,
 ) -> Result:
     """Run `railfmi close-loop` and return the result that is written as result.json.
 
-    experiment: path of an experiment.toml, or of its folder.
+    experiment: path of an experiment.toml, or of its folder; or its content as a dictionary or an object.
     out: folder for result.json, report.html, the figures and the augmented FMU; None writes nothing.
     data_dir: folder of the data files, by default the folder of the experiment.
     jobs: number of processes, by default one per core.
     seed: seed of the random numbers.
     resume: continue from the checkpoints that an interrupted run left in `out`.
     isolation: limits of the processes in which a foreign FMU runs; None runs it in this process.
+    show: gets the table of conversions as lines, before anything is simulated.
+    data: the record, in place of the data file; units by column in data.attrs["units"].
     Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit.
     """
     begun = time.monotonic()
-    declared = experiment_of(experiment, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
+        declared = with_test_part(given(experiment, data_dir, data, Path(work)))
         posed = Posed.of(declared, Path(work), isolation)
+        show(conversion_lines(posed.problem.record))
         folder = None if out is None else writable(Path(out))
         stages = stages_of(declared, folder, seed, resume)
         result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]
@@ -93,7 +102,11 @@ class Posed:
 def experiment_of(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
     """Read the experiment in a file or folder; raises BadInput also if it declares no test part."""
     where = Path(path)
-    declared = load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir)
+    return with_test_part(load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir))
+
+
+def with_test_part(declared: Experiment) -> Experiment:
+    """The experiment; raises BadInput if it declares no test part."""
     if declared.split is None:
         raise BadInput(
             f"{declared.file}: key 'split' is missing; close-loop needs it to set a test part apart"
@@ -108,8 +121,9 @@ def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> St
     """
     if folder is None:
         return Stages()
-    files = [e.file, *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
-    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files)]
+    files = [*([e.file] if e.file.is_file() else []), *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
+    said = [] if e.file.is_file() else [sha256(repr(dict(e)).encode()).hexdigest()]
+    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files), *said]
     stages = Stages(folder / STAGES, " ".join(key))
     if not resume:
         stages.forget()
@@ -154,7 +168,10 @@ def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATE
         return ModelBuilder(e.model, work)
     if e.fmu_path is None:
         raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
-    ports = tuple(PortNames(p.name, p.force, p.velocity, p.displacement) for p in e.ports)
+    units = {name: output.model_unit for name, output in e.outputs.items()}
+    ports = tuple(
+        PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity)) for p in e.ports
+    )
     return ForeignBuilder(e.fmu_path, ports, work, isolation_of(e.fmu_path, isolation))
 
 

@@ -1,6 +1,6 @@
 """The result of close-loop as lines for the command line."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from scenarios.closing.result import Result
 from scenarios.closing.several_results import (
@@ -9,6 +9,7 @@ from scenarios.closing.several_results import (
     Results,
     effect_text,
 )
+from scenarios.drawing.typography import aligned
 
 SHOWN = ("experiment", "verdict", "gap closed", "output", "before", "after", "noise", "seconds", "effects")
 
@@ -47,12 +48,6 @@ def table_of(found: Results) -> Iterator[str]:
             yield f"  {_carried(c)}"
     for j in found.joint:
         yield from _joint(j)
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of cells as lines with aligned columns."""
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def _carried(c: Carried) -> str:

@@ -4,9 +4,10 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
@@ -23,6 +24,10 @@ from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.host.archive import describe
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Figure = list[float]  # value and standard error
 
@@ -45,8 +50,8 @@ class Alternative:
     score: float
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Shown):
     """The result of close-loop, one field for each key of result.json.
 
     decision: the checks that lead to the verdict, in order, each with its value and limit.
@@ -81,6 +86,25 @@ class Result:
     free_form: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     start_values: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def lines(self) -> list[str]:
+        """See Shown.lines."""
+        from scenarios.closing.lines import lines_of  # which imports this module
+
+        return [*lines_of(self)]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Error of each output on the test part, in the FMU's units: a row each, a column each model."""
+        return pd.DataFrame(self.error).T.rename_axis("output")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Errors before and after over the noise, as bars for each output."""
+        table = self.to_frame()
+        ratios = table[["before", "after"]].div(table["noise"], axis=0)
+        drawn: Axes = ratios.plot.bar(ax=axes_or_new(ax), logy=True, rot=0)
+        drawn.axhline(1.0, color="0.5", linewidth=0.8)
+        drawn.set(ylabel="error over noise", title=f"{self.experiment}: {self.verdict}")
+        return drawn
 
     def write(self, path: Path) -> None:
         """Write the result as JSON; an interrupted write leaves no partial file."""
@@ -179,7 +203,7 @@ def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
             table[name] = {"how": "not seen", "value": known[name].start}
     if isinstance(problem.builder, ForeignBuilder):  # outputs of our models follow from states
         own = describe(problem.builder.fmu).variables
-        at_ports = [name for port in problem.ports for name in (port.displacement, port.velocity)]
+        at_ports = [name for port in problem.ports for name in port.motion]
         for name in dict.fromkeys([*problem.record.outputs, *at_ports]):
             if name not in (*problem.free_states, *problem.declared):
                 how = "not settable" if own[name].initial == "calculated" else "not exact"

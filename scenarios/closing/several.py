@@ -34,6 +34,7 @@ from scenarios.closing.several_results import (
     joint,
     together,
 )
+from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment
 from scenarios.output import writable
 
@@ -51,6 +52,7 @@ def close_loops(
     seed: int = 0,
     resume: bool = False,
     isolation: Isolation | None = ISOLATED,
+    show: Show = lambda _: None,
 ) -> Results:
     """Run `railfmi close-loop` on several experiments; see close_loop for a single one.
 
@@ -65,6 +67,8 @@ def close_loops(
     _check_ids(declared)
     with tempfile.TemporaryDirectory(prefix="railfmi_loops_") as work:
         posed = [_posed(e, Path(work) / f"{i}", isolation) for i, e in enumerate(declared)]
+        for p in posed:
+            show([f"{p.declared.id}:", *conversion_lines(p.problem.record)])
         campaign = _Campaign(posed, None if out is None else writable(Path(out)), jobs or cpu_count())
         try:
             campaign.run(tell, done, seed, resume)

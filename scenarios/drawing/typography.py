@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Sequence
 
 from markupsafe import Markup, escape
 
@@ -63,6 +64,12 @@ def quantity(text: str, of: str | None) -> str:
 def label(text: str, of: str | None) -> str:
     """A quantity with its unit, for axes and heads of tables: "F in N·m"."""
     return f"{text} in {unit(of)}" if unit(of) else text
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells as lines of plain text with aligned columns."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def capital(text: str) -> str:

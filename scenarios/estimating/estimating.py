@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from estimator.filters.consistency import checks
 from estimator.record import Array
@@ -36,46 +37,54 @@ from scenarios.estimating.result import (
     write_csv,
 )
 from scenarios.estimating.setup import set_up
+from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.declaration import Options
-from scenarios.experiment.experiment import Experiment, load_experiment
+from scenarios.experiment.experiment import Experiment
+from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
 from scenarios.output import writable, written_at_once
 
 
 def estimate(
-    experiment: str | Path,
+    experiment: Given,
     out: str | Path | None = None,
     data_dir: str | Path | None = None,
     tell: Tell = lambda _: None,
     options: Options | None = None,
     truth: Mapping[str, tuple[Array, Array]] | None = None,
     isolation: Isolation | None = ISOLATED,
+    show: Show = lambda _: None,
+    data: pd.DataFrame | None = None,
 ) -> EstimateResult:
     """Run `railfmi estimate` and return the result that is written as result.json.
 
-    experiment: path of an experiment.toml, or of its folder.
+    experiment: path of an experiment.toml, or of its folder; or its content as a dictionary or an object.
     out: folder for estimate.csv, result.json, estimate.html and its figures; None writes nothing.
     data_dir: folder of the data files, by default the folder of the experiment.
     options: replace the options of the experiment.
     truth: true values by name as (times, values), for errors and figures.
     isolation: limits of the process in which a foreign FMU runs; None runs it in this process.
+    show: gets the table of conversions as lines, before anything is estimated.
+    data: the record, in place of the data file; units by column in data.attrs["units"].
     Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit. If the
     filter diverges, the result contains the estimates up to that time, and `diverged` and `reason` are set.
     """
     begun = time.monotonic()
-    path = Path(experiment)
-    e = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
-    if e.estimate is None:
-        raise BadInput(f"{e.file}: has no [estimate]; list there the parameters, states or inputs to find")
-    chosen = options or e.estimate.options
-    folder = None if out is None else writable(Path(out))
     with tempfile.TemporaryDirectory(prefix="railfmi_estimate_") as work, closing_rooms():
+        e = given(experiment, data_dir, data, Path(work))
+        if e.estimate is None:
+            raise BadInput(
+                f"{e.file}: has no [estimate]; list there the parameters, states or inputs to find"
+            )
+        chosen = options or e.estimate.options
+        folder = None if out is None else writable(Path(out))
         tell("opening the FMU and the record")
         fmu = fmu_of(e, Path(work))
         if e.model is None:
             check_honest(fmu, isolation or ISOLATED)
         with Archive(fmu, isolation_of(fmu, isolation) if e.model is None else None) as archive:
             record = load_record(e, archive.description, missing=True)
+            show(conversion_lines(record))
             setup = set_up(e, chosen, record, archive)
             found = find(setup, archive, tell)
             try:

@@ -1,11 +1,13 @@
 """The result of estimate, as it is written to result.json and estimate.csv."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from scipy.stats import norm
 
 from estimator.filters.consistency import (
@@ -22,6 +24,10 @@ from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.aside import blocks, let_go
 from scenarios.experiment.declaration import Alarm, Options
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BAND = 1.959964  # half width of the 95 % band in standard deviations
 CLEAR = 0.5  # probability below which an alarm ends
@@ -38,8 +44,8 @@ class Raised:
     probability: float  # the highest in the interval
 
 
-@dataclass(frozen=True)
-class EstimateResult:
+@dataclass(frozen=True, repr=False)
+class EstimateResult(Shown):
     """The result of estimate.
 
     estimated: by name, the kind, value, standard error, 95 % band and further properties of each quantity.
@@ -75,6 +81,42 @@ class EstimateResult:
     def doubt(self) -> str:
         """A sentence on failed consistency tests and the standard errors; empty if all tests pass."""
         return "" if self.consistent or self.diverged else doubt(self.checks)
+
+    def lines(self) -> list[str]:
+        """See Shown.lines."""
+        return [*self._lines()]
+
+    def _lines(self) -> Iterator[str]:
+        for name, found in self.estimated.items():
+            spread, unit = found["std_error"], found["unit"] or ""
+            bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
+            yield f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound
+        if self.doubt:
+            yield self.doubt
+        for alarm in self.alarms:
+            end = "to the end" if alarm.end is None else f"to {alarm.end:g} s"
+            likely = f"probability {alarm.probability:.3f}"
+            yield f"alarm: {alarm.name} {alarm.limit} from {alarm.begin:g} s {end}, {likely}"
+        if self.diverged:
+            yield f"diverged: {self.reason}"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Each estimated quantity with its value, standard error and 95 % band, in the FMU's units."""
+        columns = ["kind", "value", "std_error", "unit", "low_95", "high_95", "consistent"]
+        rows = {
+            name: [e["kind"], e["value"], e["std_error"], e["unit"], *e["band_95"], self.consistent]
+            for name, e in self.estimated.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index", columns=columns).rename_axis("quantity")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """The standard error of each quantity, as a share of its value."""
+        table = self.to_frame()
+        drawn = axes_or_new(ax)
+        drawn.barh(table.index.to_list(), (table["std_error"] / table["value"].abs()).to_numpy())
+        word = "" if self.consistent else ", not consistent with the record"
+        drawn.set(xlabel="standard error over value", xscale="log", title=f"{self.experiment}{word}")
+        return drawn
 
     def write(self, path: Path) -> None:
         """Write the result as JSON."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
 
@@ -128,12 +128,15 @@ class Derived(Table):
 
 
 class Port(Table):
-    """A location on a foreign FMU: a force input and the outputs conjugate to it."""
+    """A location on a foreign FMU: a force input and the outputs conjugate to it.
+
+    Without a displacement, only laws over velocity and time are tried there.
+    """
 
     name: str
     force: str
     velocity: str
-    displacement: str
+    displacement: str | None = None
 
 
 class EstimatedParameter(Table):
@@ -210,6 +213,21 @@ class Estimate(Table):
     options: Options = Options()
 
 
+class DataFile(Table):
+    """`[data]`: the file, and options of the library that reads its format (of pandas.read_csv for CSV)."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    file: str | None = None
+
+
+def _data(value: object) -> str | DataFile:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, dict):
+        return DataFile.model_validate(value)
+    raise ValueError(f"must be a file name in quotes, or a table {{file = ..., option = ...}}, not {value!r}")
+
+
 class Plan(Table):
     """What `plan` assumes of a record that is not taken yet.
 
@@ -232,8 +250,9 @@ class Declaration(Table):
     id: str
     model: str | None = None
     fmu: str | None = None
-    data: str | None = None
+    data: Annotated[str | DataFile, PlainValidator(_data)] | None = None
     time: str
+    time_unit: str | None = None
     split: Split | None = None
     parameters: dict[str, Number] = {}
     calibrate: dict[str, Interval] = {}
@@ -244,6 +263,16 @@ class Declaration(Table):
     ports: tuple[Port, ...] = ()
     estimate: Estimate | None = None
     plan: Plan = Plan()
+
+    @property
+    def data_file(self) -> str | None:
+        """The one data file, if it is named."""
+        return self.data.file if isinstance(self.data, DataFile) else self.data
+
+    @property
+    def data_options(self) -> dict[str, Any]:
+        """Options of the library that reads the data, by name."""
+        return dict(self.data.model_extra or {}) if isinstance(self.data, DataFile) else {}
 
     @property
     def input_columns(self) -> dict[str, InputColumn]:
@@ -270,9 +299,9 @@ def _contradictions(d: Declaration) -> Iterator[str]:
     if d.ports and d.model:
         yield "[[ports]] are for a foreign 'fmu' only; our own models have theirs"
     files = set(d.split.files.values()) if d.split else set()
-    if not files and d.data is None:
-        yield "key 'data' is missing"
-    if files and d.data is not None and d.data not in files:
+    if not files and d.data_file is None:
+        yield "key 'data' is missing" if d.data is None else "[data] has no key 'file'; name the data file"
+    if files and d.data_file is not None and d.data_file not in files:
         yield "key 'data' beside [split] identify_data and test_data; leave one of the two out"
     made: set[str] = set()
     for name, derived in d.derived.items():

@@ -35,7 +35,7 @@ class Experiment(Declaration):
         """One file, or one for each part of the split: to identify, to choose if it is given, to test."""
         if self.split and self.split.files:
             return tuple(self.data_dir / file for file in self.split.files.values())
-        return (self.data_dir / (self.data or ""),)
+        return (self.data_dir / (self.data_file or ""),)
 
 
 def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
@@ -45,11 +45,16 @@ def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Exp
     """
     file = Path(path).absolute()  # an FMU may change the working directory
     declared = read_file(Declaration, file, "an experiment.toml")
+    return placed(declared, file, data_dir)
+
+
+def placed(declared: Declaration, file: Path, data_dir: str | Path | None = None) -> Experiment:
+    """A declaration as the experiment of a file, which need not exist; data_dir: see load_experiment."""
     if declared.model is not None:
         _check_model(file, declared.model)
-    data = file.parent if data_dir is None else Path(data_dir).absolute()
-    place: dict[str, Any] = {"file": file, "data_dir": data}
-    return Experiment.model_construct(**dict(declared), **place)
+    data = file.parent if data_dir is None else Path(data_dir)
+    place: dict[str, Any] = {"file": file, "data_dir": data.absolute()}
+    return Experiment.model_construct(**{**dict(declared), **place})
 
 
 def _check_model(file: Path, name: str) -> None:
@@ -94,7 +99,8 @@ def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
     yield "[plan.sensors]", e.plan.sensors, fmu.outputs, "an output"
     for port in e.ports:
         yield f"[[ports]] '{port.name}' force", [port.force], fmu.inputs, "an input"
-        yield f"[[ports]] '{port.name}'", [port.velocity, port.displacement], fmu.outputs, "an output"
+        motion = [name for name in (port.velocity, port.displacement) if name]
+        yield f"[[ports]] '{port.name}'", motion, fmu.outputs, "an output"
     if e.estimate:
         yield "[estimate] states", e.estimate.states, states, "a state whose start can be set"
         yield "[estimate.parameters]", e.estimate.parameters, fmu.parameters, "a parameter"

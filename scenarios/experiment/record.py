@@ -1,6 +1,6 @@
 """Measured data: from the files of an experiment to a checked Record in the FMU's units."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +9,7 @@ import numpy as np
 from estimator.record import (
     Array,
     BoolArray,
+    Conversion,
     Note,
     Record,
     Run,
@@ -24,13 +25,10 @@ from scenarios.experiment.checks import (
     time_notes,
 )
 from scenarios.experiment.experiment import Experiment, check_names
+from scenarios.experiment.parts import MIN_SAMPLES, masks
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.units import SAME, StatedUnits
 
-CHOOSE = 0.2  # share of the identify part that becomes the part to choose, if none is declared
-PIECES = 5  # number of pieces in which these samples lie
-GRID = 15  # samples; pieces begin at multiples of it, so that screening can average 3 or 5 samples
-MIN_SAMPLES = 50  # samples in each part; with fewer, an error is within its own scatter
 LARGEST = 1e100  # of a measured number
 MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
 
@@ -38,17 +36,20 @@ MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
 def load_record(experiment: Experiment, description: FmuDescription, missing: bool = False) -> Record:
     """The measured inputs and outputs of an experiment in the FMU's units, checked.
 
-    Without [split], all samples are fitted and there is no test part. missing: whether cells of outputs may
-    be empty; they become nan. Raises BadInput if names, units or data forbid the use; other oddities are
+    Without [split], all samples are fitted and there is no test part. missing: whether empty cells of
+    outputs become nan; otherwise their samples belong to no part of the record, and values between the
+    neighbours stand in for them. Raises BadInput if names, units or data forbid the use; other oddities are
     listed in the notes.
     """
     check_names(experiment, description)
-    scale, notes = _conversions(experiment, description)
+    conversions, notes = _conversions(experiment, description)
+    scale = np.array([(c.factor, c.offset) for c in conversions]).reshape(-1, 2)
     runs = []
     for part, file in enumerate(experiment.data_files):
-        run, found = _run(experiment, description, part, file, scale, missing)
+        run, found, inputs = _run(experiment, description, part, file, scale, missing)
         runs.append(run)
         notes += found
+        conversions += inputs if not part else []
     std = [output.noise_std or np.nan for output in experiment.outputs.values()]
     return Record(
         runs=tuple(runs),
@@ -56,6 +57,7 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
         outputs=tuple(experiment.outputs),
         noise_std=np.array(std) * np.abs(scale[:, 0]),
         notes=tuple(notes),
+        conversions=tuple(conversions),
     )
 
 
@@ -65,7 +67,7 @@ def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
     Without [split], all samples belong to the part to identify. The noise is that of the declared outputs.
     """
     check_names(experiment, description)
-    scale, _ = _conversions(experiment, description)
+    conversions, _ = _conversions(experiment, description)
     needed = {c.column for c in experiment.input_columns.values()}
     for name, made in reversed(experiment.derived.items()):
         if name in needed:
@@ -73,61 +75,78 @@ def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
     derived = {name: made for name, made in experiment.derived.items() if name in needed}
     inputs_alone = experiment.model_copy(update={"outputs": {}, "derived": derived})
     record = load_record(inputs_alone, description)
-    std = [output.noise_std or np.nan for output in experiment.outputs.values()]
-    return replace(record, outputs=tuple(experiment.outputs), noise_std=np.array(std) * np.abs(scale[:, 0]))
+    std = [
+        (output.noise_std or np.nan) * abs(c.factor)
+        for output, c in zip(experiment.outputs.values(), conversions, strict=True)
+    ]
+    return replace(
+        record,
+        outputs=tuple(experiment.outputs),
+        noise_std=np.array(std),
+        conversions=(*conversions, *record.conversions),
+    )
 
 
-def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[Array, list[Note]]:
-    """Factor and offset of each output's column, (n_y, 2), and notes on conversions."""
-    scale, notes = [], []
+def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[list[Conversion], list[Note]]:
+    """The conversion of each output's column, and notes on those that change a number."""
+    found, notes = list[Conversion](), []
     for name, output in e.outputs.items():
         where, variable = f"{e.file}: [outputs.{name}]", f"'{name}' of {fmu.name}"
         unit = model_unit(fmu.variables[name].unit, output.model_unit, variable, where)
-        scale.append(column_conversion(output.unit, unit, variable, where))
-        if scale[-1] != SAME:
+        scale = column_conversion(output.unit, unit, variable, where)
+        found.append(Conversion(name, output.column, output.unit, unit, *scale))
+        if scale != SAME:
             said = f"column '{output.column}' is converted from {output.unit} to {unit}"
             notes.append(Note("unit", output.column, said))
-    return np.array(scale).reshape(-1, 2), notes
+    return found, notes
 
 
 def _run(
     e: Experiment, fmu: FmuDescription, part: int, file: Path, scale: Array, missing: bool
-) -> tuple[Run, list[Note]]:
-    """One file as a run with its notes, from its start to the last sample of the split."""
+) -> tuple[Run, list[Note], list[Conversion]]:
+    """One file as a run with its notes, from its start to the last sample of the split.
+
+    The last item holds the conversions of the inputs.
+    """
     data, stated = _read(e, file)
-    fit, choose, test = _masks(e, part, file, data[e.time])
-    used = slice(int(np.flatnonzero(fit | choose | test)[-1]) + 1)
+    chosen = masks(e, part, file, data[e.time])
+    used = slice(int(np.flatnonzero(np.any(chosen, axis=0))[-1]) + 1)
     data = {column: values[used] for column, values in data.items()}
+    fit, choose, test = (mask[used] for mask in chosen)
     t = data[e.time]
-    notes = _checked(e, file, data, missing)
+    notes = _checked(e, file, data)
+    if not missing:
+        there = _filled(e, data)
+        fit, choose, test = fit & there, choose & there, test & there
+        notes += _left_out(file, there, (fit, choose, test))
     for name, derived in e.derived.items():
         data[name] = _derivative(t, data[derived.derivative])
     given = dict[str, Array | float](e.input_constants)
-    for name, channel in e.input_columns.items():
-        given[name] = _input(e, fmu, name, data[channel.column], stated)
+    converted = [_input(e, fmu, name, stated) for name in e.input_columns]
+    for c in converted:
+        given[c.variable] = data[c.column] * c.factor + c.offset
     u = np.empty((t.size, len(e.inputs)))
     for j, name in enumerate(e.inputs):
         u[:, j] = given[name]
     measured = [data[output.column] for output in e.outputs.values()]
     outputs = np.column_stack(measured) if measured else np.empty((t.size, 0))  # of an experiment planned
     y = outputs * scale[:, 0] + scale[:, 1]
-    masks = {"fit": fit[used], "choose": choose[used], "test": test[used]}
-    return Run(t=t, u=u, y=y, **masks), [*notes, *stated.notes]
+    return Run(t, u, y, fit, choose, test), [*notes, *stated.notes], converted
 
 
-def _input(e: Experiment, fmu: FmuDescription, name: str, values: Array, stated: StatedUnits) -> Array:
-    """An input in the FMU's unit (N,); unchanged if neither the experiment nor the file states its unit."""
+def _input(e: Experiment, fmu: FmuDescription, name: str, stated: StatedUnits) -> Conversion:
+    """The conversion of an input's column; none if neither the experiment nor the file states its unit."""
     channel, where, variable = e.input_columns[name], f"{e.file}: [inputs] {name}", f"'{name}' of {fmu.name}"
     column, times = _source(e, channel.column)
     target = model_unit(fmu.variables[name].unit, channel.model_unit, variable, where)
     if channel.unit is None:
-        factor, offset = stated.to(column, target, where, times)
-        return values * factor + offset
-    factor, offset = column_conversion(channel.unit, target, variable, where)
-    if (factor, offset) != SAME:
+        scale = stated.to(column, target, where, times)
+        return Conversion(name, channel.column, stated.stated(column, where, times), target, *scale)
+    scale = column_conversion(channel.unit, target, variable, where)
+    if scale != SAME:
         said = f"column '{channel.column}' is converted from {channel.unit} to {target}"
         stated.notes.append(Note("unit", channel.column, said))
-    return values * factor + offset
+    return Conversion(name, channel.column, channel.unit, target, *scale)
 
 
 def _check_units(e: Experiment, stated: StatedUnits) -> None:
@@ -141,14 +160,40 @@ def _check_units(e: Experiment, stated: StatedUnits) -> None:
         stated.check(column, times, unit, f"{e.file}: {where}")
 
 
-def _checked(e: Experiment, file: Path, data: dict[str, Array], missing: bool) -> list[Note]:
+def _filled(e: Experiment, data: dict[str, Array]) -> BoolArray:
+    """Whether every output has a number at a sample (N,); in `data`, values between neighbours fill gaps."""
+    t = data[e.time]
+    there = np.ones(t.size, dtype=np.bool_)
+    for column in dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values()):
+        known = np.isfinite(data[column])
+        data[column] = np.interp(t, t[known], data[column][known])
+        there &= known
+    return there
+
+
+def _left_out(file: Path, there: BoolArray, parts: Sequence[BoolArray]) -> list[Note]:
+    """A note on samples that are left out; BadInput if a part of the record is left with too few."""
+    missing = int((~there).sum())
+    if not missing:
+        return []
+    for mask in parts:
+        if mask.any() and mask.sum() < MIN_SAMPLES:
+            raise BadInput(
+                f"{file}: outputs have no number in {missing} of {there.size} rows, so a part of the split "
+                f"has {mask.sum()} samples; at least {MIN_SAMPLES} are needed"
+            )
+    said = f"{file.name}: outputs have no number in {missing} of {there.size} rows, which are left out"
+    return [Note("gap", "", said)]
+
+
+def _checked(e: Experiment, file: Path, data: dict[str, Array]) -> list[Note]:
     """Notes on the columns of a file, (N,) each; raises BadInput for gaps and for missing numbers."""
     t = data[e.time]
     check_gaps(str(file), t)
     measured = dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values())
     needed = {_source(e, c.column)[0] for c in e.input_columns.values()}
     for column, values in data.items():
-        may_miss = missing and column in measured and column not in needed
+        may_miss = column in measured and column not in needed
         check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
         if np.isfinite(values).sum() < MIN_MEASURED:
             raise BadInput(f"{file}: column '{column}' has almost no numbers; leave its output out")
@@ -179,68 +224,10 @@ def _source(e: Experiment, column: str) -> tuple[str, int]:
     return column, times
 
 
-def _masks(e: Experiment, part: int, file: Path, t: Array) -> tuple[BoolArray, BoolArray, BoolArray]:
-    """Identify part, part to choose and test part of the samples, t: (N,) s -> (N,) each."""
-    every, none = np.ones(t.size, dtype=np.bool_), np.zeros(t.size, dtype=np.bool_)
-    if e.split is None:
-        _check_enough(e, f"file {file}", every)
-        return every, none, none
-    if e.split.files:
-        _check_enough(e, f"file {file}", every)
-        whole = list(e.split.files)[part]
-        masks = {key: every if key == whole else none for key in ("identify", "choose", "test")}
-    else:
-        masks = {"choose": none} | _windows(e, e.split.windows, file, t)
-    if "choose" not in {**e.split.files, **e.split.windows}:
-        masks["choose"] = spread(masks["identify"])
-    return masks["identify"] & ~masks["choose"], masks["choose"], masks["test"]
-
-
-def spread(identify: BoolArray) -> BoolArray:
-    """The part to choose (N,) if none is declared: the end of each piece of the identify part.
-
-    It is spread over the record, because an effect with a late onset must be visible in both parts. The
-    pieces are few and long, so that neighbouring samples do not correlate the two parts (hold-out of blocks:
-    J. Racine, Journal of Econometrics 99 (2000), 39-61).
-    """
-    index, found = np.flatnonzero(identify), np.zeros_like(identify)
-    whole = GRID if len(index) > 20 * PIECES * GRID else 1  # else rounding would change the share
-    for piece in range(PIECES):
-        first, last = (
-            round((piece + part) * len(index) / PIECES / whole) * whole for part in (1 - CHOOSE, 1)
-        )
-        found[index[first:last]] = True
-    return found
-
-
-def _windows(
-    e: Experiment, windows: Mapping[str, tuple[float, float]], file: Path, t: Array
-) -> dict[str, BoolArray]:
-    """The samples (N,) in each window of one file; a sample on the common edge belongs to the first."""
-    step = float(np.median(np.diff(t))) if t.size > 1 else 0.0
-    masks: dict[str, BoolArray] = {}
-    for key, window in windows.items():
-        if window[0] < t[0] - step or window[1] > t[-1] + step:
-            raise BadInput(
-                f"{e.file}: [split] {key} = {list(window)} leaves the record {file.name}, which runs from "
-                f"{t[0]:.9g} to {t[-1]:.9g} s; keep it within"
-            )
-        slack = 1e-6 * step  # for times printed with few digits
-        mask = (t >= window[0] - slack) & (t <= window[1] + slack)
-        masks[key] = mask & ~np.any([*masks.values()], axis=0) if masks else mask
-        _check_enough(e, f"[split] {key} = {list(window)}", masks[key])
-    return masks
-
-
-def _check_enough(e: Experiment, where: str, mask: BoolArray) -> None:
-    if mask.sum() < MIN_SAMPLES:
-        raise BadInput(f"{e.file}: {where} holds {mask.sum()} samples; at least {MIN_SAMPLES} are needed")
-
-
 def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
     """The columns an experiment uses, (N,) each, the time in seconds and checked, and the units stated."""
     wanted = _wanted(e)
-    sheet = read_sheet(file, e.time, wanted)
+    sheet = read_sheet(file, e.time, wanted, e.data_options)
     for name in e.derived:
         if name in sheet.known:
             raise BadInput(f"{e.file}: [derived.{name}] has the name of a column of {file}; take another one")
@@ -253,7 +240,7 @@ def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
     stated = StatedUnits(sheet)
     _check_units(e, stated)
     columns = {column: sheet.numbers(column) for column in wanted if column != e.time}
-    t = stated.seconds(e.time, f"{e.file}: key 'time'")
+    t = stated.seconds(e.time, f"{e.file}: key 'time'", e.time_unit)
     check_time(str(file), e.time, t, np.arange(t.size) + sheet.first, sheet.row)
     return {e.time: t, **columns}, stated
 

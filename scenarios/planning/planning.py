@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from estimator.closeloop.planning.plan import Question
 from estimator.closeloop.planning.plan import plan as planned
@@ -15,8 +16,11 @@ from estimator.plant import PLANTS
 from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
 from scenarios.closing.closing import Builder, builder_for, problem_of
-from scenarios.experiment.experiment import Experiment, load_experiment
-from scenarios.experiment.record import load_planned, spread
+from scenarios.experiment.conversions import Show, conversion_lines
+from scenarios.experiment.experiment import Experiment
+from scenarios.experiment.given import Given, given
+from scenarios.experiment.parts import spread
+from scenarios.experiment.record import load_planned
 from scenarios.output import writable
 from scenarios.planning.result import PlanResult, result_of
 
@@ -24,23 +28,30 @@ Tell = Callable[[str], None]
 
 
 def plan(
-    experiment: str | Path,
+    experiment: Given,
     out: str | Path | None = None,
     data_dir: str | Path | None = None,
     tell: Tell = lambda _: None,
+    show: Show = lambda _: None,
+    data: pd.DataFrame | None = None,
 ) -> PlanResult:
     """Run `railfmi plan` and return the result that is written as plan.json.
 
-    experiment: path of an experiment.toml, or of its folder; only the time and the inputs of its data are
-    read. out: folder for plan.json, plan.html and the figures; None writes nothing. data_dir: folder of the
-    data files, by default the folder of the experiment. Raises BadInput if the experiment is wrong.
+    experiment: path of an experiment.toml, or of its folder; or its content as a dictionary or an object.
+    Only the time and the inputs of its data are read.
+    out: folder for plan.json, plan.html and the figures; None writes nothing.
+    data_dir: folder of the data files, by default the folder of the experiment.
+    show: gets the table of conversions as lines, before anything is simulated.
+    data: the record, in place of the data file; units by column in data.attrs["units"].
+    Raises BadInput if the experiment is wrong.
     """
-    begun, where = time.monotonic(), Path(experiment)
-    e = load_experiment(where / "experiment.toml" if where.is_dir() else where, data_dir)
-    folder = None if out is None else writable(Path(out))
+    begun = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="railfmi_plan_") as work:
+        e = given(experiment, data_dir, data, Path(work))
+        folder = None if out is None else writable(Path(out))
         try:
             question = question_of(e, builder_for(e, Path(work)))
+            show(conversion_lines(question.problem.record))
             found = planned(question, tell)
             result = result_of(e, found, time.monotonic() - begun)
             if folder is not None:

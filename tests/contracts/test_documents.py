@@ -63,7 +63,7 @@ def test_the_scoreboard_gives_the_exact_interval_of_each_count() -> None:
 
 
 def test_the_readmes_package_for_other_tools_is_written(tmp_path: Path, monkeypatch) -> None:
-    [line] = re.findall(r"^    railfmi (export-ssp .*?) +#", (ROOT / "README.md").read_text(), re.M)
+    [line] = re.findall(r"^railfmi (export-ssp .*?) +#", (ROOT / "README.md").read_text(), re.M)
     command, scenario, *options = shlex.split(line)
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(

@@ -113,7 +113,7 @@ class Tsv(Reader):
     """Rows are called by the lines of the file."""
 
     kind: ClassVar[str] = "TSV"
-    suffixes: ClassVar[tuple[str, ...]] = (".tsv",)
+    suffixes: ClassVar[tuple[str, ...]] = (".tbl",)
 
     def sheet(self, file, time, columns):
         """See Reader.sheet."""
@@ -156,8 +156,8 @@ def test_a_track_defect_gets_the_contract_tests_for_free(mine):
 
 def write(mine: Further, data: pd.DataFrame) -> None:
     """An experiment with its data as CSV, and one with them in the format of one's own."""
-    mine.write("scenarios/experiment/readers/tsv.py", TSV)
-    for suffix, separator in (("csv", ","), ("tsv", "\t")):
+    mine.write("scenarios/experiment/readers/tbl.py", TSV)
+    for suffix, separator in (("csv", ","), ("tbl", "\t")):
         data.to_csv(mine.work / f"data.{suffix}", sep=separator, index=False)
         (mine.work / f"{suffix}.toml").write_text(GOOD.replace("data.csv", f"data.{suffix}"))
 
@@ -166,7 +166,7 @@ def test_a_data_format_is_one_file(mine):
     data = pd.DataFrame(table())
     write(mine, data)
     compare = """
-a, b = load("csv"), load("tsv")
+a, b = load("csv"), load("tbl")
 print(all(np.array_equal(getattr(a, n), getattr(b, n)) for n in ("t", "u", "y", "fit", "test")), a.y.size)
 """
     assert mine.says(LOAD + compare) == f"True {2 * len(data)}"
@@ -176,20 +176,20 @@ def test_a_data_format_has_all_checks_of_the_data(mine):
     data = pd.DataFrame(table()).astype({"torque": object})
     data.loc[3, "torque"] = "off"
     write(mine, data)
-    said = mine.says(LOAD + "try:\n    load('tsv')\nexcept BadInput as error:\n    print(error)")
-    assert "data.tsv line 5: column 'torque' holds 'off', not a number" in said
+    said = mine.says(LOAD + "try:\n    load('tbl')\nexcept BadInput as error:\n    print(error)")
+    assert "data.tbl line 5: column 'torque' holds 'off', not a number" in said
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('(".tsv",)', '(".csv",)', "'.csv' is also of CSV"),
+        ('(".tbl",)', '(".csv",)', "'.csv' is also of CSV"),
         ("suffixes:", "suffices:", "has no 'suffixes'"),
     ],
 )
 def test_a_data_format_that_cannot_be_chosen_is_refused(mine, old, new, words):
-    mine.write("scenarios/experiment/readers/tsv.py", TSV.replace(old, new))
+    mine.write("scenarios/experiment/readers/tbl.py", TSV.replace(old, new))
     (mine.work / "experiment.toml").write_text(GOOD)
     said = mine.refused("estimate", "experiment.toml", "--out", "out")
     assert words in said
-    assert "Tsv of scenarios.experiment.readers.tsv" in said
+    assert "Tsv of scenarios.experiment.readers.tbl" in said

@@ -10,7 +10,7 @@ import pytest
 
 from tests.helpers.paths import ROOT
 
-PACKAGES = ("fmus", "estimator", "scenarios")  # each may import those before it
+PACKAGES = ("fmus", "estimator", "scenarios", "railfmi")  # each may import those before it
 FILES = [file for package in PACKAGES for file in sorted((ROOT / package).rglob("*.py"))]
 CLOSELOOP = ROOT / "estimator" / "closeloop"
 ROOMS = [  # of closeloop, each may import those before it

@@ -26,7 +26,10 @@ def conicity(out, *arguments):
 
 
 def test_a_pair_is_written_as_page_json_and_csv(tmp_path, capsys):
+    (tmp_path / "result.json").write_text("{}")
     assert conicity(tmp_path, "--wheel", A, "--rail", RAIL, "--gauge", 1.43516) == 0
+    printed = capsys.readouterr()
+    assert "(result.json, of 2" in printed.err.replace("\n", " ")  # the earlier one was replaced
     table = contact_table(
         A, RAIL, 0.0, 1.43516, search="rigid", roll=False, shifts=STEP * np.arange(-500, 501)
     )
@@ -44,7 +47,7 @@ def test_a_pair_is_written_as_page_json_and_csv(tmp_path, capsys):
     low, high = np.interp([2e-3, 4e-3], AMPLITUDES, expected)
     assert_allclose(result["nonlinearity_parameter"], (high - low) / 2e-3)
     at_3 = expected[AMPLITUDES.index(0.003)]
-    assert f"3 mm: {at_3:.4f}" in capsys.readouterr().out
+    assert f"3 mm: {at_3:.4f}" in printed.out
     page = (tmp_path / "conicity.html").read_text()
     assert f"Equivalent conicity {at_3:.3f} at 3 mm" in page
     assert page.count('<img src="data:image/png;base64,') == 3

@@ -92,6 +92,8 @@ def test_a_perfect_reader_passes_and_a_wrong_one_does_not(tmp_path, capsys):
     file = tmp_path / "reader.py"
     file.write_text(READERS)
     given = ("--pair", "B", "--draws", 1)
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "norm.json").write_text("{}")
     assert norm(tmp_path / "good", *given, "--reader", f"{file}:perfect") == 0
     result = json.loads((tmp_path / "good" / "norm.json").read_text())
     assert [(r["error"], r["place"]) for r in result["step2"]] == [
@@ -103,7 +105,9 @@ def test_a_perfect_reader_passes_and_a_wrong_one_does_not(tmp_path, capsys):
         # step 2 has fewer shifts, which counts where B jumps to its root
         assert row["largest"] < 0.012
     assert result["step1"][0]["inside"] is None
-    assert "step 1, B: no table" in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "step 1, B: no table" in printed.out
+    assert "(norm.json, of 2" in printed.err.replace("\n", " ")  # the earlier one was replaced
     assert norm(tmp_path / "bad", *given, "--reader", f"{file}:wrong") == 1
     rows = pd.read_csv(tmp_path / "bad" / "step2.csv")
     assert not rows["passed"][rows["place"] != "rail"].any()

@@ -1,11 +1,13 @@
 """The command plan: from an experiment whose outputs do not exist yet to the plan, its page and its table."""
 
 import json
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import chi2
 from typer.testing import CliRunner
@@ -19,15 +21,19 @@ from estimator.closeloop.planning.responses import unknowns_of
 from estimator.plant import PLANTS
 from estimator.weighting import Weighting
 from fmus.errors import BadInput
+from fmus.host.archive import describe
 from scenarios import plan
 from scenarios.cli.app import loaded, run_safely
 from scenarios.closing.closing import builder_for
 from scenarios.experiment.experiment import load_experiment
+from scenarios.experiment.given import given
+from scenarios.experiment.record import load_planned
 from scenarios.planning.planning import question_of
 from scenarios.planning.result import PlanResult
 from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 
 FITS = 60
+OVER_DISPLACEMENT = {"cubic_stiffness", "bump_stop", "free_play"}
 TEXT = """\
 id = "planned"
 model = "drive"
@@ -106,6 +112,33 @@ def test_both_directions_split_friction_from_a_force(tmp_path: Path) -> None:
     assert together == []
 
 
+def test_a_plan_may_be_given_as_a_table_with_its_inputs_as_a_frame(tmp_path: Path) -> None:
+    """The outputs do not exist in the frame either; their conversions are known all the same."""
+    file = write(tmp_path, TEXT.replace('unit = "m"', 'unit = "mm"').replace("1e-4", "0.1"))
+    data = pd.read_csv(tmp_path / "planned.csv").set_index("t")
+    data.attrs["units"] = {"force": "kN"}
+    (tmp_path / "planned.csv").unlink()
+    e = given(tomllib.loads(file.read_text()), None, data, tmp_path)
+    builder = builder_for(e, tmp_path)
+    record = load_planned(e, describe(builder(())))
+    assert {c.variable: (c.unit, c.factor) for c in record.conversions} == {
+        "q": ("mm", pytest.approx(1e-3)),
+        "F": ("kN", pytest.approx(1e3)),
+    }
+    np.testing.assert_allclose(record.runs[0].u[:, 0], 1e3 * data["force"])
+    np.testing.assert_allclose(record.noise_std, 1e-4)
+
+
+def test_a_port_without_a_displacement_is_planned_for_laws_over_the_velocity_alone(
+    foreign: Callable[..., Path], tmp_path: Path
+) -> None:
+    write_foreign(tmp_path, foreign(), FOREIGN.replace('displacement = "x"\n', "") + "[plan]\ninputs = []\n")
+    result = plan(tmp_path)
+    seen = {v["kind"] for v in result.visible if v["location"] == "shaft"}
+    assert "quadratic_damping" in seen
+    assert not seen & OVER_DISPLACEMENT
+
+
 def test_at_the_stated_size_the_simulated_effect_is_detected_as_often_as_stated(tmp_path: Path) -> None:
     """By simulations with the effect built in, a calibration by least squares, and draws of the noise."""
     e = load_experiment(write(tmp_path, sign=-1.0))
@@ -159,6 +192,7 @@ def test_a_foreign_fmu_is_planned_whether_it_shows_its_state_or_not(
     seen = {(v["kind"], v["location"]): v["smallest"] for v in result.visible}
     assert 0 < seen["quadratic_damping", "shaft"] < 0.3  # of the record that close-loop traces
     assert "quadratic_damping@shaft" not in result.hidden
+    assert {kind for kind, location in seen if location == "shaft"} >= OVER_DISPLACEMENT
 
 
 def _shown(question: Question, c: Candidate, size: float) -> np.ndarray:

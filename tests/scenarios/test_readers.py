@@ -1,9 +1,11 @@
 """Formats of data files: each gives the record that CSV gives; rasters, units, names, what is refused."""
 
+import gzip
 import inspect
 import json
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -12,6 +14,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from estimator.record import Record
@@ -120,8 +124,46 @@ def write_mdf3(file, columns, units):
     mdf(file, {"log": columns}, units, "3.30")
 
 
+def write_lines(file, columns, units, separator=";", decimal=",", encoding="utf-8"):
+    """As loggers write it: a line of units below the names, in a file that states any."""
+    text = pd.DataFrame(columns).to_csv(None, index=False, sep=separator, decimal=decimal)
+    names, rows = text.split("\n", 1)
+    stated = separator.join(f"[{units[n]}]" if n in units else "" for n in columns)
+    lines = [names, stated, rows] if units else [names, rows]
+    content = "\r\n".join("\n".join(lines).split("\n")).encode(encoding)
+    file.write_bytes(gzip.compress(content) if file.suffix == ".gz" else content)
+
+
+def write_excel(file, columns, units):
+    rows = pd.DataFrame(columns)
+    if units:
+        rows = pd.concat([pd.DataFrame([{n: f"[{units[n]}]" if n in units else "" for n in columns}]), rows])
+    rows.to_excel(file, index=False)
+
+
+def write_hdf5(file, columns, units):
+    import h5py
+
+    with h5py.File(file, "w") as f:
+        for name, x in columns.items():
+            f[name] = x
+            if name in units:
+                f[name].attrs["unit"] = units[name]
+
+
 WRITERS = {
     "csv": (write_csv, "data.csv"),
+    "csv, lines": (write_lines, "data.csv"),
+    "csv, zipped": (write_lines, "data.csv.gz"),
+    "csv, UTF-16": (partial(write_lines, encoding="utf-16"), "data.csv"),
+    "txt, mark": (partial(write_lines, separator=" ", decimal=".", encoding="utf-8-sig"), "data.txt"),
+    "txt, zipped": (write_lines, "data.txt.gz"),
+    "tsv": (partial(write_lines, separator="\t"), "data.tsv"),
+    "tsv, zipped": (partial(write_lines, separator="\t"), "data.tsv.gz"),
+    "excel": (write_excel, "data.xlsx"),
+    "excel, macros": (write_excel, "data.xlsm"),
+    "hdf5": (write_hdf5, "data.h5"),
+    "hdf5, long": (write_hdf5, "data.hdf5"),
     "parquet": (write_parquet, "data.parquet"),
     "mat": (write_mat, "data.mat"),
     "mat 7.3": (write_mat73, "data.mat"),
@@ -130,7 +172,8 @@ WRITERS = {
     "mdf 4": (write_mdf, "data.mf4"),
     "mdf 3": (write_mdf3, "data.mdf"),
 }
-WITH_UNITS = [kind for kind in WRITERS if not kind.startswith("mat")]
+BLANKS = "txt, mark"  # blanks between the columns, so that each needs a unit in the line of units
+WITH_UNITS = [kind for kind in WRITERS if not kind.startswith("mat") and kind != BLANKS]
 every_kind = pytest.mark.parametrize("kind", WRITERS)
 
 
@@ -151,8 +194,8 @@ def assert_same(one: Record, other: Record) -> None:
     (a,), (b,) = one.runs, other.runs
     # the times of a waveform are multiples of its step, those of the table are not to the last bit
     assert_allclose(a.t, b.t, rtol=1e-14)
-    assert_array_equal(a.u, b.u)
-    assert_array_equal(a.y[:, 0], b.y[:, 0])
+    assert_allclose(a.u, b.u, rtol=1e-15)  # Excel keeps 16 digits
+    assert_allclose(a.y[:, 0], b.y[:, 0], rtol=1e-15)
     assert_allclose(a.y[:, 1], b.y[:, 1], rtol=1e-9)  # a derivative over these times
     assert_array_equal(a.fit, b.fit)
     assert_array_equal(a.test, b.test)
@@ -160,7 +203,7 @@ def assert_same(one: Record, other: Record) -> None:
 
 def test_every_format_is_tested():
     own = {s for s, reader in READERS.items() if ROOT in Path(inspect.getfile(type(reader))).parents}
-    assert {Path(name).suffix for _, name in WRITERS.values()} == own
+    assert {"".join(Path(name).suffixes) for _, name in WRITERS.values()} == own
 
 
 @every_kind
@@ -214,6 +257,24 @@ def test_units_that_contradict_are_refused(tmp_path, kind, column, unit, words):
     with pytest.raises(BadInput) as refused:
         load(file)
     assert_one_clear_line(refused, file, words)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mdf 4"])
+def test_an_unknown_unit_of_an_input_is_an_error(tmp_path, kind):
+    """Nobody has said what its numbers are, so they must not be compared with anything."""
+    file = experiment(tmp_path, kind, units={"torque": "Kästchen"})
+    with pytest.raises(BadInput) as refused:
+        load(file)
+    assert_one_clear_line(refused, file, "has the unit 'Kästchen', which is not known; declare one that is")
+
+
+def test_an_unknown_unit_of_the_time_is_an_error_unless_one_is_declared(tmp_path):
+    file = experiment(tmp_path, "csv", units={"time": "Takte"})
+    with pytest.raises(BadInput, match=r"'Takte', which is not known; .*time_unit"):
+        load(file)
+    file.write_text('time_unit = "ms"\n' + file.read_text().replace("[0.0, 6.0]", "[0.0, 0.006]"))
+    with pytest.raises(BadInput, match="test"):  # its windows are in seconds, the record is 10 ms long
+        load(file)
 
 
 @pytest.mark.parametrize("kind", WITH_UNITS)
@@ -298,7 +359,12 @@ def test_a_missing_package_is_one_clear_line(tmp_path, kind, module, monkeypatch
     assert_one_clear_line(refused, file, f"run 'pip install {module}', or convert the file to CSV")
 
 
-@every_kind
+def test_between_blanks_no_cell_can_be_empty(tmp_path):
+    with pytest.raises(BadInput, match="line 3: has fewer cells than there are names"):
+        read_sheet(lines(tmp_path, "t n m\n0 1 2\n1 2\n", "log.txt"))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in WRITERS if kind != BLANKS])
 def test_a_lost_number_is_refused_in_all_formats(tmp_path, kind):
     columns = table()
     columns["torque"][5] = np.nan
@@ -484,3 +550,140 @@ def test_a_table_of_matlab_is_refused_with_the_way_out(tmp_path):
     assert sheet(tmp_path / "a.mat", "t", "t").known == ("t",)
     with pytest.raises(BadInput, match=r"'T\.x' is not in it as numbers, but objects are.*table2struct"):
         sheet(tmp_path / "a.mat", "t", "T.x")
+
+
+# --- text files as they are
+
+
+def lines(folder: Path, text: str, name: str = "log.csv", encoding: str = "utf-8") -> Path:
+    file = folder / name
+    file.write_bytes(text.encode(encoding))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [
+        ("t,n\ns,U/min\n0,1.5\n1,2\n", {"t": "s", "n": "rpm"}),
+        ("t;n\n[s];[rpm]\n0;1,5\n1;2\n", {"t": "s", "n": "rpm"}),
+        ("t;n, filtered\n0;1,5\n1;2\n", {}),
+        ("t [ms];n (rpm)\n0;1,5\n1;2,0\n", {"t [ms]": "ms", "n (rpm)": "rpm"}),
+        ("t\tn\n0\t1.5\n1\t2\n", {}),
+        ("t  n\n0  1.5\n1  2\n", {}),
+    ],
+)
+def test_layouts(tmp_path, text, units):
+    sheet = read_sheet(lines(tmp_path, text))
+    assert_array_equal(sheet.numbers(sheet.known[1]), [1.5, 2.0])
+    assert dict(sheet.units) == units
+
+
+@given(
+    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", ","), ("\t", ".")]),
+    st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=2, max_size=20),
+    st.booleans(),
+)
+def test_numbers_survive_any_layout(tmp_path_factory, how, rows, stated):
+    separator, decimal = how
+    cells = pd.DataFrame(rows, columns=["a", "b", "c"]) + 0.5
+    text = cells.to_csv(None, index=False, sep=separator, decimal=decimal)
+    if stated:
+        names, below = text.split("\n", 1)
+        text = f"{names}\n{separator.join(['s', 'rpm', '%'])}\n{below}"
+    sheet = read_sheet(lines(tmp_path_factory.mktemp("layout"), text))
+    assert_allclose(sheet.cells.to_numpy(dtype=float), cells.to_numpy(), rtol=1e-15)
+    assert sheet.first == 2 + stated
+
+
+def test_a_wrong_cell_is_found_below_a_line_of_units(tmp_path):
+    sheet = read_sheet(lines(tmp_path, "t,n\ns,rpm\n0,1\n1,2\n2,off\n"))
+    with pytest.raises(BadInput, match="line 5: column 'n' holds 'off', not a number"):
+        sheet.numbers("n")
+
+
+def test_words_in_the_first_row_are_no_units(tmp_path):
+    sheet = read_sheet(lines(tmp_path, "t,n\nstart,idle\n0,1\n"))
+    assert sheet.first == 2
+    with pytest.raises(BadInput, match="line 2: column 'n' holds 'idle'"):
+        sheet.numbers("n")
+
+
+def test_dates_are_times(tmp_path):
+    file = experiment(tmp_path, "csv")
+    data = pd.read_csv(tmp_path / "data.csv")
+    begin = pd.Timestamp("2024-05-01 23:59:58")
+    data["time"] = [str(begin + pd.Timedelta(seconds=t)) for t in data["time"]]
+    data.to_csv(tmp_path / "data.csv", index=False)
+    assert_allclose(load(file).runs[0].t, table()["time"], atol=1e-9)
+
+
+def options(folder: Path, said: str) -> Path:
+    """The good experiment with [data] in place of the key."""
+    file = experiment(folder, "csv")
+    file.write_text(GOOD.replace('data = "data.csv"', "") + f'\n[data]\nfile = "data.csv"\n{said}\n')
+    return file
+
+
+def test_options_of_the_library_are_passed_on(tmp_path):
+    file = options(tmp_path, "skiprows = 2\nna_values = [-999]")
+    text = (tmp_path / "data.csv").read_text()
+    (tmp_path / "data.csv").write_text("Logger 7\nserial; 4, of 5\n" + text)
+    (tmp_path / "plain").mkdir()
+    assert_same(load(file), load(experiment(tmp_path / "plain", "csv")))
+    data = pd.read_csv(tmp_path / "plain" / "data.csv")
+    data.loc[5, "torque"] = -999
+    (tmp_path / "data.csv").write_text("Logger 7\nserial; 4, of 5\n" + data.to_csv(index=False))
+    with pytest.raises(BadInput, match="column 'torque' has no number in 1 of 1001 rows"):
+        load(file)
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("skprows = 2", "cannot be read with the options skprows of [data]"),
+        ('skiprows = "two"', "[data] skiprows = 'two' must be the number of lines"),
+        ('encoding = "utf-9"', "is not text in the encoding utf-9"),
+    ],
+)
+def test_wrong_options_are_one_clear_line(tmp_path, said, words):
+    with pytest.raises(BadInput) as refused:
+        load(options(tmp_path, said))
+    assert "\n" not in str(refused.value)
+    assert words in str(refused.value)
+
+
+def test_another_encoding_has_to_be_said(tmp_path):
+    file = lines(tmp_path, "t;Weg in °\n0;1\n1;2\n", encoding="cp1252")
+    with pytest.raises(BadInput, match='encoding = "cp1252"'):
+        read_sheet(file)
+    assert "Weg in °" in read_sheet(file, options={"encoding": "cp1252"}).known
+
+
+def test_a_table_and_a_matrix_of_hdf5(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as f:
+        f["rig/log"] = np.array([(0.0, 5.0), (1.0, 6.0)], dtype=[("t", "f8"), ("F", "f4")])
+        f["rig/Y"] = np.array([[1.0, 2.0], [3.0, 4.0]])
+        f["rig/name"] = "bench"
+    sheet = read_sheet(tmp_path / "a.h5")
+    assert set(sheet.known) == {"rig/log/t", "rig/log/F", "rig/Y(:,1)", "rig/Y(:,2)"}
+    assert_array_equal(sheet.numbers("rig/Y(:,2)"), [2.0, 4.0])
+    assert_array_equal(sheet.numbers("rig/log/F"), [5.0, 6.0])
+
+
+def test_samples_without_an_output_belong_to_no_part(tmp_path):
+    columns = table()
+    columns["n_wheel"][[100, 101, 700]] = np.nan
+    record = load(experiment(tmp_path, "csv", columns))
+    run = record.runs[0]
+    assert not (run.fit | run.choose | run.test)[[100, 101, 700]].any()
+    assert np.isfinite(run.y).all()
+    assert any("no number in 3 of 1001 rows, which are left out" in n.sentence for n in record.notes)
+
+
+def test_a_record_tells_how_its_columns_are_converted(tmp_path):
+    found = {c.variable: c for c in load(experiment(tmp_path, "csv", units={"torque": "N.m"})).conversions}
+    assert (found["omega_w"].unit, found["omega_w"].model_unit) == ("rpm", "rad/s")
+    assert found["omega_w"].factor == pytest.approx(np.pi / 30)
+    assert (found["T_P"].unit, found["T_P"].factor) == ("N.m", 1.0)

@@ -23,10 +23,12 @@ def own_cache(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("what", WRONG)
-@pytest.mark.parametrize("command", ["estimate", "close-loop"])
+@pytest.mark.parametrize("command", ["estimate", "close-loop", "close-loop --dry-run"])
 def test_it_is_refused_in_one_line(command, what, own_cache, tmp_path, tmp_path_factory, capfd):
     bad_fmu(tmp_path, Fault(what, "none", ""), tmp_path_factory.mktemp("library"))
-    assert run_safely([command, str(tmp_path / "experiment.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert (
+        run_safely([*command.split(), str(tmp_path / "experiment.toml"), "--out", str(tmp_path / "out")]) == 2
+    )
     [line] = [line for line in capfd.readouterr().err.splitlines() if line.strip()]
     assert WRONG[what] in line
     assert "bad.fmu" in line

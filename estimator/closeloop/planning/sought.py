@@ -16,7 +16,7 @@ import numpy as np
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
-from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.closeloop.screening.missing_force import MissingForce, motion_of
 from estimator.record import Array
 
 PERIODS_ASSUMED = 30.0  # periods of the assumed lines in a record: between slow motion and the sampling
@@ -49,7 +49,7 @@ def sought(
     noise: (n,) standard deviation of each measured output.
     """
     builder, run = problem.builder, problem.record.runs[0]
-    names = [name for p in problem.ports for name in (p.displacement, p.velocity)]
+    names = [name for p in problem.ports for name in p.motion]
     [full] = problem.simulate(theta, names)
     n_y = len(problem.record.outputs)
     found = physical_candidates(
@@ -67,7 +67,7 @@ def _assumed(problem: Problem, t: Array, motion: Array) -> Iterator[MissingForce
     known, since = problem.plant.fmu.description.variables, t - t[0]
     cycle = 2 * np.pi * PERIODS_ASSUMED
     for i, port in enumerate(problem.ports):
-        q, v = motion[:, 2 * i], motion[:, 2 * i + 1]
+        q, v = motion_of(port, i, t, motion)
         span = float(np.ptp(q))
         line = np.sin(max(1.0, cycle / span) * (q - q.min())) if span > 0 else np.zeros_like(q)
         shape = np.sin(cycle * since / since[-1]) + line + (since > since[-1] / 2)

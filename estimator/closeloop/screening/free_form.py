@@ -48,9 +48,12 @@ def offered(problem: Problem, forces: Sequence[MissingForce]) -> list[tuple[str,
     """Kind and port of every force of free form that fits the port."""
     model = problem.builder.outside().model
     known = model.ports() if model else {}
-    ports = [m.port.name for m in forces]
     return [
-        (k, at) for at in ports for k, law in FREE_FORMS.items() if at not in known or law.fits(known[at])
+        (k, m.port.name)
+        for m in forces
+        for k, law in FREE_FORMS.items()
+        if (m.port.name not in known or law.fits(known[m.port.name]))
+        and (m.port.displacement or not law.needs_displacement())
     ]
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.linear import linearise, shows_its_state
@@ -45,7 +46,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     plant, run = problem.plant, problem.record.runs[0]
     if not problem.ports:
         return []
-    names = [name for p in problem.ports for name in (p.displacement, p.velocity)]
+    names = [name for p in problem.ports for name in p.motion]
     [full, *_] = problem.simulate(theta, (*plant.states, *names))
     last = int(np.flatnonzero(run.fit)[-1]) + 1
     keep = np.arange(0, last, max(1, -(-last // SMOOTHED_SAMPLES)))
@@ -55,7 +56,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
         whole = run.y[:last] - y[:last]
         pushes = [pushed(problem, theta, port, whole, noise) for port in problem.ports]
         return [
-            MissingForce(p, run.t[keep], f[keep], s[keep], motion[keep, 2 * i], motion[keep, 2 * i + 1])
+            MissingForce(p, run.t[keep], f[keep], s[keep], *motion_of(p, i, run.t[keep], motion[keep]))
             for i, (p, (f, s)) in enumerate(zip(problem.ports, pushes, strict=True))
         ]
     local = linearise(problem, theta, x, keep, [port.force for port in problem.ports], names)
@@ -64,7 +65,16 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     moved = motion[keep] + np.einsum("kmn,kn->km", seen, found.together)
     return [
         MissingForce(
-            p, run.t[keep], found.force[i], found.std[i], moved[:, 2 * i], moved[:, 2 * i + 1], moved
+            p, run.t[keep], found.force[i], found.std[i], *motion_of(p, i, run.t[keep], moved), moved
         )
         for i, p in enumerate(problem.ports)
     ]
+
+
+def motion_of(port: PortNames, i: int, t: Array, motion: Array) -> tuple[Array, Array]:
+    """Displacement and velocity (n,) of port number i out of the motion (n, 2 n_ports) of all.
+
+    A displacement that no output gives is the integral of the velocity, from 0 at the start.
+    """
+    q, v = motion[:, 2 * i], motion[:, 2 * i + 1]
+    return (q if port.displacement else np.asarray(cumulative_trapezoid(v, t, initial=0))), v

@@ -127,7 +127,7 @@ class Screening:
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
         plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
-        motion = [name for p in problem.ports for name in (p.displacement, p.velocity)]
+        motion = [name for p in problem.ports for name in p.motion]
         [full, *_] = problem.simulate(theta, motion)
         known = plant.fmu.description.variables
         start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)

@@ -82,7 +82,7 @@ class EffectsAlone(Model):
             self.add(replace(v, start=values.get(v.name, v.start)))
         self.known("clock")  # our FMUs have at least one state
         ahead = self.add(Parameter("s", step / 2, min=0.0, doc=AHEAD_DOC, name=AHEAD))
-        motion = [n for p in ports for n in (p.displacement, p.velocity)]
+        motion = [n for p in ports for n in p.motion]
         read = {n: cs.SX.sym(n) for n in (*motion, *made.given)}
         x = cs.vertcat(*(self.symbols[s.name] for s in made.states))
         z = cs.vertcat(*(read[n] for n in made.given), *(self.symbols[p.name] for p in made.parameters))

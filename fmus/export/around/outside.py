@@ -18,6 +18,7 @@ from fmus.host.description import FmuDescription, FmuVariable, PortNames
 from fmus.integrators.rk4 import runge_kutta
 from fmus.port import UNITS, Port, alike
 from fmus.sampled import Row, Sampled
+from fmus.units import base_exponents
 from fmus.variables import (
     Expr,
     Input,
@@ -42,7 +43,7 @@ class Outside(Site):
     ) -> None:
         known, seen = description.variables, {*description.inputs, *description.outputs}
         for port in ports:
-            for name in (port.force, port.velocity, port.displacement):
+            for name in (port.force, *port.motion):
                 if name not in seen:
                     raise BadInput(f"port '{port.name}': {description.name} has no input or output '{name}'")
         names = [*description.inputs, *description.parameters]
@@ -60,6 +61,7 @@ class Outside(Site):
                 self.motion[2 * i + 1],
                 {port.force: 1.0},
                 "rotation" if self._turns(port) else "translation",
+                has_displacement=port.displacement is not None,
             )
             for i, port in enumerate(self.names)
         }
@@ -79,7 +81,11 @@ class Outside(Site):
         return [u for u in super().own_inputs() if u.name not in forces]
 
     def _turns(self, port: PortNames) -> bool:
-        return self.description.variables[port.displacement].unit in (UNITS["rotation"]["q"], "deg")
+        known = self.description.variables
+        if port.displacement is not None and known[port.displacement].unit is not None:
+            return known[port.displacement].unit in (UNITS["rotation"]["q"], "deg")
+        unit = known[port.velocity].unit or port.velocity_unit
+        return unit is not None and "rad" in base_exponents(unit).exponents
 
 
 @dataclass(frozen=True, eq=False)

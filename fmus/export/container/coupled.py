@@ -117,7 +117,7 @@ def _base_card(
         "guid": description.guid,
         "identifier": description.identifier,
         "references": references,
-        "motion": [order.index(n) for port in ports for n in (port.displacement, port.velocity)],
+        "motion": [order.index(n) for port in ports for n in port.motion],
         "told": [order.index(n) for n in made.told],
         "states": len(made.states),
     }

@@ -82,7 +82,7 @@ def draw_law(ax: Axes, law: Law, words: Glossary) -> None:
         folded = np.mod(q, period) if period else q
         grid = np.linspace(0, period, 400) if period else np.linspace(q.min(), q.max(), 400)
         force = law.along(grid, np.full_like(grid, v.mean()))
-        _against(ax, folded, m, words, m.port.displacement, ", folded" if period else "")
+        _against(ax, folded, m, words, m.port.motion[0], ", folded" if period else "")
     ax.plot(grid, force, color=LAW, linewidth=2.0, label=f"law found ({effect_words(law.candidate.kind)})")
 
 

@@ -40,7 +40,7 @@ def free_form_plot(found: Outcome, h: Hypothesis, words: Glossary) -> Plot:
             ax.plot(
                 *averages(x[inside], m.force[inside]), "o", color=AFTER, markersize=3, label="missing force"
             )
-            over = m.port.velocity if curve.against == "velocity" else m.port.displacement
+            over = m.port.velocity if curve.against == "velocity" else m.port.motion[0]
             x_label, y_label = label(over, words.unit(over)), label("force", words.unit(m.port.force))
             name_axes(ax, x_label, y_label, m.port.name)
     ax.fill_between(

@@ -149,10 +149,11 @@ def _law(case: Case, h: Hypothesis, c: Candidate) -> LawText:
 
 
 def _motion(case: Case, port: PortNames) -> str:
-    of = {n: unit(case.words.unit(n)) or "1" for n in (port.force, port.velocity, port.displacement)}
+    of = {n: unit(case.words.unit(n)) or "1" for n in (port.force, *port.motion)}
+    displacement = f", q is {port.displacement} in {of[port.displacement]}" if port.displacement else ""
     return (
         f"F acts at the port “{port.name}” in {of[port.force]}, positive in the direction of motion; "
-        f"v is {port.velocity} in {of[port.velocity]}, q is {port.displacement} in {of[port.displacement]}."
+        f"v is {port.velocity} in {of[port.velocity]}{displacement}."
     )
 
 

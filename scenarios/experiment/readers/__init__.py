@@ -1,13 +1,14 @@
 """Readers of data files by suffix. Each file of this folder with a Reader is one; there is no other list."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import Any
 
 from fmus.errors import BadInput
 from fmus.registry import classes_in
 from fmus.taken import check_file
-from scenarios.experiment.readers.reader import Reader
+from scenarios.experiment.readers.reader import NO_OPTIONS, Reader
 from scenarios.experiment.readers.sheet import Sheet
 
 
@@ -30,16 +31,23 @@ def _by_suffix(readers: list[type[Reader]]) -> dict[str, Reader]:
 READERS = _by_suffix(classes_in(sys.modules[__name__], Reader))  # type: ignore[type-abstract]
 
 
-def read_sheet(file: Path, time: str | None = None, columns: Collection[str] | None = None) -> Sheet:
+def read_sheet(
+    file: Path,
+    time: str | None = None,
+    columns: Collection[str] | None = None,
+    options: Mapping[str, Any] = NO_OPTIONS,
+) -> Sheet:
     """Read the columns of a data file that share their rows.
 
     time: the column that determines the rows, required if a file has several time rasters.
     columns: the columns to read, by default all; columns that are not in the file are left out.
+    options: of the library that reads the format, by name.
     Raises BadInput if the file has no known format or cannot be read, or if a name in it is ambiguous.
     """
-    reader = READERS.get(file.suffix.lower())
+    endings = [suffix.lower() for suffix in file.suffixes]
+    reader = READERS.get("".join(endings[-2:])) or READERS.get("".join(endings[-1:]))
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise BadInput(f"{file}: has no known format; convert it to one of {known}")
     check_file(file)
-    return reader.read(file, time, columns)
+    return reader.read(file, time, columns, options)

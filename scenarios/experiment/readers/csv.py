@@ -1,26 +1,83 @@
-"""CSV files, with units in a file beside them, if any: those of data.csv in data.csv.units.json."""
+"""Text files of columns, as loggers and spreadsheets write them."""
 
 import json
+import warnings
 from collections.abc import Collection
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
+import pandas as pd
 
 from fmus.errors import BadInput
-from scenarios.experiment.csv_file import read_csv
+from scenarios.experiment.readers.header import units_of
+from scenarios.experiment.readers.layout import BLANKS, Layout, layout_of
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.sheet import Sheet
 
 
 class Csv(Reader):
-    """CSV files; a row is identified by its line in the file, and the names are in line 1."""
+    """Separator, decimal sign, byte order mark and a line of units below the names are recognised.
+
+    A row is identified by its line in the file. Units may also stand in brackets behind a name, or in a file
+    beside it: those of data.csv in data.csv.units.json. Options are those of pandas.read_csv.
+    """
 
     kind: ClassVar[str] = "CSV"
-    suffixes: ClassVar[tuple[str, ...]] = (".csv",)
+    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
 
-    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """All columns, up to the last row that is not blank."""
-        cells = read_csv(file)
-        return Sheet(file, cells, tuple(map(str, cells.columns)), _units(file), row="line", first=2)
+        layout = layout_of(file, options)
+        cells = _cells(file, layout, options)
+        units = {**units_of(layout.names, layout.units), **_units(file)}
+        return Sheet(file, cells, layout.names, units, row="line", first=layout.first)
+
+
+def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
+    """The cells of the file, without blank rows at its end."""
+    ours: dict[str, Any] = {
+        "names": list(layout.names),
+        "header": 0,
+        "index_col": False,
+        "skip_blank_lines": False,
+        "skipinitialspace": True,
+        "low_memory": False,
+    }
+    found: dict[str, Any] = {
+        "skiprows": layout.skipped,
+        "sep": layout.separator,
+        "decimal": layout.decimal,
+        "encoding": layout.encoding,
+    }
+    theirs = {key: value for key, value in options.items() if key != "delimiter"}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            table: pd.DataFrame = pd.read_csv(file, **{**ours, **theirs, **found})
+    except pd.errors.ParserError as error:
+        raise BadInput(f"{file}: is not a sound CSV file: {' '.join(str(error).split())}") from error
+    except pd.errors.ParserWarning as error:
+        raise BadInput(
+            f"{file}: line {layout.first} has more cells than line {layout.above + 1} has names; "
+            "name each column"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise BadInput(
+            f"{file}: is not text in the encoding {layout.encoding}; "
+            'say which it is, [data] encoding = "cp1252", or save it as UTF-8'
+        ) from error
+    filled = np.flatnonzero(table.notna().any(axis=1))
+    if not filled.size:
+        raise BadInput(f"{file}: has no data below line {layout.first - 1}; record some")
+    table = table.iloc[: filled[-1] + 1]
+    short = table.iloc[:, -1].isna().to_numpy()
+    if layout.separator == BLANKS and short.any():  # which cell is empty cannot be seen
+        raise BadInput(
+            f"{file} line {layout.first + int(short.argmax())}: has fewer cells than there are names; "
+            "between columns that are separated by blanks no cell can be empty, use commas"
+        )
+    return table
 
 
 def _units(file: Path) -> dict[str, str]:

@@ -25,7 +25,7 @@ class Mat(Reader):
     kind: ClassVar[str] = "MAT"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
 
-    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """Version 7.3 is HDF5 and is read with h5py; earlier versions are read with scipy."""
         with file.open("rb") as stream:
             begins = stream.read(16)
@@ -35,7 +35,7 @@ class Mat(Reader):
                 channels, objects = channels_of_hdf5(source)
                 found = sheet_of(file, channels, time, columns)
         else:
-            matlab = library("scipy.io", "scipy", file).loadmat(file)
+            matlab = library("scipy.io", "scipy", file).loadmat(file, **options)
             objects = any(_is_object(value) for value in matlab.values())
             channels = [c for name, value in matlab.items() for c in _channels(name, value)]
             found = sheet_of(file, channels, time, columns)

@@ -21,18 +21,18 @@ class Mdf(Reader):
     kind: ClassVar[str] = "MDF"
     suffixes: ClassVar[tuple[str, ...]] = (".mf4", ".mdf")
 
-    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """All master channels are read for comparison, and only those other channels that are needed."""
         asammdf = library("asammdf", "asammdf", file)
-        with file.open("rb") as stream, _opened(asammdf, stream) as source:
+        with file.open("rb") as stream, _opened(asammdf, stream, options) as source:
             groups = range(len(source.groups))
             return sheet_of(file, [c for g in groups for c in _channels(source, g)], time, columns)
 
 
-def _opened(asammdf: Any, stream: BinaryIO) -> Any:
+def _opened(asammdf: Any, stream: BinaryIO, options: dict[str, Any]) -> Any:
     """The library's object of a file."""
     try:
-        return asammdf.MDF(stream)
+        return asammdf.MDF(stream, **options)
     except Exception as error:
         # its object of a broken file fails once more when it is collected, and says so on the screen
         for frame, _ in walk_tb(error.__traceback__):

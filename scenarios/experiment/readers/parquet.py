@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from fmus.errors import BadInput
 from scenarios.experiment.readers.reader import Reader, library
@@ -17,10 +17,10 @@ class Parquet(Reader):
     kind: ClassVar[str] = "Parquet"
     suffixes: ClassVar[tuple[str, ...]] = (".parquet",)
 
-    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """Only the columns wanted are read from the disk."""
         parquet = library("pyarrow.parquet", "pyarrow", file)
-        with parquet.ParquetFile(file) as source:
+        with parquet.ParquetFile(file, **options) as source:
             schema = source.schema_arrow
             twice = [name for name in schema.names if schema.names.count(name) > 1]
             if twice:

@@ -43,6 +43,6 @@ class Sheet:
             held = str(cells.iloc[i])[:40]
             raise BadInput(
                 f"{self.file} {self.row} {i + self.first}: column '{column}' holds '{held}', not a number; "
-                "use decimal points and remove any words"
+                "use one decimal sign throughout and remove any words"
             )
         return numbers.to_numpy(dtype=np.float64)

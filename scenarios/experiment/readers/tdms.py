@@ -22,10 +22,10 @@ class Tdms(Reader):
     kind: ClassVar[str] = "TDMS"
     suffixes: ClassVar[tuple[str, ...]] = (".tdms",)
 
-    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None) -> Sheet:
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """Only the channels wanted are read from the disk."""
         nptdms = library("nptdms", "nptdms", file)
-        with file.open("rb") as stream, nptdms.TdmsFile.open(stream) as source:
+        with file.open("rb") as stream, nptdms.TdmsFile.open(stream, **options) as source:
             return sheet_of(file, [c for group in source.groups() for c in _channels(group)], time, columns)
 
 

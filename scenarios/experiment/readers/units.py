@@ -1,19 +1,17 @@
 """Compare the units that a file states for its columns with the units declared for them."""
 
 from math import isclose
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput
 from fmus.units import base_exponents, column_conversion, conversion
+from scenarios.experiment.readers.header import is_number, spelled
 from scenarios.experiment.readers.sheet import Sheet
 
-# usual in measured files, but not in the grammar of units
-SPELLINGS = MappingProxyType(
-    {"-": "1", "Nm": "N.m", "kNm": "kN.m", "°C": "degC", "U/min": "rpm", "1/min": "rpm", "sec": "s"}
-)
 SAME = (1.0, 0.0)  # factor and offset
 
 
@@ -32,7 +30,16 @@ class StatedUnits:
         """
         if not derived and self._sheet.units.get(column) == declared:
             return
-        stated = self._known(column, f"it is taken as {declared}, as declared")
+        try:
+            stated = self.stated(column, where)
+        except BadInput:  # who declares a unit knows better than a file that writes it in its own way
+            said = (
+                f"{self._file.name}: column '{column}' has the unit '{self._sheet.units[column]}', which is"
+            )
+            self.notes.append(
+                Note("unit", column, f"{said} not known; it is taken as {declared}, as declared")
+            )
+            return
         if stated is None:
             return
         for _ in range(derived):
@@ -48,16 +55,14 @@ class StatedUnits:
             )
 
     def to(self, column: str, target: str | None, where: str, derived: int = 0) -> tuple[float, float]:
-        """Factor and offset from the file's unit to another; identity if the file states no known unit.
+        """Factor and offset from the file's unit to another; identity if the file states no unit.
 
         derived: how many times the column is differentiated before. Raises BadInput if the units cannot be
-        converted, or if a unit is stated but there is no unit to convert to.
+        converted or are not known, or if a unit is stated but there is no unit to convert to.
         """
-        stated = self._known(column, f"it is taken as {target or 'it is'}")
+        stated = self.stated(column, where, derived)
         if stated is None:
             return SAME
-        for _ in range(derived):
-            stated = f"({stated})/s"
         place = f"{where}: column '{column}' of {self._file}"
         found = column_conversion(stated, target, "the input", place)
         if found != SAME:
@@ -65,30 +70,50 @@ class StatedUnits:
             self.notes.append(Note("unit", column, f"{said}, to {target}"))
         return found
 
-    def seconds(self, column: str, where: str) -> Array:
-        """The time column (N,) s: dates count from the first one, numbers are in the unit stated, else s."""
-        cells = self._sheet.cells[column]
+    def seconds(self, column: str, where: str, unit: str | None = None) -> Array:
+        """The time column (N,) s: dates count from the first one, numbers are in the unit stated, else s.
+
+        unit: declared for numbers; None if none is.
+        """
+        cells = _dates(self._sheet.cells[column])
         if cells.dtype.kind == "M":
             said = f"{self._file.name}: column '{column}' holds dates; 0 s is {cells.min()}"
             self.notes.append(Note("unit", column, said))
             cells = cells - cells.min()
         if cells.dtype.kind == "m":
             return np.asarray(cells.dt.total_seconds(), dtype=np.float64)
-        factor, offset = self.to(column, "s", where)
+        if unit is None:
+            factor, offset = self.to(column, "s", where)
+        else:
+            self.check(column, 0, unit, where)
+            factor, offset = conversion(unit, "s", where)
         return self._sheet.numbers(column) * factor + offset
 
-    def _known(self, column: str, instead: str) -> str | None:
-        """The unit stated in the file, in railfmi's spelling; an unknown unit causes a note."""
-        unit = self._sheet.units.get(column, "").strip()
-        unit = SPELLINGS.get(unit, unit)
+    def stated(self, column: str, where: str, derived: int = 0) -> str | None:
+        """The unit stated in the file, in railfmi's spelling, None if there is none; BadInput if unknown.
+
+        derived: how many times the column is differentiated.
+        """
+        unit = spelled(self._sheet.units.get(column, ""))
         if not unit:
             return None
         try:
             base_exponents(unit)
-        except BadInput:
-            said = (
-                f"{self._file.name}: column '{column}' has the unit '{unit}', which is not known; {instead}"
-            )
-            self.notes.append(Note("unit", column, said))
-            return None
+        except BadInput as error:
+            raise BadInput(
+                f"{where}: column '{column}' of {self._file} has the unit '{unit}', which is not known; "
+                'declare one that is, unit = "..." for a channel, time_unit = "..." for the time'
+            ) from error
+        for _ in range(derived):
+            unit = f"({unit})/s"
         return unit
+
+
+def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
+    """Dates that a file holds as text, as dates; all else unchanged."""
+    if not pd.api.types.is_string_dtype(cells) or is_number(str(cells.iloc[0])):
+        return cells
+    try:
+        return pd.to_datetime(cells, errors="raise", format="ISO8601")
+    except (ValueError, TypeError):
+        return cells

@@ -1,0 +1,62 @@
+"""railfmi: FMI models for railway dynamics that find out what they lack.
+
+Everything here is loaded on first use, so that `import railfmi` costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fmus.contact import contact_table, creep_forces, equivalent_conicity, hertz, kalker
+    from fmus.errors import BadInput
+    from fmus.host.fmu import Fmu, FmuError
+    from scenarios.closing.closing import close_loop
+    from scenarios.closing.several import close_loops
+    from scenarios.estimating.estimating import estimate
+    from scenarios.experiment.experiment import load_experiment
+    from scenarios.planning.planning import plan
+    from scenarios.preparing.initialising import init
+    from scenarios.preparing.inspecting import inspect
+    from scenarios.preparing.trial import dry_run
+
+    __version__: str
+
+_HOMES = {
+    "BadInput": "fmus.errors",
+    "Fmu": "fmus.host.fmu",
+    "FmuError": "fmus.host.fmu",
+    "close_loop": "scenarios.closing.closing",
+    "close_loops": "scenarios.closing.several",
+    "contact_table": "fmus.contact",
+    "creep_forces": "fmus.contact",
+    "dry_run": "scenarios.preparing.trial",
+    "equivalent_conicity": "fmus.contact",
+    "estimate": "scenarios.estimating.estimating",
+    "hertz": "fmus.contact",
+    "init": "scenarios.preparing.initialising",
+    "inspect": "scenarios.preparing.inspecting",
+    "kalker": "fmus.contact",
+    "load_experiment": "scenarios.experiment.experiment",
+    "plan": "scenarios.planning.planning",
+}
+
+__all__ = [
+    "BadInput", "Fmu", "FmuError", "__version__", "close_loop", "close_loops", "contact_table",
+    "creep_forces", "dry_run", "equivalent_conicity", "estimate", "hertz", "init", "inspect", "kalker",
+    "load_experiment", "plan",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """Loaded on first use."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("railfmi")
+    if name not in _HOMES:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,40 @@
+"""`railfmi init`: draft an experiment from your FMU and your record."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import Out, app
+
+
+@app.command("init")
+def init(
+    fmu: Annotated[Path, typer.Argument(help="FMU file")],
+    data: Annotated[Path, typer.Argument(help="measured record, in any format that railfmi reads")],
+    out: Out = Path(),
+    time: Annotated[str | None, typer.Option(help="time column, if it is not found")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace an existing experiment.toml")] = False,
+) -> None:
+    """Match columns to variables, guess split, bounds and ports, and write a commented experiment.toml.
+
+    On a terminal you are asked about what is not sure; otherwise the likeliest is taken.
+    """
+    from scenarios.preparing.initialising import init as drafted
+
+    asks = sys.stdin.isatty() and sys.stdout.isatty()
+    made = drafted(fmu, data, out, time, _ask if asks else None, force)
+    for line in made.lines():
+        typer.echo(line)
+    typer.echo(f"experiment: {made.file}; look at it, then: railfmi close-loop {made.file} --dry-run")
+
+
+def _ask(question: str, answers: Sequence[str], default: str) -> str:
+    """The answer of a user at the terminal, one of the answers."""
+    while True:
+        answer: str = typer.prompt(f"{question}, of {', '.join(answers)}", default=default)
+        if answer in answers:
+            return answer
+        typer.echo(f"'{answer}' is none of them")

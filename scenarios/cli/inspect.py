@@ -1,0 +1,21 @@
+"""`railfmi inspect`: show what a record or an FMU holds."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenarios.cli.console import RESULTS, Out, app
+
+
+@app.command("inspect")
+def inspect(
+    file: Annotated[Path, typer.Argument(help="record in any format that railfmi reads, or an FMU")],
+    out: Out = RESULTS / "inspect",
+    time: Annotated[str | None, typer.Option(help="time column of the record, if it is not found")] = None,
+) -> None:
+    """Channels, units, rates, gaps, clipping and spectra of a record; variables and access of an FMU."""
+    from scenarios.preparing.inspecting import inspect as looked_at
+
+    for line in looked_at(file, out, time):
+        typer.echo(line)

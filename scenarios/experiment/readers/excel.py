@@ -1,0 +1,36 @@
+"""Excel files: names in the first row of a worksheet, units in brackets or in the row below them."""
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pandas as pd
+
+from fmus.errors import BadInput
+from scenarios.experiment.readers.header import is_line_of_units, units_of
+from scenarios.experiment.readers.reader import Reader, library
+from scenarios.experiment.readers.sheet import Sheet
+
+
+class Excel(Reader):
+    """One worksheet, the first by default; options are those of pandas.read_excel, as `sheet_name`."""
+
+    kind: ClassVar[str] = "Excel"
+    suffixes: ClassVar[tuple[str, ...]] = (".xlsx", ".xlsm")
+
+    def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
+        """All columns of the worksheet, without rows that are blank at its end."""
+        library("openpyxl", "openpyxl", file)
+        above = int(options.get("skiprows", 0))
+        cells: pd.DataFrame = pd.read_excel(file, **{"engine": "openpyxl", **options})
+        cells.columns = pd.Index([str(name).strip() for name in cells.columns])
+        names = [str(name) for name in cells.columns]
+        if cells.dropna(how="all").empty:
+            raise BadInput(f"{file}: has no data below row {above + 1}; record some")
+        top = ["" if pd.isna(cell) else str(cell) for cell in cells.iloc[0]]
+        units = top if len(cells) > 1 and is_line_of_units(top) else []
+        if units:
+            cells = cells.iloc[1:].infer_objects()
+        last = int(cells.notna().any(axis=1).to_numpy().nonzero()[0][-1]) + 1
+        known = units_of(names, units)
+        return Sheet(file, cells.iloc[:last], tuple(names), known, first=above + 2 + bool(units))

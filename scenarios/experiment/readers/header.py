@@ -1,0 +1,67 @@
+"""The lines above the numbers of a table of text: names of columns, and units in brackets or in a line."""
+
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+from fmus.errors import BadInput
+from fmus.units import base_exponents
+
+# usual in measured files, but not in the grammar of units
+SPELLINGS = MappingProxyType(
+    {
+        "-": "1", "Nm": "N.m", "kNm": "kN.m", "°C": "degC", "U/min": "rpm", "1/min": "rpm", "min-1": "rpm",
+        "RPM": "rpm", "r/min": "rpm", "rev/min": "rpm", "sec": "s", "msec": "ms", "Volt": "V", "Ampere": "A",
+        "Sekunden": "s", "seconds": "s",
+    }
+)  # fmt: skip
+BRACKETS = re.compile(r".*\S\s*(\[[^\]]+\]|\([^)]+\))")
+NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
+
+
+def spelled(unit: str) -> str:
+    """A unit in railfmi's spelling, without brackets around it."""
+    bare = unit.strip()
+    if _in_brackets(bare):
+        bare = bare[1:-1].strip()
+    return SPELLINGS.get(bare, bare)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that railfmi knows, in any usual spelling."""
+    try:
+        base_exponents(spelled(text))
+    except BadInput:
+        return False
+    return True
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a number, with a decimal point or a decimal comma."""
+    return NUMBER.fullmatch(text.strip()) is not None
+
+
+def is_line_of_units(cells: Sequence[str]) -> bool:
+    """Whether a line of cells states units.
+
+    None is a number, and most of those filled are known units or stand in brackets.
+    """
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    if not filled or any(is_number(cell) for cell in filled):
+        return False
+    return 2 * sum(_in_brackets(cell) or is_unit(cell) for cell in filled) >= len(filled)
+
+
+def _in_brackets(cell: str) -> bool:
+    return cell[:1] + cell[-1:] in ("[]", "()")
+
+
+def units_of(names: Sequence[str], line: Sequence[str] = ()) -> Mapping[str, str]:
+    """Units by column: from the line of units, else known units in brackets behind a name."""
+    found = {}
+    for name in names:
+        bracket = BRACKETS.fullmatch(name.strip())
+        if bracket and is_unit(bracket.group(1)):
+            found[name] = spelled(bracket.group(1))
+    stated = {name: spelled(cell) for name, cell in zip(names, line, strict=False) if cell.strip()}
+    return found | stated

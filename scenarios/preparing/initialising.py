@@ -1,0 +1,103 @@
+"""`railfmi init`: draft an experiment from an FMU and a record."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fmus.errors import BadInput
+from fmus.host.archive import describe
+from scenarios.drawing.typography import aligned
+from scenarios.experiment.experiment import load_experiment
+from scenarios.experiment.record import load_record
+from scenarios.output import writable
+from scenarios.preparing.draft import Draft, doubtful, draft, sure, toml_of, with_column
+from scenarios.preparing.survey import survey
+
+NONE = "-"  # the answer that leaves a variable without a column
+# question, answers, default -> answer
+Ask = Callable[[str, Sequence[str], str], str]
+
+
+@dataclass(frozen=True)
+class Initialised:
+    """What was drafted, and the file that holds it."""
+
+    file: Path
+    draft: Draft
+
+    def lines(self) -> list[str]:
+        """The mapping as a table, and what was found beside it."""
+        d = self.draft
+        rows = [("FMU variable", "", "column", "unit", "unit in the FMU", "how sure")]
+        rows += [
+            (s.variable.name, str(s.variable.causality), s.channel.name, s.unit or "not stated",
+             s.variable.unit or f"{s.model_unit or 'not stated'} (guess)",
+             f"{sure(s.likeness)}, {s.likeness:.0%}")
+            for s in d.signals
+        ]  # fmt: skip
+        lines = aligned(rows)
+        for port in d.ports:
+            far = f", displacement {port.displacement}" if port.displacement else ", no displacement"
+            lines.append(f"port '{port.name}': force {port.force}, velocity {port.velocity}{far}")
+        for v in d.free_inputs:
+            lines.append(f"input '{v.name}' has no column; it is constant at {v.start or 0.0:g}")
+        if d.unused:
+            lines.append(f"columns that are not used: {', '.join(d.unused)}")
+        return lines
+
+
+def init(
+    fmu: str | Path,
+    data: str | Path,
+    out: str | Path = ".",
+    time: str | None = None,
+    ask: Ask | None = None,
+    force: bool = False,
+) -> Initialised:
+    """Write a commented experiment.toml that `close-loop` accepts.
+
+    out: folder of the file. time: the time column, by default it is looked for. ask: asks a user about what
+    is not sure; None takes the likeliest. force: whether an existing experiment.toml may be replaced.
+    Raises BadInput if nothing in the record looks like an output of the FMU.
+    """
+    model, record, folder = Path(fmu), Path(data), Path(out)
+    file = folder / "experiment.toml"
+    if file.exists() and not force:
+        raise BadInput(f"{file}: exists already; give another --out, or --force to replace it")
+    description = describe(model)
+    rasters = survey(record, time)
+    made = max((draft(model, description, raster) for raster in rasters), key=lambda d: len(d.signals))
+    if ask is not None:
+        made = _asked(made, ask)
+    if not made.outputs:
+        raise BadInput(
+            f"{record}: no column looks like an output of {model.name} ({', '.join(description.outputs)}); "
+            f"the columns are {', '.join(c.name for c in made.raster.channels)}; rename one, or run "
+            "the command on a terminal, where it asks"
+        )
+    text = toml_of(made, writable(folder))
+    part = file.with_suffix(".part")
+    part.write_text(text, encoding="utf-8")
+    try:  # what is written must be accepted by close-loop
+        load_record(load_experiment(part), description)
+    except BadInput as error:
+        part.replace(file)
+        said = str(error).replace(str(part), str(file))
+        raise BadInput(f"{file} was written, but has to be completed by hand: {said}") from error
+    part.replace(file)
+    return Initialised(file, made)
+
+
+def _asked(made: Draft, ask: Ask) -> Draft:
+    """The draft after questions about each signal that is not sure, and each output without a column."""
+    for s in doubtful(made):
+        answers = [c.name for c in made.raster.channels]
+        question = f"column of {s.variable.causality} '{s.variable.name}' ({NONE} for none)"
+        answer = ask(question, [*answers, NONE], s.channel.name)
+        made = with_column(made, s.variable.name, None if answer == NONE else answer)
+    taken = {s.variable.name for s in made.signals}
+    for name in made.description.outputs:
+        if name not in taken and made.unused:
+            answer = ask(f"column of output '{name}' ({NONE} for none)", [*made.unused, NONE], NONE)
+            made = with_column(made, name, None if answer == NONE else answer)
+    return made

@@ -1,0 +1,56 @@
+"""Which column of a record is which variable of an FMU: by name, quantity and unit, and how sure that is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import SequenceMatcher
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from fmus.host.description import FmuVariable
+from scenarios.preparing.quantities import alike, known, quantities_of, share_a_word, words_of
+from scenarios.preparing.survey import Channel
+
+SURE = 0.8  # from here on a match is not asked about
+ENOUGH = 0.45  # below it a column and a variable are left apart
+
+
+@dataclass(frozen=True)
+class Match:
+    """A variable and the column that it probably is, with a likeness between 0 and 1."""
+
+    variable: FmuVariable
+    channel: Channel
+    likeness: float
+
+
+def likeness(v: FmuVariable, channel: Channel) -> float:
+    """How much a column looks like a variable: 1 for the same name, 0 if the units contradict each other."""
+    one, other = words_of(v.name), words_of(channel.name)
+    unit = channel.unit if known(channel.unit) else None
+    if v.unit and unit and not alike(unit, v.unit):
+        return 0.0
+    if one == other:
+        return 1.0
+    meant, seen = quantities_of(v.name, v.description), quantities_of(channel.name)
+    score = 0.6 * SequenceMatcher(None, " ".join(one), " ".join(other)).ratio()
+    if share_a_word([*one, *words_of(v.description)], other):
+        score = max(score, 0.7)
+    if set(meant) & set(seen):
+        score = max(score, 0.6)
+    if unit and (v.unit or any(alike(unit, q.unit) for q in meant)):
+        return min(score + 0.3, 0.95)
+    if unit and meant and not v.unit:
+        return score / 3  # the name means another quantity than the unit
+    return score
+
+
+def matches(variables: Sequence[FmuVariable], channels: Sequence[Channel]) -> list[Match]:
+    """The assignment of columns to variables with the largest sum of likeness, each used once at most."""
+    if not variables or not channels:
+        return []
+    score = np.array([[likeness(v, c) for c in channels] for v in variables])
+    rows, columns = linear_sum_assignment(score, maximize=True)
+    at = zip(rows.tolist(), columns.tolist(), strict=True)
+    pairs = [(variables[i], channels[j], float(score[i, j])) for i, j in at]
+    return [Match(v, c, s) for v, c, s in pairs if s >= ENOUGH]

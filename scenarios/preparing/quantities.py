@@ -1,0 +1,81 @@
+"""Physical quantities by the words that people name channels and variables with."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fmus.errors import BadInput
+from fmus.units import base_exponents, conversion
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity: its unit in SI, and the words for it in lower case, symbols among them."""
+
+    name: str
+    unit: str
+    words: tuple[str, ...]
+
+
+QUANTITIES = (
+    Quantity("voltage", "V", ("u", "voltage", "volt", "spannung", "u_a", "v_in", "vin")),
+    Quantity("current", "A", ("i", "current", "strom", "amp", "i_a", "amperage")),
+    Quantity("speed of rotation", "rad/s", ("omega", "w", "n", "speed", "rpm", "drehzahl", "spin")),
+    Quantity("velocity", "m/s", ("v", "velocity", "speed", "geschwindigkeit", "vel", "dot")),
+    Quantity("torque", "N.m", ("t", "m", "torque", "moment", "drehmoment", "tau", "trq")),
+    Quantity("force", "N", ("f", "force", "kraft")),
+    Quantity("angle", "rad", ("theta", "phi", "angle", "winkel", "psi", "alpha", "position")),
+    Quantity("displacement", "m", ("q", "x", "y", "z", "s", "position", "pos", "displacement", "weg")),
+    Quantity("acceleration", "m/s2", ("a", "acc", "acceleration", "beschleunigung", "ddot")),
+    Quantity("temperature", "degC", ("temperature", "temp", "temperatur")),
+    Quantity("pressure", "Pa", ("p", "pressure", "druck")),
+)  # fmt: skip
+_BRACKET = re.compile(r"[\[(].*?[\])]")
+_SPLIT = re.compile(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])")
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name in lower case, without a unit in brackets and without digits at their end."""
+    bare = _BRACKET.sub(" ", name)
+    return [word.lower().rstrip("0123456789") or word for word in _SPLIT.split(bare) if word]
+
+
+def quantities_of(name: str, description: str = "") -> list[Quantity]:
+    """The quantities that a name can mean, likeliest first: by its first word, then by the others."""
+    words = [*words_of(name), *(w for w in words_of(description) if len(w) > 2)]
+    found = [q for word in words for q in QUANTITIES if word in q.words]
+    return list(dict.fromkeys(found))
+
+
+def alike(unit: str, other: str) -> bool:
+    """Whether two units can be converted into each other."""
+    try:
+        conversion(unit, other, "")
+    except BadInput:
+        return False
+    return True
+
+
+def known(unit: str | None) -> bool:
+    """Whether a unit is stated and known."""
+    if not unit:
+        return False
+    try:
+        base_exponents(unit)
+    except BadInput:
+        return False
+    return True
+
+
+def likely_unit(name: str, description: str, column_unit: str | None) -> str | None:
+    """The SI unit that a variable without one probably has; None if its name and its column say nothing."""
+    meant = quantities_of(name, description)
+    if column_unit and known(column_unit):
+        fitting = [q.unit for q in (*meant, *QUANTITIES) if alike(column_unit, q.unit)]
+        return fitting[0] if fitting else column_unit
+    return meant[0].unit if meant else None
+
+
+def share_a_word(one: Sequence[str], other: Sequence[str]) -> bool:
+    """Whether two lists of words have one of at least three letters in common."""
+    return bool({w for w in one if len(w) > 2} & set(other))

@@ -1,0 +1,143 @@
+"""`railfmi close-loop --dry-run`: what a run would do, and what one simulation of it looks like."""
+
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from joblib import cpu_count
+
+from estimator.closeloop.question.problem import Problem
+from estimator.plant import PLANTS
+from estimator.record import Array
+from estimator.sensor_faults import FAULTS
+from fmus.host.apart.isolation import ISOLATED, Isolation
+from fmus.host.archive import describe
+from scenarios.closing.closing import Posed, experiment_of
+from scenarios.drawing.sheet import BEFORE, INK, Plot, envelope, legend, name_axes, sheet, sheets
+from scenarios.drawing.typography import unit
+from scenarios.experiment.conversions import conversion_lines
+from scenarios.output import writable
+
+SHOWN = 0.25  # of the record is drawn, from its beginning
+# of simulations in a whole run, a third and three times of the 89 that the motor of the tutorial took, since
+# what is found decides how many it takes
+RUNS_PER_CANDIDATE = (30.0, 300.0)
+APART = 2.0  # factor between measured and simulated values beyond which a wrong unit is suspected
+PANELS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A trial of an experiment.
+
+    seconds: of one simulation of the record; candidates: effects and sensor faults that would be screened.
+    """
+
+    problem: Problem
+    simulated: Array  # (N, n_y) of the first run
+    seconds: float
+    candidates: int
+    jobs: int
+    pictures: tuple[Path, ...] = ()
+
+    def lines(self) -> list[str]:
+        """The mapping, the fit of the first simulation, and the expected cost."""
+        return [*conversion_lines(self.problem.record), *self._outputs(), *self._cost()]
+
+    def _outputs(self) -> Iterator[str]:
+        record = self.problem.record
+        run = record.runs[0]
+        for note in record.notes:
+            if note.kind != "unit":
+                yield f"note: {note.sentence}"
+        for j, name in enumerate(record.outputs):
+            measured, simulated = run.y[:, j], self.simulated[:, j]
+            rms = float(np.sqrt(np.mean((measured - simulated) ** 2)))
+            share = rms / (float(np.std(measured)) + 1e-300)
+            yield f"{name}: error of the simulation with declared values {rms:.3g}, {share:.0%} of the signal"
+            factor = factor_of(measured, simulated)
+            if factor is not None and not 1 / APART < factor < APART:
+                yield (
+                    f"  measured values are {factor:.3g} times the simulated ones: look at unit, model_unit "
+                    "and the column of this output"
+                )
+
+    def _cost(self) -> Iterator[str]:
+        low, high = (n * self.candidates * self.seconds / self.jobs for n in RUNS_PER_CANDIDATE)
+        effects = f"{self.candidates} candidates (effects at their locations, faults of sensors)"
+        yield f"{effects}; one simulation of the record takes {duration(self.seconds)}"
+        yield f"expected: {duration(low)} to {duration(high)} in {self.jobs} processes"
+        for picture in self.pictures:
+            yield f"picture: {picture}"
+
+
+def dry_run(
+    experiment: str | Path,
+    out: str | Path | None = None,
+    data_dir: str | Path | None = None,
+    jobs: int | None = None,
+    isolation: Isolation | None = ISOLATED,
+) -> Trial:
+    """Read everything, simulate the record with the declared values, and estimate what a run would cost.
+
+    The arguments are those of close_loop. Raises BadInput if the experiment is wrong, FmuEnded if a foreign
+    FMU crashes or passes a limit.
+    """
+    declared = experiment_of(experiment, data_dir)
+    with tempfile.TemporaryDirectory(prefix="railfmi_trial_") as work:
+        problem = Posed.of(declared, Path(work), isolation).problem
+        try:
+            theta = {**problem.declared, **_first_states(problem)}
+            problem.simulate(theta)  # the first one also builds and loads the FMU
+            begun = time.perf_counter()
+            [simulated, *_] = problem.simulate(theta)
+            seconds = time.perf_counter() - begun
+        finally:
+            PLANTS.close()
+        candidates = len(problem.builder.offers) + len(FAULTS) * len(problem.record.outputs)
+        pictures = () if out is None else tuple(_drawn(problem, simulated, writable(Path(out))))
+    return Trial(problem, simulated, seconds, candidates, jobs or cpu_count(), pictures)
+
+
+def _first_states(problem: Problem) -> dict[str, float]:
+    return {name: value for name, (value, _) in problem.start_states(problem.record.runs[0]).items()}
+
+
+def factor_of(measured: Array, simulated: Array) -> float | None:
+    """Factor between two signals (N,) that have the same course, by their spreads; None if they have not."""
+    spreads = float(np.std(measured)), float(np.std(simulated))
+    if not all(np.isfinite(spreads)) or min(spreads) <= 0:
+        return None
+    alike = float(np.corrcoef(measured, simulated)[0, 1])
+    return spreads[0] / spreads[1] if alike > 0.5 else None
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    for limit, word, divisor in ((1.0, "ms", 1e-3), (90.0, "s", 1.0), (5400.0, "min", 60.0)):
+        if seconds < limit:
+            return f"{seconds / divisor:.0f} {word}"
+    return f"{seconds / 3600:.2g} h"
+
+
+def _drawn(problem: Problem, simulated: Array, folder: Path) -> Iterator[Path]:
+    """Measured and simulated outputs over the first part of the record."""
+    record, run = problem.record, problem.record.runs[0]
+    units = {v.name: v.unit for v in describe(problem.builder(())).variables.values()}
+    units |= {c.variable: c.model_unit for c in record.conversions}
+    head = slice(max(2, int(SHOWN * run.t.size)))
+    for ending, some in sheets(list(enumerate(record.outputs)), PANELS):
+        figure, axes = sheet(0.6 + 1.6 * len(some), [[name] for _, name in some], sharex=True)
+        for j, name in some:
+            ax = axes[name]
+            ax.plot(*envelope(run.t[head], run.y[head, j]), color=INK, linewidth=0.9, label="measured")
+            drawn = envelope(run.t[head], simulated[head, j])
+            ax.plot(*drawn, color=BEFORE, linewidth=1.1, label="simulated with the declared values")
+            name_axes(ax, "", unit(units.get(name)) or "1", name)
+        axes[some[-1][1]].set_xlabel("time in s", fontsize=9)
+        legend(figure, axes[some[0][1]])
+        Plot(f"dry_run{ending}", figure, "Measured and simulated outputs.").write(folder)
+        yield folder / f"dry_run{ending}.png"

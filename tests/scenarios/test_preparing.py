@@ -1,0 +1,329 @@
+"""The way in: a record surveyed, columns matched to variables, an experiment drafted, a trial run."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fmus.errors import BadInput
+from fmus.host.description import FmuDescription, FmuVariable
+from scenarios.cli.app import run_safely
+from scenarios.cli.console import interrupted, say_notices, will_write
+from scenarios.experiment.experiment import load_experiment
+from scenarios.output import WRITING, replaced
+from scenarios.preparing.draft import draft, toml_of, with_column
+from scenarios.preparing.initialising import init
+from scenarios.preparing.inspecting import bandwidth, inspect
+from scenarios.preparing.matching import SURE, likeness, matches
+from scenarios.preparing.survey import Channel, survey
+from scenarios.preparing.trial import dry_run, duration, factor_of
+from tests.helpers.foreign import foreign_builder
+from tests.helpers.paths import SHIPPED
+
+DEMO = SHIPPED / "demo" / "rig-drag"
+T = np.arange(1000) * 0.01
+
+
+def variable(name, causality="output", unit=None, start=None, description="", **more):
+    given = {"min": None, "max": None, "nominal": None, **more}
+    return FmuVariable(name, 0, causality, "continuous", None, unit, start, description=description, **given)
+
+
+def fmu(*variables):
+    return FmuDescription("Motor", "2.0", "Motor", "{0}", {v.name: v for v in variables})
+
+
+MOTOR = fmu(
+    variable("u", "input", start=0.0),
+    variable("T_load", "input", start=0.0),
+    variable("R", "parameter", start=1.2, max=1.3),
+    variable("k", "parameter", start=-0.05),
+    variable("zero", "parameter", start=0.0),
+    variable("i"),
+    variable("omega"),
+)
+
+
+def channel(name, unit=None):
+    return Channel(name, unit, np.sin(T), ())
+
+
+def log(folder, text_of_units="s,V,rpm,mA", begin=1234.5, names="time,voltage,speed,current", **columns):
+    """A record of a motor as a logger writes it."""
+    file = folder / "log.csv"
+    rng = np.random.default_rng(0)
+    cells = {"t": begin + T, "u": np.sin(T), "n": 100 * np.cos(T), "i": rng.normal(size=T.size)} | columns
+    lines = pd.DataFrame(cells).to_csv(None, index=False, header=False)
+    file.write_text("\n".join([names, *([text_of_units] if text_of_units else []), lines]))
+    return file
+
+
+# --- survey
+
+
+def test_a_survey_finds_time_rate_units_and_gaps(tmp_path):
+    u = np.sin(T)
+    u[5] = np.nan
+    file = log(tmp_path, u=u)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([*lines[:500], *lines[700:]]) + "\n")
+    [raster] = survey(file)
+    assert (raster.time, raster.step) == ("time", pytest.approx(0.01))
+    assert [(c.name, c.unit) for c in raster.channels] == [
+        ("voltage", "V"), ("speed", "rpm"), ("current", "mA"),
+    ]  # fmt: skip
+    assert "no number in 1 of 800 rows" in raster.channels[0].remarks
+    assert any(r.startswith("no data from 1239.47 to 1241.48 s") for r in raster.remarks)
+    assert raster.longest() == pytest.approx((1234.5, 1239.47))
+
+
+def test_without_a_time_a_survey_says_so(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("a,b\n1,2\n0,3\n2,1\n")
+    with pytest.raises(BadInput, match=r"no column increases from row to row.*--time"):
+        survey(file)
+    with pytest.raises(BadInput, match="column 'a' does not increase"):
+        survey(file, "a")
+    with pytest.raises(BadInput, match="has no time column 'c'"):
+        survey(file, "c")
+
+
+def test_several_rates_are_several_rasters(tmp_path):
+    from tests.scenarios.test_readers import mdf
+
+    fast = {"time": T, "speed": np.sin(T)}
+    slow = {"time": T[::10], "temp": np.cos(T[::10]), "press": np.cos(T[::10])}
+    mdf(tmp_path / "a.mf4", {"fast": fast, "slow": slow})
+    rasters = survey(tmp_path / "a.mf4")
+    assert {round(r.step, 6): len(r.channels) for r in rasters} == {0.1: 2, 0.01: 1}
+
+
+def test_the_bandwidth_is_that_of_the_signal():
+    step, t = 0.01, np.arange(20000) * 0.01
+    slow = np.sin(2 * np.pi * 1.0 * t)
+    assert bandwidth(slow, step) == pytest.approx(1.0, abs=0.2)
+    assert bandwidth(slow + 0.5 * np.sin(2 * np.pi * 20 * t), step) == pytest.approx(20, abs=0.5)
+
+
+def test_the_noise_of_a_channel_is_found():
+    rng = np.random.default_rng(3)
+    assert Channel("a", None, np.sin(T) + rng.normal(0, 0.02, T.size), ()).noise == pytest.approx(
+        0.02, rel=0.1
+    )
+
+
+# --- matching
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "column", "column_unit", "sure"),
+    [
+        ("omega", None, "omega", None, True),
+        ("omega", "rad/s", "speed", "rpm", True),
+        ("u", None, "Voltage [V]", "V", True),
+        ("T_P", "N.m", "T_P", None, True),
+        ("x", "m", "n", "rpm", False),  # the units contradict each other
+        ("omega", None, "speed", "m/s", False),
+        ("a", None, "bogus", None, False),
+    ],
+)
+def test_likeness(name, unit, column, column_unit, sure):
+    found = likeness(variable(name, unit=unit), channel(column, column_unit))
+    assert 0.0 <= found <= 1.0
+    assert (found >= SURE) == sure
+
+
+@given(st.permutations(["voltage", "speed", "current", "junk"]))
+def test_the_order_of_the_columns_does_not_matter(names):
+    units = {"voltage": "V", "speed": "rpm", "current": "mA", "junk": "degC"}
+    signals = [MOTOR.variables[n] for n in (*MOTOR.inputs, *MOTOR.outputs)]
+    found = matches(signals, [channel(n, units[n]) for n in names])
+    assert {m.variable.name: m.channel.name for m in found} == {
+        "u": "voltage", "omega": "speed", "i": "current",
+    }  # fmt: skip
+
+
+def drafted(folder, description=MOTOR, **record):
+    [raster] = survey(log(folder, **record))
+    return draft(folder / "Motor.fmu", description, raster)
+
+
+def test_a_draft_guesses_units_ports_split_and_bounds(tmp_path):
+    made = drafted(tmp_path)
+    assert {s.variable.name: s.model_unit for s in made.signals} == {"u": "V", "i": "A", "omega": "rad/s"}
+    [port] = made.ports
+    assert (port.force, port.velocity, port.displacement) == ("T_load", "omega", None)
+    file = tmp_path / "experiment.toml"
+    file.write_text(toml_of(made, tmp_path))
+    e = load_experiment(file)
+    assert e.calibrate == {"R": (0.96, 1.3), "k": (-0.06, -0.04)}  # within the FMU's limits; not around 0
+    assert e.split.identify == pytest.approx((1234.5, 1240.99), abs=0.01)
+    assert e.split.test[1] <= 1234.5 + T[-1] + 1e-9
+
+
+def test_a_port_takes_the_displacement_that_the_fmu_gives(tmp_path):
+    more = fmu(*MOTOR.variables.values(), variable("theta"))
+    assert drafted(tmp_path, more).ports[0].displacement == "theta"
+
+
+def test_many_parameters_are_left_to_the_user(tmp_path):
+    many = fmu(*MOTOR.variables.values(), *(variable(f"p{i}", "parameter", start=1.0) for i in range(9)))
+    text = toml_of(drafted(tmp_path, many), tmp_path)
+    assert "# p3 = [0.8, 1.2]" in text
+    (tmp_path / "experiment.toml").write_text(text)
+    assert load_experiment(tmp_path / "experiment.toml").calibrate == {}
+
+
+def test_another_column_may_be_chosen(tmp_path):
+    made = with_column(drafted(tmp_path), "omega", None)
+    assert made.unused == ["speed"]
+    assert made.ports[0].velocity == "omega"
+    assert [s.channel.name for s in with_column(made, "i", "speed").outputs] == ["speed"]
+
+
+# --- commands
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """The test rig's FMU."""
+    folder = tmp_path_factory.mktemp("rig")
+    assert run_safely(["build", "testrig", "--out", str(folder)]) == 0
+    return folder / "Testrig.fmu"
+
+
+def test_init_writes_what_close_loop_accepts(rig, tmp_path, capsys):
+    assert run_safely(["init", str(rig), str(DEMO / "data.csv"), "--out", str(tmp_path)]) == 0
+    assert "omega_r" in capsys.readouterr().out
+    e = load_experiment(tmp_path / "experiment.toml")
+    assert {n: o.column for n, o in e.outputs.items()} == {"omega_w": "omega_w", "omega_r": "omega_r"}
+    assert {n: c.column for n, c in e.input_columns.items()} == {"T_P": "T_P", "f_sync": "f_sync"}
+    assert {p.force for p in e.ports} == {"T_w_ext", "T_r_ext"}
+    assert [p.velocity for p in e.ports] == ["omega_w", "omega_r"]
+    # and nothing is replaced without being asked to
+    assert run_safely(["init", str(rig), str(DEMO / "data.csv"), "--out", str(tmp_path)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert run_safely(["init", str(rig), str(DEMO / "data.csv"), "--out", str(tmp_path), "--force"]) == 0
+
+
+def test_init_asks_what_is_not_sure_and_nothing_else(rig, tmp_path):
+    data = pd.read_csv(DEMO / "data.csv").rename(columns={"omega_w": "kanal 7"})
+    data.to_csv(tmp_path / "data.csv", index=False)
+    asked = []
+
+    def ask(question, answers, default):
+        asked.append(question)
+        return "kanal 7" if "'omega_w'" in question else default
+
+    made = init(rig, tmp_path / "data.csv", tmp_path, ask=ask)
+    assert any("'omega_w'" in question for question in asked)
+    assert not any("'omega_r'" in question for question in asked)
+    assert load_experiment(made.file).outputs["omega_w"].column == "kanal 7"
+
+
+def test_init_refuses_a_record_of_something_else(rig, tmp_path):
+    file = tmp_path / "a.csv"
+    pd.DataFrame({"time": T, "zzz": T}).to_csv(file, index=False)
+    with pytest.raises(BadInput, match=r"no column looks like an output of Testrig\.fmu"):
+        init(rig, file, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_trial_tells_mapping_fit_and_cost(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert run_safely(["close-loop", str(DEMO), "--dry-run", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "omega_w       omega_w  rad/s       rad/s            as it is" in said
+    assert "candidates" in said
+    assert "expected:" in said
+    assert [f.name for f in sorted(out.iterdir())] == ["dry_run.png", "dry_run.svg"]
+
+
+def test_a_trial_notices_a_wrong_unit(tmp_path):
+    """Columns in rad/s that are declared as rpm are ten times too small after the conversion."""
+    (tmp_path / "data.csv").write_bytes((DEMO / "data.csv").read_bytes())
+    text = (DEMO / "experiment.toml").read_text().replace('unit = "rad/s"', 'unit = "rpm"')
+    (tmp_path / "experiment.toml").write_text(text)
+    trial = dry_run(tmp_path)
+    assert sum("look at unit, model_unit" in line for line in trial.lines()) == 2
+    assert not any("look at unit" in line for line in dry_run(DEMO).lines())
+    assert trial.candidates == dry_run(DEMO).candidates > 20
+
+
+@given(st.floats(0.01, 100))
+def test_the_factor_between_signals_of_one_course(factor):
+    x = np.sin(T)
+    assert factor_of(factor * x, x) == pytest.approx(factor)
+    assert factor_of(np.cos(40 * T), x) is None
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.13, "130 ms"), (4.2, "4 s"), (300, "5 min"), (7200, "2 h")]
+)
+def test_durations(seconds, words):
+    assert duration(seconds) == words
+
+
+def test_inspecting_an_fmu_tells_what_is_missing(tmp_path):
+    said = "\n".join(inspect(foreign_builder(tmp_path)()))
+    assert "whether it can be used: railfmi check" in said
+    assert "state" in said
+
+
+# --- folders and conversions
+
+
+def test_a_command_says_what_it_replaces(tmp_path, capsys):
+    will_write(tmp_path)
+    say_notices()
+    assert capsys.readouterr().err == ""
+    (tmp_path / "result.json").write_text("{}")
+    will_write(tmp_path)
+    say_notices()
+    assert "held earlier results (result.json, of 2" in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_files_that_are_not_complete_are_no_earlier_results(tmp_path):
+    (tmp_path / f"{WRITING}1_x").mkdir()
+    (tmp_path / f"{WRITING}1_x" / "result.json").write_text("{}")
+    assert replaced(tmp_path) == ""
+    (tmp_path / "plan.json").write_text("{}")
+    assert "(plan.json, of 2" in replaced(tmp_path)
+
+
+@pytest.mark.parametrize("code", [0, 1, 130])
+def test_an_interrupted_command_does_not_say_that_it_replaced_results(tmp_path, monkeypatch, capsys, code):
+    def command(_arguments, standalone_mode):
+        will_write(tmp_path)
+        return interrupted("nothing is kept").exit_code if code == 130 else code
+
+    (tmp_path / "result.json").write_text("{}")
+    monkeypatch.setattr("scenarios.cli.app.loaded", lambda _: command)
+    assert run_safely([]) == code
+    assert ("were replaced" in capsys.readouterr().err.replace("\n", " ")) == (code != 130)
+
+
+def test_each_command_has_a_folder_of_its_own():
+    from inspect import signature
+
+    from scenarios.cli import (
+        close_loop,
+        compare,
+        conicity,
+        conicity_norm,
+        estimate,
+        import_ssp,
+        inspect,
+        plan,
+        row,
+        run,
+    )
+
+    modules = [
+        close_loop.close_loop, estimate.estimate, compare.compare, row.rebuild, run.run_scenarios,
+        import_ssp.import_package, plan.plan, inspect.inspect, conicity.conicity, conicity_norm.conicity_norm,
+    ]  # fmt: skip
+    folders = [str(signature(command).parameters["out"].default) for command in modules]
+    assert len(set(folders)) == len(folders)
+    assert all(folder.startswith("out/") for folder in folders)
