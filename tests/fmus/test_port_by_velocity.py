@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from estimator.closeloop.screening.missing_force import _motion
+from estimator.closeloop.screening.missing_force import motion_of
 from fmus.drive.model import Drive
 from fmus.effects import EFFECTS, offers
 from fmus.effects.force_law import ForceLaw
@@ -78,10 +78,10 @@ def test_the_motion_is_that_with_a_displacement(drive, tmp_path, kind):
 def test_a_displacement_that_nobody_gives_is_the_integral_of_the_velocity():
     t = np.linspace(0, 1, 1001)
     motion = np.column_stack([np.cos(t), np.cos(t)])
-    q, v = _motion(FAST, 0, t, motion)
+    q, v = motion_of(FAST, 0, t, motion)
     assert_allclose(q, np.sin(t), atol=1e-6)
     assert_allclose(v, np.cos(t))
-    assert _motion(FULL, 0, t, motion)[0] is not q
+    assert motion_of(FULL, 0, t, motion)[0] is not q
 
 
 @pytest.mark.parametrize(
