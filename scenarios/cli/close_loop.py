@@ -51,36 +51,53 @@ def close_loop(
     Several experiments get a folder each and a common table. If they use the same FMU, each effect found is
     tested on the other records and fitted to all of them. Ctrl-C keeps the experiments that are finished.
     """
-    from fmus.host.apart.isolation import FmuEnded, Isolation
+    from fmus.host.apart.isolation import Isolation
 
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     if dry_run:
         _try(experiments, out, data, jobs, isolation)
         return
-    from fmus.host.fmu import FmuError
-    from scenarios.closing.lines import lines_of, table_of
-
     will_write(out)
     if len(experiments) == 1:
-        from scenarios.closing.closing import STAGES
-        from scenarios.closing.closing import close_loop as run
+        _one(experiments[0], out, data, jobs, seed, resume, isolation)
+    else:
+        _several(experiments, out, data, jobs, seed, resume, isolation)
 
-        try:
-            with said.status("reading the experiment") as status:
-                result = run(experiments[0], out, data, status.update, jobs, seed, resume, isolation, show)
-        except KeyboardInterrupt:
-            raise interrupted(RESUME) from None
-        except FmuError as error:
-            if not INTERRUPTED.came:  # an FMU in Python takes the exception for a failure of its own
-                raise
-            raise interrupted(RESUME) from error
-        except FmuEnded as error:
-            kept = "; --resume continues from the checkpoints" if (out / STAGES).is_dir() else ""
-            raise FmuEnded(f"{error}{kept}") from error
-        for line in lines_of(result):
-            typer.echo(line)
-        typer.echo(f"report: {out / 'report.html'}")
-        return
+
+def _one(
+    experiment: Path, out: Path, data: Path | None, jobs: int | None, seed: int, resume: bool,
+    isolation: "Isolation | None",
+) -> None:  # fmt: skip
+    """Close the loop on one experiment and print its answer."""
+    from fmus.host.apart.isolation import FmuEnded
+    from fmus.host.fmu import FmuError
+    from scenarios.closing.closing import STAGES
+    from scenarios.closing.closing import close_loop as run
+    from scenarios.closing.lines import lines_of
+
+    try:
+        with said.status("reading the experiment") as status:
+            result = run(experiment, out, data, status.update, jobs, seed, resume, isolation, show)
+    except KeyboardInterrupt:
+        raise interrupted(RESUME) from None
+    except FmuError as error:
+        if not INTERRUPTED.came:  # an FMU in Python takes the exception for a failure of its own
+            raise
+        raise interrupted(RESUME) from error
+    except FmuEnded as error:
+        kept = "; --resume continues from the checkpoints" if (out / STAGES).is_dir() else ""
+        raise FmuEnded(f"{error}{kept}") from error
+    for line in lines_of(result):
+        typer.echo(line)
+    typer.echo(f"report: {out / 'report.html'}")
+
+
+def _several(
+    experiments: list[Path], out: Path, data: Path | None, jobs: int | None, seed: int, resume: bool,
+    isolation: "Isolation | None",
+) -> None:  # fmt: skip
+    """Close the loop on several experiments and print a table."""
+    from scenarios.closing.lines import table_of
     from scenarios.closing.several import close_loops as run_all
 
     with said.status("reading the experiments") as status:

@@ -1,26 +1,22 @@
 """Errors that hold over the forms of a model that are as plausible as the chosen one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
-from estimator.closeloop.fitting.fit import fit
-from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
-from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array, Run
-from estimator.weighting import Weighting
 from tests.helpers.baselines import baseline
+from tests.helpers.fitters import SIZE, Refitter
 from tests.helpers.problems import OneByOne, record_with
 
-SIZE = np.array([0.1])
 LAW = Candidate("viscous_damping", "here", (Unknown("c", 1.0, -np.inf, np.inf, 1.0),))
 GAIN = Unknown("g", 1.0, -np.inf, np.inf, 1.0)
 T = np.arange(2000) * 0.01
@@ -51,21 +47,6 @@ class Formed(OneByOne):
         [run], form = self.record.runs, self.declared["form"]
         y = theta["g"] * np.sin(T) + theta["c"] * (1 + 0.3 * form) * np.cos(T) + self.bend * form * T
         return run.y - y[:, None]
-
-
-class Refitter(Fitter):
-    """Fits without an FMU."""
-
-    def finished(
-        self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
-        guess: Mapping[str, Array] | None = None, step: float = STEP,
-    ) -> list[Hypothesis]:  # fmt: skip
-        """See Fitter."""
-        [p], weighting = promises, Weighting.white(SIZE)
-        every = [*(unknowns or ()), *p.candidates[0].unknowns]
-        return [
-            Hypothesis(p.candidates, fit(self.baseline.problem, every, weighting, p.start, step=step), ())
-        ]
 
 
 def found_by(problem: Formed) -> tuple[Refitter, Hypothesis]:

@@ -1,15 +1,13 @@
 """Rivals of an answer are fitted from its values and as carefully as it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import carefully
-from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
@@ -17,11 +15,10 @@ from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.search.rivals import as_carefully, from_its_values
 from estimator.record import Array, Run
-from estimator.weighting import Weighting
 from tests.helpers.baselines import NOTHING, baseline
+from tests.helpers.fitters import SIZE, Refitter
 from tests.helpers.problems import OneByOne, record_with
 
-SIZE = np.array([0.1])
 STIFFNESS = Unknown("k", 10.0, 0.0, np.inf, 10.0)
 TURNS_OFF = 3.0  # N/m too stiff a start, several turns of the motion away
 
@@ -51,21 +48,6 @@ class Swinging(OneByOne):
         [run] = self.record.runs
         [q] = (v for n, v in theta.items() if n.endswith("_q"))
         return run.y - q * np.cos(np.sqrt(theta["k"]) * run.t)[:, None]
-
-
-class Refitter(Fitter):
-    """Fits without an FMU."""
-
-    def finished(
-        self, promises: Sequence[Promise], unknowns: Sequence[Unknown] | None = None,
-        guess: Mapping[str, Array] | None = None, step: float = STEP,
-    ) -> list[Hypothesis]:  # fmt: skip
-        """See Fitter."""
-        [p], weighting = promises, Weighting.white(SIZE)
-        every = [*(unknowns or ()), *p.candidates[0].unknowns]
-        return [
-            Hypothesis(p.candidates, fit(self.baseline.problem, every, weighting, p.start, step=step), ())
-        ]
 
 
 def fitted(fitter: Fitter, kind: str, k: float) -> Hypothesis:
