@@ -19,9 +19,9 @@ scenarios: .venv/ready  ## all scenarios, with their figures and a contact sheet
 test: .venv/ready-dev  ## everything that is fast
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
-test-all: .venv/ready-dev  ## the slow ones too, and other importers of FMUs
+test-all: .venv/ready-dev  ## the slow ones too, on examples drawn anew, and other importers of FMUs
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[interop]'
-	$(BIN)/python -m pytest -m "" -n auto --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest -m "" --hypothesis-profile=railfmi -n auto --maxprocesses 4 --dist loadfile
 
 lint: .venv/ready-dev
 	$(BIN)/ruff check .
