@@ -72,6 +72,48 @@ class DetectionPolicy:
 
 
 @dataclass(frozen=True)
+class StartPolicy:
+    """Limits of the first guess of a measured start state, by a polynomial through the first samples."""
+
+    samples: int = limit(
+        20,
+        "samples",
+        "largest number of first samples through which the polynomial is laid",
+        "convention: a motion with less than one turn within them is followed by the degrees that are tried",
+    )
+    fewest: int = limit(
+        8,
+        "samples",
+        "smallest number of first samples that is tried",
+        "derivation: the guess by a line through them has two thirds of the noise as its error",
+    )
+    apart: int = limit(
+        4,
+        "samples",
+        "by which the numbers of first samples that are tried differ",
+        "derivation: the error by a line changes by a sixth at most from one number to the next",
+    )
+    degree: int = limit(
+        6,
+        "powers",
+        "highest degree of the polynomial",
+        "derivation: follows one turn within the samples to a hundredth of its amplitude",
+    )
+    spare: int = limit(
+        4,
+        "samples",
+        "samples more than coefficients, from whose misfit the noise is estimated",
+        "derivation: the estimate scatters by a third of the noise",
+    )
+    error: float = limit(
+        3.0,
+        "times the scatter",
+        "bound of the error of the guess within which the start state is fitted",
+        "derivation: 1 in 370 by the normal distribution",
+    )
+
+
+@dataclass(frozen=True)
 class InputPolicy:
     """Limits of the noise of the recorded inputs: when it is noise, and how it is smoothed and carried on."""
 
@@ -424,8 +466,9 @@ class DecisionPolicy:
 
 @dataclass(frozen=True)
 class Policy:
-    """All limits, grouped by inputs, detection, search and decision."""
+    """All limits, grouped by start states, inputs, detection, search and decision."""
 
+    start: StartPolicy = StartPolicy()
     inputs: InputPolicy = InputPolicy()
     detection: DetectionPolicy = DetectionPolicy()
     search: SearchPolicy = SearchPolicy()

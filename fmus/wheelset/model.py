@@ -263,8 +263,12 @@ class Wheelset(Model):
         }
 
     def groups(m) -> dict[str, tuple[str, ...]]:
-        """What a change of the rail's surface changes together."""
-        return {"friction_condition": PARAMETERS}
+        """What a change of the rail's surface changes together.
+
+        The scales of the model's form are means over the forces and creepages that occur, so that they change
+        with the friction.
+        """
+        return {"friction_condition": (*PARAMETERS, *m.form)}
 
     @cached_property
     def _curves(m) -> dict[str, Expr]:

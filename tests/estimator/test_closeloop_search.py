@@ -31,7 +31,7 @@ from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search.lookalikes import lookalikes
 from estimator.closeloop.search.nomination import overlooked
 from estimator.closeloop.search.onset import ONSET_BLOCKS, onset
-from estimator.closeloop.search.simpler import from_the_start
+from estimator.closeloop.search.simpler import from_the_start, in_groups
 from estimator.plant import between
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -409,3 +409,31 @@ def test_an_effect_that_sets_in_is_also_tried_from_the_start():
     assert promise.candidates == always.candidates
     assert promise.start["damping_change_secondary_change"] == 0.5
     assert from_the_start([late], late.candidates) == []
+
+
+def step_of(location, *amplitudes, cost):
+    """A hypothesis of a step at 20 s whose fit left so much; each amplitude is 0.3."""
+    prefix = f"parameter_step_{location}_"
+    sizes = tuple(Unknown(prefix + name, 0.0, -9.0, 9.0, 1.0) for name in amplitudes)
+    onset = (Unknown(prefix + "t0", 20.0, 0.0, 40.0, 1.0),)
+    k = Unknown("k", 1.0, 0.0, 2.0, 1.0)
+    values = np.array([*(0.3 for _ in sizes), 20.0, 1.1])
+    n = len(values)
+    left = np.full(100, np.sqrt(cost / 100))
+    fit = fit_with((*sizes, *onset, k), values, np.eye(n), left, np.zeros((100, n)))
+    return Hypothesis((Candidate("parameter_step", location, sizes, onset),), fit, ())
+
+
+def test_a_group_starts_where_the_best_of_its_parameters_has_arrived():
+    one = step_of("mu0", "delta", cost=50.0)
+    behind = step_of("friction", "delta_mu0", "delta_A", cost=80.0)
+    another = step_of("axle", "delta_r0", "delta_s", cost=80.0)
+    every = [h.candidates[0] for h in (one, behind, another)]
+    [promise] = in_groups([one, behind], every)
+    assert promise.candidates == behind.candidates
+    prefix = "parameter_step_friction_"
+    assert promise.start[prefix + "delta_mu0"] == 0.3
+    assert promise.start[prefix + "delta_A"] == 0.0
+    assert promise.start[prefix + "t0"] == 20.0
+    assert promise.start["k"] == 1.1
+    assert in_groups([one, step_of("friction", "delta_mu0", "delta_A", cost=50.0)], every) == []

@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.question.problem import START_ERROR, START_SAMPLES, smooth_start
+from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.question.problem import smooth_start
 
-T = np.arange(START_SAMPLES) * 0.01
+LIMITS = DEFAULT.start
+T = np.arange(LIMITS.samples) * 0.01
 
 
 @given(
@@ -18,31 +20,31 @@ def test_the_guess_is_within_its_bounds_wherever_an_oscillation_begins(f, phase,
     """Up to 0.8 of a turn within the samples, at any phase."""
     y = offset + np.sin(2 * np.pi * f * T + phase)
     noisy = y + noise * np.random.default_rng(seed).standard_normal(len(T))
-    value, scatter = smooth_start(T, noisy)
-    assert abs(value - y[0]) < 2 * START_ERROR * max(scatter, noise)
+    value, scatter = smooth_start(T, noisy, LIMITS)
+    assert abs(value - y[0]) < 2 * LIMITS.error * max(scatter, noise)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_line_stays_a_line(seed):
     """The guess keeps about the error of a line."""
     noisy = 1.0 + 2.0 * T + 0.01 * np.random.default_rng(seed).standard_normal(len(T))
-    assert smooth_start(T, noisy)[0] == pytest.approx(1.0, abs=0.04)
+    assert smooth_start(T, noisy, LIMITS)[0] == pytest.approx(1.0, abs=0.04)
 
 
 def test_a_fast_oscillation_is_followed_by_few_samples():
     """2.2 turns within the samples: no polynomial follows them all."""
     y = np.sin(2 * np.pi * 11.0 * T + 0.3)
-    assert smooth_start(T, y)[0] == pytest.approx(np.sin(0.3), abs=0.1)
+    assert smooth_start(T, y, LIMITS)[0] == pytest.approx(np.sin(0.3), abs=0.1)
 
 
 def test_the_scatter_is_that_of_the_noise():
     rng = np.random.default_rng(0)
-    scatter = [smooth_start(T, 1.0 + T + 0.01 * rng.standard_normal(len(T)))[1] for _ in range(200)]
+    scatter = [smooth_start(T, 1.0 + T + 0.01 * rng.standard_normal(len(T)), LIMITS)[1] for _ in range(200)]
     assert np.median(scatter) == pytest.approx(0.01, rel=0.25)  # the smallest error is also one by chance
 
 
 @pytest.mark.parametrize("n", [1, 2, 5])
 def test_few_samples_are_enough(n):
-    value, scatter = smooth_start(T[:n], np.linspace(1.0, 2.0, n))
+    value, scatter = smooth_start(T[:n], np.linspace(1.0, 2.0, n), LIMITS)
     assert value == pytest.approx(1.0)
     assert np.isfinite(scatter)

@@ -63,7 +63,7 @@ def test_unsymmetric_difference_has_the_wave_of_its_integrated_motion(slopes, ce
 def test_unlike_diameters_move_the_middle_and_leave_the_wave(conicity, more, amplitude):
     table = table_of(2 * conicity * Y + 2 * conicity * more)
     assert_allclose(equivalent_conicity(table, amplitude), conicity, rtol=1e-6)
-    levelled = NOTHING * (Y[1] - Y[0]) / (4 * conicity * amplitude)  # a tabulated dr below NOTHING counts as none
+    levelled = NOTHING * (Y[1] - Y[0]) / (4 * conicity * amplitude)  # a dr below NOTHING is none
     assert_allclose(np.mean(turning_points(table, amplitude)), -more, rtol=0, atol=1e-12 + levelled)
     for form in (linear_conicity, harmonic_conicity):
         assert_allclose(form(table, amplitude), conicity, rtol=1e-9)

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from estimator.closeloop.policy import DEFAULT, Policy
+from estimator.closeloop.policy import DEFAULT, Policy, StartPolicy
 from estimator.closeloop.question.input_noise import InputNoise
 from estimator.plant import PLANTS, Plant
 from estimator.record import Array, Record, Run
@@ -19,12 +19,6 @@ from fmus.aside import set_aside
 from fmus.export.around.outside import Outside
 from fmus.host.apart.isolation import Isolation
 from fmus.host.description import PortNames
-
-START_SAMPLES = 20  # first samples from which the start value of a measured state is estimated
-SHORTER_STARTS = (8, 12, 16)  # numbers of first samples that are tried too
-HIGHEST_DEGREE = 6  # of the polynomial through them
-FREE_SAMPLES = 4  # samples more than coefficients, at least
-START_ERROR = 3.0  # times the scatter of these samples: bound of the error of that start value
 
 
 @dataclass(frozen=True)
@@ -159,13 +153,14 @@ class Problem:
         If the state is measured, the guess comes from a polynomial through the first samples; otherwise it is
         the start value of the FMU, with an infinite bound.
         """
-        head = slice(START_SAMPLES)
+        limits = self.policy.start
+        head = slice(limits.samples)
         guess = {}
         for name in self.free_states:
             if name in self.measured_state:
                 t, y = run.t[head] - run.t[0], run.y[head, self.measured_state[name]]
-                value, scatter = smooth_start(t, y)
-                guess[name] = value, START_ERROR * scatter
+                value, scatter = smooth_start(t, y, limits)
+                guess[name] = value, limits.error * scatter
             else:
                 guess[name] = self.plant.fmu.description.variables[name].start or 0.0, np.inf
         return guess
@@ -209,7 +204,7 @@ class Problem:
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
 
 
-def smooth_start(t: Array, y: Array) -> tuple[float, float]:
+def smooth_start(t: Array, y: Array, limits: StartPolicy) -> tuple[float, float]:
     """Value at the first of the samples y (N,) at times t (N,), and the scatter of the samples used.
 
     A polynomial through some of the first samples gives the value. Degree and number of samples are those
@@ -217,8 +212,8 @@ def smooth_start(t: Array, y: Array) -> tuple[float, float]:
     they cover a large part of an oscillation.
     """
     found = [(np.inf, float(y[0]), float(np.std(y)))]
-    for n in sorted({len(t), *(m for m in SHORTER_STARTS if m < len(t))}):
-        for degree in range(1, min(HIGHEST_DEGREE, n - FREE_SAMPLES - 1) + 1):
+    for n in sorted({len(t), *range(limits.fewest, len(t), limits.apart)}):
+        for degree in range(1, min(limits.degree, n - limits.spare - 1) + 1):
             powers = ((t[:n] - t[0]) / (t[n - 1] - t[0]))[:, None] ** np.arange(degree + 1)
             q, r = np.linalg.qr(powers)
             coefficients = np.linalg.solve(r, q.T @ y[:n])

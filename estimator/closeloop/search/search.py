@@ -22,7 +22,7 @@ from estimator.closeloop.search.onset import since
 from estimator.closeloop.search.pairs import beside, try_pairs
 from estimator.closeloop.search.rivals import from_its_values
 from estimator.closeloop.search.screened import Screened
-from estimator.closeloop.search.simpler import from_the_start, simpler
+from estimator.closeloop.search.simpler import from_the_start, in_groups, simpler
 
 
 @dataclass(frozen=True)
@@ -188,9 +188,13 @@ class Search:
         """
         s = self.screened
         found = self._form.ranked(best_by_label(found))
-        if not found or (s.baseline.noise.known and not s.explained(found[:1])):
+        if not found:
             return found
         every = [c for c, _ in s.change]
+        if whole := self.fitter.finished(in_groups(found, every)):
+            found = self._form.ranked(best_by_label([*found, *whole]))
+        if s.baseline.noise.known and not s.explained(found[:1]):
+            return found
         leading = found[: s.problem.policy.search.finalists]
         promises = [*simpler(found, every), *from_the_start(leading, every)]
         promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)

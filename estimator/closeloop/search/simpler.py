@@ -1,12 +1,16 @@
-"""Replaces a law by a simpler one that is its limit, and an effect that sets in by one from the start."""
+"""Fits in place of the best hypothesis those that contain it or that it contains.
+
+A law is replaced by a simpler one that is its limit, an effect that sets in by one from the start, and the
+change of a parameter by that of a group with this parameter.
+"""
 
 from collections.abc import Sequence
 from itertools import product
 
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct, key
-from estimator.closeloop.hypotheses.relations import limits
+from estimator.closeloop.hypotheses.relations import groups_with, limits
 
 
 def simpler(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> list[Promise]:
@@ -34,6 +38,31 @@ def from_the_start(found: Sequence[Hypothesis], candidates: Sequence[Candidate])
             same = (c for c in candidates if c.label == h.label and c.onset is None)
             promises += [Promise((c,), 0.0, _start(h, (c,))) for c in same]
     return promises
+
+
+def in_groups(found: Sequence[Hypothesis], candidates: Sequence[Candidate]) -> list[Promise]:
+    """Promises of the best of `found` with the change of a parameter replaced by that of a group with it.
+
+    With no change of the others the group is the parameter alone, so that it cannot fit worse. Where it does,
+    or was not fitted, its fit has not arrived; it starts there.
+    """
+    best = found[0]
+    known = {h.key for h in found if cost(h) <= cost(best)}
+    promises = []
+    for i, c in enumerate(best.candidates):
+        for group in (g for g in candidates if groups_with(g, c)):
+            laws = (*best.candidates[:i], group, *best.candidates[i + 1 :])
+            if key(laws) not in known:
+                promises.append(Promise(laws, 0.0, {**best.theta, **_alone(group, c, best)}))
+    return distinct(promises)
+
+
+def _alone(group: Candidate, c: Candidate, h: Hypothesis) -> dict[str, float]:
+    """The values with which a group changes as the one of its parameters that c changes in h."""
+    same = {u.name: group.prefix + u.name.removeprefix(c.prefix) for u in (*c.amplitudes, *c.shape)}
+    sizes = {f"{same[u.name]}_{c.location}": h.theta[u.name] for u in c.amplitudes}
+    shape = {same[u.name]: h.theta[u.name] for u in c.shape}
+    return {**dict.fromkeys((u.name for u in group.amplitudes), 0.0), **sizes, **shape}
 
 
 def _in_place_of(c: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
