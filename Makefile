@@ -6,7 +6,7 @@ OUT ?= out
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-all lint bench challenge scenarios clean
+.PHONY: demo test test-all lint site bench challenge scenarios clean
 
 demo: .venv/ready  ## build the FMU, close the loop on the bundled record, name the report
 	$(BIN)/railfmi build testrig --out $(OUT)/demo
@@ -28,6 +28,9 @@ lint: .venv/ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+site: .venv/ready-docs  ## the pages of documentation as a site, in out/site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet --site-dir $(abspath $(OUT))/site
+
 bench: .venv/ready-dev  ## one table of speed beside named peers; for ecos, pip install '.[interop]' first
 	$(BIN)/python -m benchmarks --out $(OUT)/benchmarks
 
@@ -44,6 +47,10 @@ challenge: .venv/ready-dev  ## a fresh blind set of records closed and scored; S
 
 .venv/ready-dev: .venv/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[dev]'
+	@touch $@
+
+.venv/ready-docs: .venv/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[docs]'
 	@touch $@
 
 clean:
