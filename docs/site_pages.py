@@ -1,4 +1,4 @@
-"""Hook of MkDocs: the site shows the pages of the repository where they lie, and the files that they refer to.
+"""Hook of MkDocs: the site shows the pages of the repository where they lie, and what they refer to.
 
 A page keeps its path, so that its links hold both in the repository and on the site. The page of the Python
 interface lists what the package railfmi declares as public.
@@ -18,8 +18,8 @@ PAGES = ("README.md", "CONTRIBUTING.md", "docs/*.md", "benchmarks/**/*.md", "fmu
 LINK = re.compile(r"\]\(([^)#\s]+)")
 INTERFACE = """# Python interface
 
-What `import railfmi` offers. Everything is loaded on first use. The rooms behind these names, `fmus`, `estimator` and
-`scenarios`, are described in [CONTRIBUTING](CONTRIBUTING.md).
+What `import railfmi` offers. Everything is loaded on first use. The rooms behind these names, `fmus`,
+`estimator` and `scenarios`, are described in [CONTRIBUTING](CONTRIBUTING.md).
 
 """
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from scenarios.preparing.initialising import init
     from scenarios.preparing.inspecting import inspect
     from scenarios.preparing.trial import dry_run
+    from scenarios.reporting.report import report
 
     __version__: str
 
@@ -38,12 +39,13 @@ _HOMES = {
     "kalker": "fmus.contact",
     "load_experiment": "scenarios.experiment.experiment",
     "plan": "scenarios.planning.planning",
+    "report": "scenarios.reporting.report",
 }
 
 __all__ = [
     "BadInput", "Fmu", "FmuError", "__version__", "close_loop", "close_loops", "contact_table",
     "creep_forces", "dry_run", "equivalent_conicity", "estimate", "hertz", "init", "inspect", "kalker",
-    "load_experiment", "plan",
+    "load_experiment", "plan", "report",
 ]  # fmt: skip
 
 

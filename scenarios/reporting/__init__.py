@@ -1,0 +1,1 @@
+"""`railfmi report`: all results of a folder on one page."""

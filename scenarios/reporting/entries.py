@@ -1,0 +1,203 @@
+"""The results in a folder and its subfolders, each as one entry of a list.
+
+Commands write JSON with keys of their own. A kind of result is known by some of these keys; what it says in
+one line follows from its function below. A file that cannot be read is an entry too, with the reason.
+"""
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from scenarios.closing.page.glossary import effect_words
+from scenarios.drawing.typography import quantity, with_error
+from scenarios.output import WRITING
+
+FILES = ("result.json", "results.json", "plan.json", "norm.json")
+PAGES = ("report.html", "estimate.html", "conicity.html", "plan.html", "norm.html", "index.html", "table.md")
+LARGEST = 64 * 2**20  # bytes of a result; what commands write has at most a few MB
+Standing = Literal["good", "doubtful", "bad"]
+Table = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One result: the command that wrote it, its name, its answer in words, and where it lies.
+
+    standing: good; doubtful if the record does not decide or a test failed; bad if nothing can be relied on.
+    error_over_noise: of close-loop, the largest error after over noise of all outputs; page: the page beside
+    the result, "" if there is none.
+    """
+
+    command: str
+    name: str
+    answer: str
+    standing: Standing
+    file: Path
+    written: datetime
+    seconds: float | None = None
+    error_over_noise: float | None = None
+    page: str = ""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What one kind of result says."""
+
+    name: str
+    answer: str
+    standing: Standing
+    error_over_noise: float | None = None
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A command, keys by which its results are known, and the function that reads one."""
+
+    command: str
+    keys: frozenset[str]
+    read: Callable[[Table], Said] = field(repr=False)
+
+
+def entries(folder: Path) -> Iterator[Entry]:
+    """All results in a folder and below, in the order of their paths; links to folders are not followed."""
+    for here, folders, files in os.walk(folder):
+        folders[:] = sorted(f for f in folders if not f.startswith((WRITING, ".")))
+        for name in FILES:
+            if name in files:
+                yield entry(Path(here) / name)
+
+
+def entry(file: Path) -> Entry:
+    """The entry of one file; one that cannot be read has the reason as its answer."""
+    written = datetime.fromtimestamp(file.stat().st_mtime)
+    try:
+        table = _table(file)
+        kind = next((k for k in KINDS if k.keys <= table.keys()), None)
+        if kind is None:
+            return Entry(
+                "other",
+                file.parent.name,
+                "a result that this version does not know",
+                "doubtful",
+                file,
+                written,
+            )
+        said = kind.read(table)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        why = f"cannot be read: {' '.join(str(error).split())[:200]}"
+        return Entry("unreadable", file.parent.name, why, "bad", file, written)
+    seconds = table.get("wall_seconds")
+    page = next((p for p in PAGES if (file.parent / p).is_file()), "")
+    return Entry(
+        kind.command, said.name, said.answer, said.standing, file, written,
+        float(seconds) if isinstance(seconds, int | float) else None, said.error_over_noise, page,
+    )  # fmt: skip
+
+
+def _table(file: Path) -> Table:
+    if (size := file.stat().st_size) > LARGEST:
+        raise ValueError(f"{size / 2**20:.0f} MiB, a result has at most {LARGEST // 2**20}")
+    table = json.loads(file.read_text(encoding="utf-8"))
+    if not isinstance(table, dict):
+        raise ValueError("no table of keys and values")
+    return table
+
+
+def _close_loop(t: Table) -> Said:
+    effects = [
+        f"{effect_words(e['kind'])} at {e['location']}: "
+        + ", ".join(f"{n} = {with_error(*v)}" for n, v in e["parameters"].items())
+        for e in t["effects"]
+    ]
+    standing: Standing = "good"
+    if t["verdict"] in ("ambiguous", "insufficient_excitation"):
+        standing = "doubtful"
+    if t["verdict"] == "unexplained":
+        standing = "bad"
+    ratios = [
+        e["after"] / e["noise"] for e in t["error"].values() if e.get("noise") and e.get("after") is not None
+    ]
+    worst = max((r for r in ratios if math.isfinite(r)), default=None)
+    told = str(t["verdict"]).replace("_", " ")
+    return Said(t["experiment"], f"{told}: {'; '.join(effects)}" if effects else told, standing, worst)
+
+
+def _estimate(t: Table) -> Said:
+    wanted = {n: e for n, e in t["estimated"].items() if e["kind"] == "parameter"} or t["estimated"]
+    said = ", ".join(
+        f"{n} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}"
+        for n, e in list(wanted.items())[:4]
+    )
+    if t["diverged"]:
+        return Said(t["experiment"], "the filter diverged", "bad")
+    doubt = "" if t["consistent"] else "; not consistent with the record"
+    return Said(t["experiment"], said + doubt, "good" if t["consistent"] else "doubtful")
+
+
+def _run(t: Table) -> Said:
+    met = sum(bool(e["holds"]) for e in t["expectations"])
+    return Said(
+        t["scenario"], f"{met} of {len(t['expectations'])} expectations are met", "good" if t["ok"] else "bad"
+    )
+
+
+def _compare(t: Table) -> Said:
+    worst = max((o["relative"] for o in t["outputs"].values() if o["relative"] is not None), default=None)
+    said = "the FMUs agree" if t["ok"] else "the FMUs differ"
+    more = "" if worst is None else f", by {worst:.2g} of an output's rms at most"
+    return Said(t["experiment"], said + more, "good" if t["ok"] else "bad")
+
+
+def _row(t: Table) -> Said:
+    aimed = [f for f in t["findings"] if f["target"] is not None]
+    met = sum(bool(f["met"]) for f in aimed)
+    return Said(
+        t["row"], f"{met} of {len(aimed)} figures of the source are met", "good" if t["ok"] else "bad"
+    )
+
+
+def _conicity(t: Table) -> Said:
+    at = dict(zip(t["amplitude"], t["conicity"], strict=True))
+    three = min(at, key=lambda a: abs(a - 0.003)) if at else None
+    said = "none" if three is None or at[three] is None else f"{at[three]:.3f} at {three * 1e3:g} mm"
+    return Said(f"{_both(t['wheel'])} on {_both(t['rail'])}", f"equivalent conicity {said}", "good")
+
+
+def _both(sides: Any) -> str:
+    """A profile, or the two of unlike sides."""
+    return " / ".join(dict.fromkeys(map(str, sides))) if isinstance(sides, list) else str(sides)
+
+
+def _plan(t: Table) -> Said:
+    alone, alike, hidden = (len(t[key]) for key in ("alone", "classes", "hidden"))
+    said = f"{alone} effects are told from all others, {alike} groups are not, {hidden} effects stay hidden"
+    return Said(t["experiment"], said, "good")
+
+
+def _norm(t: Table) -> Said:
+    rows = [*t["step1"], *t["step2"]]
+    inside = sum(bool(row["passed"]) for row in rows)
+    said = f"{inside} of {len(rows)} rows inside the windows of EN 15302"
+    return Said(str(t["reader"]), said, "good" if t["ok"] else "bad")
+
+
+def _several(t: Table) -> Said:
+    return Said("several experiments", f"{len(t['results'])} experiments compared", "good")
+
+
+KINDS = (
+    Kind("close-loop", frozenset({"verdict", "effects", "error"}), _close_loop),
+    Kind("close-loop", frozenset({"results", "together"}), _several),
+    Kind("estimate", frozenset({"estimated", "consistent"}), _estimate),
+    Kind("run", frozenset({"scenario", "expectations"}), _run),
+    Kind("compare", frozenset({"a_sha256", "outputs"}), _compare),
+    Kind("row", frozenset({"row", "findings"}), _row),
+    Kind("conicity", frozenset({"wheel_found", "conicity"}), _conicity),
+    Kind("plan", frozenset({"visible", "classes"}), _plan),
+    Kind("conicity-norm", frozenset({"step1", "reader"}), _norm),
+)
