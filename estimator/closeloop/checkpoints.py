@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from stat import S_ISREG
 from typing import TypeVar, cast
@@ -51,6 +51,10 @@ class Stages:
 
     folder: Path | None = None
     key: str = ""
+
+    def under(self, name: str) -> "Stages":
+        """Those of the same run after it has begun anew, in a folder of this name."""
+        return self if self.folder is None else replace(self, folder=self.folder / name)
 
     def done(self, name: str, work: Callable[[], Result]) -> Result:
         """The result of a step: from its checkpoint if there is one, else from calling `work`."""

@@ -26,6 +26,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.planning.advice import next_experiment
 from estimator.closeloop.progress import Progress, Tell
+from estimator.closeloop.question.moments import identified_at
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
 from estimator.closeloop.search.free_form import free_form
@@ -64,6 +65,7 @@ class Chain:
     seed: int
     stages: Stages
     fitter: Callable[[Baseline, int], Fitter]
+    moved: bool = False  # whether the part to choose was moved away from the moment of an effect
 
     def run(self) -> Outcome:
         """Calibrate, detect, search, decide, and check the answer on the test part."""
@@ -81,7 +83,21 @@ class Chain:
             declared, baseline, detection, tuple(forces), tuple(shown.promises), (), (),
             early or Judgement(tuple(before), (), ""), diagnostics,
         )  # fmt: skip
-        return self._over_forms(found if early else self._searched(found, shown, before))
+        if early:
+            return self._over_forms(found)
+        singles, pairs = self._search(shown).run()
+        again = self._moved(shown.problem, [*singles[:1], *pairs[:1]])
+        return again.run() if again else self._over_forms(self._answer(found, shown, before, singles, pairs))
+
+    def _moved(self, problem: Problem, leading: Sequence[Hypothesis]) -> "Chain | None":
+        """The same with the moment at which a leading effect sets in identified; None if it is already."""
+        for time in (h.theta[name] for h in leading for name in h.onset_names):
+            if not self.moved and (other := identified_at(problem, time)) is not None:
+                self.tell(
+                    "parts", "an effect sets in within the part to choose: beginning anew with other parts"
+                )
+                return replace(self, problem=other, stages=self.stages.under("moved"), moved=True)
+        return None
 
     def _over_forms(self, found: Outcome) -> Outcome:
         """The outcome, without an answer with the errors of the calibrated FMU over all plausible forms."""
@@ -125,9 +141,11 @@ class Chain:
             "diagnostics", lambda: diagnose(shown.baseline, shown.fit, shown.change, level, rng)
         )
 
-    def _searched(self, found: Outcome, shown: Screened, before: Sequence[Check]) -> Outcome:
+    def _answer(
+        self, found: Outcome, shown: Screened, before: Sequence[Check],
+        singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
+    ) -> Outcome:  # fmt: skip
         """The outcome of the search for a detected discrepancy; before: the checks of the detection."""
-        singles, pairs = self._search(shown).run()
         noise = self.stages.done("noise", lambda: noise_of_best(shown.baseline, [singles, pairs]))
         if noise:
             self.tell("weights", "weighting the residuals by the noise that the best fit leaves")

@@ -138,6 +138,13 @@ def test_an_effect_accounts_for_what_it_brings_down(form, before, after, found):
     assert tuple(form_of(baseline(problem, left(*before), NOISE)).reached(one).tolist()) == found
 
 
+@pytest.mark.parametrize(("early", "found"), [(1.0, True), (1.3, False)])
+def test_what_is_left_where_the_effect_was_fitted_counts_too(early, found):
+    """A transient may show in the part to identify alone; a wrong law leaves some of it there."""
+    [one] = [replace(in_parts(early, 1.0), candidates=law("coulomb_friction", 0, 1.0).candidates)]
+    assert form_of(baseline(asked(), left(4.0, 4.0), NOISE)).reached(one).all() == found
+
+
 @pytest.mark.parametrize(
     ("before", "after", "at", "found"),
     [

@@ -175,6 +175,19 @@ def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tm
     assert "changes its sign" in result.next_experiment
 
 
+def test_an_effect_that_sets_in_within_the_part_to_choose_is_found(tmp_path: Path) -> None:
+    """The identify part of 18 s has pieces to choose at the end of each 3.6 s; one is from 10.1 to 10.8 s."""
+    effects = single("step_force", "roller", step=-40.0, step_time=10.4)
+    made = write_record(tmp_path, "step", np.random.default_rng(1), effects=effects, duration=30.0, dt=0.01)
+    result = close_loop(made, jobs=1)
+    assert ("step_force", "roller") in named(result)
+    [effect] = [e for e in result.effects if e.location == "roller"]
+    (force, force_error), (t0, t0_error) = effect.parameters["F_0"], effect.parameters["t0"]
+    assert abs(abs(force) - 40.0) < 4 * force_error
+    assert abs(t0 - 10.4) < 4 * t0_error
+    assert any("within the part to choose" in note for note in result.notes)
+
+
 @pytest.mark.parametrize(
     ("kind", "place"),
     [("sensor_gain", "omega_r"), pytest.param("sensor_bias", "omega_w", marks=pytest.mark.slow)],

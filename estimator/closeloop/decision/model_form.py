@@ -80,10 +80,14 @@ class Closed(ModelForm):
         return -self.baseline.score(h)
 
     def reached(self, h: Hypothesis, part: Part = "choose") -> BoolArray:
-        """See ModelForm; no form is right to any accuracy, so that little may be left where noise is less.
+        """See ModelForm; the part to identify must come down too, as only it may show what sets in.
 
-        Little is a small share of the signal and, at the same time, of what was there before.
+        No form is right to any accuracy, so that little may be left where noise is less. Little is a small
+        share of the signal and, at the same time, of what was there before.
         """
+        return self._little(h, part) & self._little(h, "fit")
+
+    def _little(self, h: Hypothesis, part: Part) -> BoolArray:
         b, noise = self.baseline, self.baseline.noise.std
         before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)
         beyond = np.sqrt(np.maximum(after**2 - noise**2, 0.0))
