@@ -14,7 +14,14 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ("README.md", "CONTRIBUTING.md", "docs/*.md", "benchmarks/**/*.md", "fmus/**/README.md")
+PAGES = (
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs/*.md",
+    "benchmarks/**/*.md",
+    "fmus/**/README.md",
+)
 LINK = re.compile(r"\]\(([^)#\s]+)")
 INTERFACE = """# Python interface
 
