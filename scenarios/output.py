@@ -10,8 +10,9 @@ from pathlib import Path
 
 from fmus.errors import BadInput
 
-# what commands write, by pattern
-RESULTS = ("result.json", "results.json", "plan.json", "norm.json", "*/result.json")
+# what commands write into their folder, and by pattern
+FILES = ("result.json", "results.json", "plan.json", "norm.json")
+RESULTS = (*FILES, "*/result.json")
 WRITING = ".writing_"  # begin of the name of a folder of files that are not complete
 LAST = "result.json"  # moved last, so that a folder that holds it is complete
 
@@ -67,6 +68,13 @@ def written_at_once(folder: Path) -> Iterator[Path]:
                 file.replace(folder / file.name)
     except OSError as error:
         raise unwritten(error, folder) from error
+
+
+def written(file: Path, text: str) -> None:
+    """Write a text file; an interrupted write leaves no part of it under its name."""
+    part = file.with_suffix(".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(file)
 
 
 def unwritten(error: OSError, folder: object) -> BadInput:

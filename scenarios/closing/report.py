@@ -1,12 +1,9 @@
 """The report of close-loop: one self-contained page, with each figure also as a file."""
 
-import base64
 from collections.abc import Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
@@ -31,8 +28,10 @@ from scenarios.closing.page.rejected import (
 )
 from scenarios.closing.page.wording import missed_words, story
 from scenarios.closing.result import Result, best_wrong
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.sheet import Plot
 from scenarios.drawing.typography import number, unit
+from scenarios.output import written
 
 HERE = Path(__file__).parent
 ROWS = 15  # of the table of rejected hypotheses
@@ -46,9 +45,6 @@ def write_report(folder: Path, problem: Problem, found: Outcome, result: Result)
     """
     free = (found.free_form,) if found.free_form else ()
     case = Case(problem, found, result, glossary(problem, (*found.judgement.members, *free)))
-    env = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
     parts = {
         **_figures(case, folder),
         **_measured(case),
@@ -56,10 +52,8 @@ def write_report(folder: Path, problem: Problem, found: Outcome, result: Result)
         **_rejection(case),
         **_use(case, folder),
     }
-    page = env.get_template("report.html.j2").render(result=result, story=story(case), **parts)
-    part = folder / "report.part"
-    part.write_text(page, encoding="utf-8")
-    part.replace(folder / "report.html")
+    page = rendered(HERE, "report.html.j2", result=result, story=story(case), **parts)
+    written(folder / "report.html", page)
 
 
 def _figures(case: Case, folder: Path) -> Values:
@@ -69,8 +63,7 @@ def _figures(case: Case, folder: Path) -> Values:
     errors = error_table.error_values(case)
 
     def embed(plots: Iterable[Plot]) -> list[Values]:
-        data = [(p.caption, base64.b64encode(p.write(folder)).decode()) for p in plots]
-        return [{"caption": c, "source": f"data:image/png;base64,{d}"} for c, d in data]
+        return [plot.embedded(folder) for plot in plots]
 
     return {
         "headline_figure": embed([headline_plot(problem, found, words, free)]),

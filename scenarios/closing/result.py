@@ -24,6 +24,7 @@ from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.host.archive import describe
+from scenarios.output import written
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
@@ -108,9 +109,7 @@ class Result(Shown):
 
     def write(self, path: Path) -> None:
         """Write the result as JSON; an interrupted write leaves no partial file."""
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
-        part.replace(path)
+        written(path, json.dumps(asdict(self), indent=1))
 
 
 def result_of(

@@ -1,18 +1,16 @@
 """The page of several experiments: a table with links to the single reports, and their comparison."""
 
-import base64
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from scenarios.closing.figures.common_values import common_plot
-from scenarios.closing.page.glossary import effect_words
-from scenarios.closing.result import Effect, Result
+from scenarios.closing.page.glossary import effect_words, values_words
+from scenarios.closing.result import Result
 from scenarios.closing.several_results import Carried, Joint, Results
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import (
     NOTHING,
     number,
@@ -21,6 +19,7 @@ from scenarios.drawing.typography import (
     unit,
     with_error,
 )
+from scenarios.output import written
 
 HERE = Path(__file__).parent
 Values = dict[str, Any]
@@ -28,10 +27,9 @@ Values = dict[str, Any]
 
 def write_page(folder: Path, found: Results) -> None:
     """Write index.html and its figures into the folder that contains the experiments' folders."""
-    env = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    page = env.get_template("several_page.html.j2").render(
+    page = rendered(
+        HERE,
+        "several_page.html.j2",
         headline=_headline(found),
         interrupted=found.interrupted,
         rows=[_row(r, found) for r in found.results],
@@ -39,9 +37,7 @@ def write_page(folder: Path, found: Results) -> None:
         transfers=[row for c in found.transfers for row in _transfer(c, found)],
         joints=[_joint(j, folder) for j in found.joint],
     )
-    part = folder / "index.part"
-    part.write_text(page, encoding="utf-8")
-    part.replace(folder / "index.html")
+    written(folder / "index.html", page)
 
 
 def _headline(found: Results) -> str:
@@ -58,7 +54,7 @@ def _row(r: Result, found: Results) -> Values:
         "experiment": r.experiment,
         "link": quote(str(row["report"])),
         "verdict": r.verdict,
-        "effects": [words_of(e) for e in r.effects],
+        "effects": [values_words(e.kind, e.location, e.parameters) for e in r.effects],
         "output": row["output"],
         "unit": unit(of),
         "before": number(error["before"]),
@@ -67,12 +63,6 @@ def _row(r: Result, found: Results) -> Values:
         "gap": percent(float(row["gap_closed"])) if row["gap_closed"] != "" else NOTHING,
         "seconds": f"{r.wall_seconds:.0f}",
     }
-
-
-def words_of(e: Effect) -> str:
-    """An effect in words, with its parameters."""
-    values = ", ".join(f"{n} = {with_error(v, s)}" for n, (v, s) in e.parameters.items())
-    return f"{effect_words(e.kind)} at {e.location}: {values}"
 
 
 def label_words(label: str) -> str:
@@ -123,5 +113,5 @@ def _joint(j: Joint, folder: Path) -> Values:
         "rise": number(j.rise),
         "chance": number(j.p_value, 2),
         "caption": plot.caption,
-        "figure": "data:image/png;base64," + base64.b64encode(plot.write(folder)).decode(),
+        "figure": plot.embedded(folder)["source"],
     }

@@ -7,6 +7,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from scenarios.output import written
+
 SMALLEST = 1e-6  # share of the nominal value below which an output is rounding error at rest
 
 
@@ -63,12 +65,10 @@ class Comparison:
 
     def write(self, file: Path) -> None:
         """Write the result as JSON; an interrupted write leaves no partial file."""
-        part = file.with_suffix(".part")
         table = {"ok": self.ok, **asdict(self)}
         table["outputs"] = {n: {k: _known(v) for k, v in d.items()} for n, d in table["outputs"].items()}
         text = json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False)
-        part.write_text(f"{text}\n", encoding="utf-8")
-        part.replace(file)
+        written(file, f"{text}\n")
 
     def lines(self) -> Iterator[str]:
         """Lines to print: the verdict, then each output, then other differences."""

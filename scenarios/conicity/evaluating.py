@@ -22,6 +22,7 @@ from fmus.contact.geometry.search import stand
 from fmus.contact.geometry.sides import Both, Given, sides_of
 from fmus.contact.geometry.table import contact_table, default_shifts
 from fmus.errors import BadInput
+from scenarios.output import written
 
 STEP = 2e-5  # m between shifts; the norm's own tables have 0.1 mm
 AMPLITUDES = tuple(round(1e-4 * i, 6) for i in range(10, 76))  # m, those of the norm
@@ -92,10 +93,10 @@ class Evaluation:
     def write(self, folder: Path) -> None:
         """Write conicity.csv, contact.csv and result.json, in SI; an interrupted write leaves no part."""
         table = self.table.assign(delta_r=self.difference)
-        _written(folder / "conicity.csv", self.rows.to_csv(float_format="%.9g"))
-        _written(folder / "contact.csv", table.to_csv(float_format="%.9g"))
+        written(folder / "conicity.csv", self.rows.to_csv(float_format="%.9g"))
+        written(folder / "contact.csv", table.to_csv(float_format="%.9g"))
         text = json.dumps(self.result(), indent=1, ensure_ascii=False, allow_nan=False)
-        _written(folder / "result.json", f"{text}\n")
+        written(folder / "result.json", f"{text}\n")
 
     def result(self) -> dict[str, Any]:
         """What result.json holds; None where a number does not exist."""
@@ -176,9 +177,3 @@ def _amplitudes(given: Sequence[float]) -> list[float]:
 
 def _known(values: "pd.Series[float]") -> list[float | None]:
     return [float(v) if np.isfinite(v) else None for v in values]
-
-
-def _written(file: Path, text: str) -> None:
-    part = file.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(file)

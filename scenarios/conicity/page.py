@@ -1,18 +1,16 @@
 """The pages of `railfmi conicity`: self-contained files, with each figure also as a file beside them."""
 
-import base64
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from scenarios.conicity.evaluating import Evaluation
 from scenarios.conicity.figures import all_plots
-from scenarios.drawing.sheet import Plot
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import NOTHING, number
+from scenarios.output import written
 
 HERE = Path(__file__).parent
 FEW = 16  # rows of the table of amplitudes, at most about this many
@@ -23,42 +21,20 @@ def write_page(folder: Path, found: Evaluation, command: str) -> None:
     """Write conicity.html and its figures into a folder."""
     parameter = found.nonlinearity
     text = rendered(
+        HERE,
         "page.html.j2",
+        version=version("railfmi"),
         headline=headline(found),
         pair=list(pair_rows(found)),
         rows=list(amplitude_rows(found)),
         nonlinearity=number(parameter / MILLI) if np.isfinite(parameter) else NOTHING,
-        figures=embedded(all_plots(found), folder),
+        figures=[plot.embedded(folder) for plot in all_plots(found)],
         notes=list(reading_notes(found)),
         roll=found.table.attrs["roll"],
         search=str(found.table.attrs["search"]).replace("_", "-"),
         command=command,
     )
     written(folder / "conicity.html", text)
-
-
-def rendered(template: str, **values: Any) -> str:
-    """A page from its template and values."""
-    env = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    return env.get_template(template).render(version=version("railfmi"), **values)
-
-
-def written(file: Path, text: str) -> None:
-    """Write a page; an interrupted write leaves no part of it."""
-    part = file.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(file)
-
-
-def embedded(plots: Iterable[Plot], folder: Path) -> list[dict[str, str]]:
-    """Figures as they stand in a page, each also written into a folder."""
-    found = []
-    for plot in plots:
-        code = base64.b64encode(plot.write(folder)).decode()
-        found.append({"source": f"data:image/png;base64,{code}", "caption": plot.caption, "name": plot.name})
-    return found
 
 
 def headline(found: Evaluation) -> str:

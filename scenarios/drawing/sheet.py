@@ -1,5 +1,6 @@
 """The look of all figures: palette, axes, envelopes of long records, and how they are written."""
 
+import base64
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -42,6 +43,11 @@ class Plot:
         _settle(self.figure)
         self.figure.savefig(folder / f"{self.name}.svg", metadata={"Date": None})
         return small.getvalue()
+
+    def embedded(self, folder: Path) -> dict[str, str]:
+        """Write into a folder; returns name, caption and the picture as the source of an image in a page."""
+        code = base64.b64encode(self.write(folder)).decode()
+        return {"name": self.name, "caption": self.caption, "source": f"data:image/png;base64,{code}"}
 
 
 def _drawn(figure: Figure) -> Image.Image:

@@ -1,28 +1,24 @@
 """The page of estimate: one self-contained file, with each figure also as a file beside it."""
 
-import base64
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from estimator.record import Array
-from scenarios.drawing.sheet import Plot
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import (
     NOTHING,
     number,
     percent,
-    quantity,
     short,
     unit,
     with_error,
 )
 from scenarios.estimating.findings import Findings
 from scenarios.estimating.page_figures import band_plots, correlation_plots, innovation_plots
-from scenarios.estimating.result import EstimateResult
+from scenarios.estimating.result import EstimateResult, main_values
 
 HERE = Path(__file__).parent
 Row = dict[str, Any]
@@ -31,10 +27,9 @@ Truth = Mapping[str, tuple[Array, Array]]
 
 def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Truth) -> None:
     """Write estimate.html and its figures into a folder; the page loads no other file."""
-    env = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    page = env.get_template("page.html.j2").render(
+    page = rendered(
+        HERE,
+        "page.html.j2",
         result=result,
         headline=headline(result),
         quantities=list(quantities(found, result)),
@@ -44,9 +39,9 @@ def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Tru
         noise=list(noise(found, result)),
         nis=_number(result.nis["mean"]),
         checks=list(checked(result)),
-        bands=_embedded(band_plots(found, truth), folder),
-        innovations=_embedded(innovation_plots(found), folder),
-        correlations=_embedded(correlation_plots(found), folder),
+        bands=[plot.embedded(folder) for plot in band_plots(found, truth)],
+        innovations=[plot.embedded(folder) for plot in innovation_plots(found)],
+        correlations=[plot.embedded(folder) for plot in correlation_plots(found)],
         version=version("railfmi"),
     )
     (folder / "estimate.html").write_text(page, encoding="utf-8")
@@ -56,16 +51,8 @@ def headline(result: EstimateResult) -> str:
     """The main estimates in one sentence."""
     if result.diverged:
         return "The filter diverged; the estimates up to that time are shown."
-    wanted = {n: e for n, e in result.estimated.items() if e["kind"] == "parameter"} or result.estimated
-    said = [_headed(n, e) for n, e in wanted.items()]
-    values = ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
+    values = main_values(result.estimated)
     return f"{values}: {result.doubt}" if result.doubt else values
-
-
-def _headed(name: str, e: Row) -> str:
-    """One quantity of the headline, with a remark if it lies at one of its bounds."""
-    bound = f" (at its {e['at_bound']} bound)" if "at_bound" in e else ""
-    return f"{name} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}{bound}"
 
 
 def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
@@ -148,8 +135,3 @@ def _digits(value: float, std: float) -> int:
 
 def _number(value: float | None) -> str:
     return NOTHING if value is None else number(value)
-
-
-def _embedded(plots: Iterable[Plot], folder: Path) -> list[Row]:
-    made = [(plot.caption, base64.b64encode(plot.write(folder)).decode()) for plot in plots]
-    return [{"caption": c, "source": f"data:image/png;base64,{data}"} for c, data in made]

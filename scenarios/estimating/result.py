@@ -1,7 +1,7 @@
 """The result of estimate, as it is written to result.json and estimate.csv."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from estimator.filters.identifiability import Identifiability
 from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.aside import blocks, let_go
+from scenarios.drawing.typography import quantity, with_error
 from scenarios.experiment.declaration import Alarm, Options
 from scenarios.shown import Shown, axes_or_new
 
@@ -285,3 +286,15 @@ def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: A
             both = np.stack([value[rows], std[rows]], axis=2).reshape(-1, 2 * len(names))
             np.savetxt(stream, np.column_stack([t[rows], both]), fmt="%.9g", delimiter=",")
             let_go()
+
+
+def main_values(estimated: Mapping[str, Mapping[str, Any]]) -> str:
+    """The estimated parameters, or all quantities if there are none, with errors and a remark at a bound."""
+    wanted = {n: e for n, e in estimated.items() if e["kind"] == "parameter"} or estimated
+    said = [_headed(n, e) for n, e in wanted.items()]
+    return ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
+
+
+def _headed(name: str, e: Mapping[str, Any]) -> str:
+    bound = f" (at its {e['at_bound']} bound)" if "at_bound" in e else ""
+    return f"{name} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}{bound}"

@@ -1,15 +1,14 @@
 """The page of a plan: one self-contained file, with each figure also as a file beside it."""
 
-import base64
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from estimator.closeloop.planning.plan import Plan
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import NOTHING, number, percent, quantity, short, unit
+from scenarios.output import written
 from scenarios.planning.figures import size_plot, split_plot
 from scenarios.planning.result import PlanResult
 
@@ -21,14 +20,12 @@ Row = dict[str, Any]
 
 def write_page(folder: Path, found: Plan, result: PlanResult) -> None:
     """Write plan.html and its figures into a folder; the page loads no other file."""
-    env = Environment(
-        loader=FileSystemLoader([HERE, HERE.parent / "closing"]), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True,
-    )  # fmt: skip
     known = found.question.problem.plant.fmu.description.variables
     plots = [size_plot(result), split_plot(result)]
-    sizes, splits = ([_embedded(p, folder)] if p else [] for p in plots)
-    page = env.get_template("page.html.j2").render(
+    sizes, splits = ([p.embedded(folder)] if p else [] for p in plots)
+    page = rendered(
+        HERE,
+        "page.html.j2",
         result=result,
         sensors=[_sensor(name, told, known[name].unit) for name, told in result.noise.items()],
         classes=[_class(c, {n: v.unit for n, v in known.items()}) for c in result.classes],
@@ -37,9 +34,7 @@ def write_page(folder: Path, found: Plan, result: PlanResult) -> None:
         splits=splits,
         version=version("railfmi"),
     )
-    part = folder / "plan.part"
-    part.write_text(page, encoding="utf-8")
-    part.replace(folder / "plan.html")
+    written(folder / "plan.html", page)
 
 
 def _sensor(name: str, told: Row, of: str | None) -> Row:
@@ -93,8 +88,3 @@ def _visible(v: Row) -> Row:
 def _share(share: float) -> str:
     """A share in percent, also a very small one."""
     return percent(share) if share > PERCENT else f"{number(100 * share, 2)}\u00a0%"
-
-
-def _embedded(plot: Any, folder: Path) -> Row:
-    data = base64.b64encode(plot.write(folder)).decode()
-    return {"caption": plot.caption, "source": f"data:image/png;base64,{data}"}

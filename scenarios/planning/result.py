@@ -14,6 +14,7 @@ from estimator.closeloop.planning.plan import Plan, Sight
 from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 from scenarios.experiment.experiment import Experiment
+from scenarios.output import written
 
 TIMES_DIGITS = 3  # significant digits of what is advised, which is computed to first order
 
@@ -46,9 +47,7 @@ class PlanResult:
 
     def write(self, path: Path) -> None:
         """Write the plan as JSON; an interrupted write leaves no partial file."""
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
-        part.replace(path)
+        written(path, json.dumps(asdict(self), indent=1))
 
 
 def result_of(e: Experiment, found: Plan, seconds: float) -> PlanResult:

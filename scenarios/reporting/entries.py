@@ -13,11 +13,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from scenarios.closing.page.glossary import effect_words
-from scenarios.drawing.typography import quantity, with_error
-from scenarios.output import WRITING
+from scenarios.closing.page.glossary import values_words
+from scenarios.estimating.result import main_values
+from scenarios.output import FILES, WRITING
 
-FILES = ("result.json", "results.json", "plan.json", "norm.json")
 PAGES = ("report.html", "estimate.html", "conicity.html", "plan.html", "norm.html", "index.html", "table.md")
 LARGEST = 64 * 2**20  # bytes of a result; what commands write has at most a few MB
 Standing = Literal["good", "doubtful", "bad"]
@@ -79,14 +78,8 @@ def entry(file: Path) -> Entry:
         table = _table(file)
         kind = next((k for k in KINDS if k.keys <= table.keys()), None)
         if kind is None:
-            return Entry(
-                "other",
-                file.parent.name,
-                "a result that this version does not know",
-                "doubtful",
-                file,
-                written,
-            )
+            unknown = "a result that this version does not know"
+            return Entry("other", file.parent.name, unknown, "doubtful", file, written)
         said = kind.read(table)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         why = f"cannot be read: {' '.join(str(error).split())[:200]}"
@@ -109,11 +102,7 @@ def _table(file: Path) -> Table:
 
 
 def _close_loop(t: Table) -> Said:
-    effects = [
-        f"{effect_words(e['kind'])} at {e['location']}: "
-        + ", ".join(f"{n} = {with_error(*v)}" for n, v in e["parameters"].items())
-        for e in t["effects"]
-    ]
+    effects = [values_words(e["kind"], e["location"], e["parameters"]) for e in t["effects"]]
     standing: Standing = "good"
     if t["verdict"] in ("ambiguous", "insufficient_excitation"):
         standing = "doubtful"
@@ -128,15 +117,12 @@ def _close_loop(t: Table) -> Said:
 
 
 def _estimate(t: Table) -> Said:
-    wanted = {n: e for n, e in t["estimated"].items() if e["kind"] == "parameter"} or t["estimated"]
-    said = ", ".join(
-        f"{n} = {quantity(with_error(e['value'], e['std_error']), e['unit'])}"
-        for n, e in list(wanted.items())[:4]
-    )
     if t["diverged"]:
         return Said(t["experiment"], "the filter diverged", "bad")
     doubt = "" if t["consistent"] else "; not consistent with the record"
-    return Said(t["experiment"], said + doubt, "good" if t["consistent"] else "doubtful")
+    return Said(
+        t["experiment"], main_values(t["estimated"]) + doubt, "good" if t["consistent"] else "doubtful"
+    )
 
 
 def _run(t: Table) -> Said:

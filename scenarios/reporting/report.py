@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
 from fmus.errors import BadInput
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import number
 from scenarios.output import writable, written_at_once
 from scenarios.reporting.entries import Entry, entries
@@ -53,12 +52,10 @@ class Summary:
 
     def write(self, out: Path) -> None:
         """Write summary.html and summary.csv into a folder; the page has links relative to it."""
-        env = Environment(
-            loader=FileSystemLoader([HERE, HERE.parent / "closing"]), autoescape=True,
-            undefined=StrictUndefined, trim_blocks=True,
-        )  # fmt: skip
         commands = sorted({e.command for e in self.entries})
-        text = env.get_template("summary.html.j2").render(
+        text = rendered(
+            HERE,
+            "summary.html.j2",
             headline=self.headline,
             folder=str(self.folder),
             groups=[(c, [self._row(e, out) for e in self.entries if e.command == c]) for c in commands],

@@ -1,7 +1,7 @@
 """What a report calls things: units and meanings of an FMU's variables, effects and places in words."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from markupsafe import Markup
@@ -14,7 +14,7 @@ from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 from fmus.host.archive import describe
 from fmus.host.description import FmuVariable
-from scenarios.drawing.typography import formula
+from scenarios.drawing.typography import formula, with_error
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
 _COUNTED = {"force", "stop", "step", "offset", "drift", "lag", "delay", "mode", "change", "gain"}
@@ -73,6 +73,12 @@ def effect_words(kind: str) -> str:
     if kind in FAULTS:
         return FAULTS[kind].words
     return " ".join(_PROPER.get(w, w) for w in kind.split("_"))
+
+
+def values_words(kind: str, location: str, parameters: Mapping[str, Sequence[float]]) -> str:
+    """An effect in words, with its parameters: value and standard error by name."""
+    values = ", ".join(f"{n} = {with_error(v, s)}" for n, (v, s) in parameters.items())
+    return f"{effect_words(kind)} at {location}: {values}"
 
 
 def with_article(kind: str) -> str:

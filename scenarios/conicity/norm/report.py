@@ -3,14 +3,18 @@
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
 
 from scenarios.conicity.norm.measuring import Instrument
 from scenarios.conicity.norm.steps import ExactRow, MeasuredRow
-from scenarios.conicity.page import rendered, written
+from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import NOTHING
+from scenarios.output import written
+
+HOME = Path(__file__).parents[1]  # of the templates
 
 MICRO = 1e6
 
@@ -43,7 +47,9 @@ class NormReport:
             if rows:
                 written(folder / f"{name}.csv", pd.DataFrame(rows).to_csv(index=False, float_format="%.6g"))
         page = rendered(
+            HOME,
             "norm/norm.html.j2",
+            version=version("railfmi"),
             headline=self.headline,
             ok=self.ok,
             exact=[_exact(row) for row in self.exact],
