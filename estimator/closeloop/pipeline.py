@@ -91,8 +91,10 @@ class Chain:
 
     def _moved(self, problem: Problem, leading: Sequence[Hypothesis]) -> "Chain | None":
         """The same with the moment at which a leading effect sets in identified; None if it is already."""
+        if self.moved:
+            return None
         for time in (h.theta[name] for h in leading for name in h.onset_names):
-            if not self.moved and (other := identified_at(problem, time)) is not None:
+            if (other := identified_at(problem, time)) is not None:
                 self.tell(
                     "parts", "an effect sets in within the part to choose: beginning anew with other parts"
                 )
@@ -100,7 +102,7 @@ class Chain:
         return None
 
     def _over_forms(self, found: Outcome) -> Outcome:
-        """The outcome, without an answer with the errors of the calibrated FMU over all plausible forms."""
+        """The outcome; without an answer, the errors of the calibrated FMU hold over all plausible forms."""
         if found.chosen:
             return found
         fitter = self.fitter(found.baseline, self.jobs)

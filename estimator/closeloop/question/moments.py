@@ -21,8 +21,10 @@ def identified_at(problem: Problem, time: float) -> Problem | None:
     """
     first, *others = problem.record.runs
     stretch = _stretch(first, time)
-    other = stretch and _instead(first.fit, *stretch)
-    if not stretch or other is None:
+    if stretch is None:
+        return None
+    other = _instead(first.fit, *stretch)
+    if other is None:
         return None
     fit, choose = first.fit.copy(), first.choose.copy()
     now, then = slice(*stretch), slice(other, other + stretch[1] - stretch[0])
