@@ -12,6 +12,7 @@ from benchmarks.challenge.ablation import table
 from benchmarks.challenge.draw import plans
 from benchmarks.challenge.match import Answer
 from benchmarks.challenge.measuring import WAYS, Measuring
+from benchmarks.challenge.reliability import diagram
 from benchmarks.challenge.run import Challenge, run
 from benchmarks.challenge.table import markdown, text
 from benchmarks.challenge.truth import SHARES, SYSTEMS
@@ -54,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     every = markdown(marked, seed, a.count, every=True)
     (challenge.folder / "all.md").write_text(every, encoding="utf-8")
     (challenge.folder / "scoreboard.md").write_text(markdown(marked, seed, a.count), encoding="utf-8")
+    diagram(marked, challenge.folder / "reliability.svg")
     print(text(marked, seed, a.count))
     answers = [(truth, kept["ablation"]) for truth, kept in found if "ablation" in kept]
     if answers:

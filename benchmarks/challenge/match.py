@@ -34,6 +34,7 @@ class Answer:
     cpu_seconds: float = 0.0
     failure: str = ""
     split: dict[str, float] = field(default_factory=dict)  # wall time of each step, s
+    probability: dict[str, float] = field(default_factory=dict)  # of each answer, by its label
 
     @classmethod
     def of(cls, kept: dict[str, Any]) -> Answer:
@@ -51,6 +52,7 @@ class Answer:
             r["error"],
             **times,
             split=r.get("seconds", {}),
+            probability=r.get("probability", {}),
         )
 
     @property

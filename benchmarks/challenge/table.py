@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.challenge.match import judged
+from benchmarks.challenge.reliability import rows
 from benchmarks.challenge.score import Marked, failures, scoreboard
 
 
@@ -25,6 +26,8 @@ def markdown(marked: Sequence[Marked], seed: int, count: int, every: bool = Fals
     """The scoreboard for the documentation; every: whether all records are listed, or those not right."""
     lines = [f"Seed {seed}, {len(marked)} of {count} records.", "", "| | found | target |", "|---|---|---|"]
     lines += [f"| {r.what} | {r.value} | {r.target} |" for r in scoreboard(marked)]
+    if said := rows(marked):
+        lines += ["", "Right answers by the probability that they state:", "", *said]
     listed = sorted(marked, key=lambda m: m[0].name) if every else failures(marked)
     if listed:
         head = "| record | group | truth | SNR | grade | answer | s |"

@@ -9,6 +9,7 @@ from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.probability import probabilities
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array
 
@@ -46,6 +47,12 @@ class Outcome:
     def chosen(self) -> Hypothesis | None:
         """The best hypothesis of the answer; None if there is no answer."""
         return self.judgement.members[0] if self.judgement.members else None
+
+    @property
+    def probability(self) -> dict[str, float]:
+        """Probability of each answer; see `probabilities`."""
+        fits = (*self.singles, *self.pairs)
+        return probabilities(self.baseline, self.detection, self.judgement, self.promises, fits)
 
     @property
     def built_in(self) -> Hypothesis | None:

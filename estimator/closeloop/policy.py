@@ -465,14 +465,54 @@ class DecisionPolicy:
 
 
 @dataclass(frozen=True)
+class PriorPolicy:
+    """What is held probable before a record is seen; see estimator/closeloop/probability.py.
+
+    Within these shares, all kinds and places are equally probable.
+    """
+
+    effect: float = limit(
+        0.5,
+        "probability",
+        "probability that a record holds an effect or a faulty sensor",
+        "convention: nothing is known about a record before it is seen",
+    )
+    outside: float = limit(
+        0.2,
+        "share of the records with an effect",
+        "share whose effect is not in the library",
+        "convention: one in five; only a record in which noise hides most of an effect is sensitive to it",
+    )
+    pair: float = limit(
+        0.1,
+        "share of the records with effects of the library",
+        "share in which two effects act",
+        "convention: two independent effects of which each is as probable as one in ten",
+    )
+    left: float = limit(
+        0.01,
+        "share of the sum of squares beyond noise",
+        "share that a right answer leaves on average if the model form is right",
+        "agreed assumption: as `alike`, the form is right to within small differences",
+    )
+    left_open: float = limit(
+        0.05,
+        "share of the sum of squares beyond noise",
+        "share that a right answer leaves on average if the model form is open",
+        "convention: five times `left`",
+    )
+
+
+@dataclass(frozen=True)
 class Policy:
-    """All limits, grouped by start states, inputs, detection, search and decision."""
+    """All limits, grouped by start states, inputs, detection, search, decision and priors."""
 
     start: StartPolicy = StartPolicy()
     inputs: InputPolicy = InputPolicy()
     detection: DetectionPolicy = DetectionPolicy()
     search: SearchPolicy = SearchPolicy()
     decision: DecisionPolicy = DecisionPolicy()
+    prior: PriorPolicy = PriorPolicy()
 
     @property
     def version(self) -> str:

@@ -56,6 +56,7 @@ class Result(Shown):
     """The result of close-loop, one field for each key of result.json.
 
     decision: the checks that lead to the verdict, in order, each with its value and limit.
+    probability: of each answer, by its label, most probable first; what is missing to 1 is none of these.
     policy: the version of all limits.
     error: RMSE on the test part by output. `placebo` is the error with the best wrong effect. `black_box` is
     the error of the calibrated FMU with a linear model of its residual.
@@ -69,6 +70,7 @@ class Result(Shown):
     experiment: str
     verdict: Verdict
     decision: list[dict[str, Any]]
+    probability: dict[str, float]
     policy: str
     effects: list[Effect]
     alternatives: list[Alternative]
@@ -129,6 +131,7 @@ def result_of(
         experiment=name,
         verdict=found.judgement.verdict,
         decision=[_check(c) for c in found.judgement.checks],
+        probability={label: round(p, 4) for label, p in found.probability.items()},
         policy=problem.policy.version,
         effects=list(_unique(e for h in members for e in effects_of(h))),
         alternatives=alternatives(problem, found),

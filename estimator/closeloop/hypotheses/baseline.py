@@ -35,7 +35,7 @@ class Baseline:
 
     def score(self, h: Hypothesis, part: Part = "choose") -> float:
         """Log score of a part of the record, up to a constant."""
-        return -0.5 * float(np.sum(self._weighted(h, part) ** 2))
+        return -0.5 * float(np.sum(self.weighted(h, part) ** 2))
 
     def lead(self, a: Hypothesis, b: Hypothesis, part: Part = "choose") -> tuple[float, float]:
         """Log score of a minus that of b on a part of the record, and its standard error if a is right.
@@ -45,7 +45,7 @@ class Baseline:
         the sums over blocks. Where and when the hypotheses differ does not matter: an effect that acts for a
         moment only can be as certain as one that always acts.
         """
-        own, other = self._weighted(a, part), self._weighted(b, part)
+        own, other = self.weighted(a, part), self.weighted(b, part)
         apart = other - own
         sums = [float(np.sum(block)) for block in np.array_split(own * apart, BLOCKS)]
         error = float(np.sqrt(max(np.sum(apart**2), np.sum(np.square(sums)))))
@@ -57,10 +57,10 @@ class Baseline:
         With d the difference of their residuals, h then leads by d'd / 2 on average, with a standard error
         of the root of d'd for white noise. That must be enough standard errors.
         """
-        apart = self._weighted(self.hypothesis, part) - self._weighted(h, part)
+        apart = self.weighted(self.hypothesis, part) - self.weighted(h, part)
         return float(np.linalg.norm(apart)) / 2 > self.policy.decision.telling
 
-    def _weighted(self, h: Hypothesis, part: Part) -> Array:
+    def weighted(self, h: Hypothesis, part: Part) -> Array:
         """Residual of h on a part of the record in units of the noise, (m, n_y)."""
         return self.noise.weighting.of(h.of(self.problem, part), self.problem.record.stretches(part))
 
@@ -81,7 +81,7 @@ class Baseline:
 
     def beyond_noise(self, h: Hypothesis, part: Part = "choose") -> float:
         """Sum of squares on a part minus its expectation for pure noise."""
-        return float(np.sum(self._weighted(h, part) ** 2 - 1))
+        return float(np.sum(self.weighted(h, part) ** 2 - 1))
 
     def beyond_noise_of_all(self, h: Hypothesis, part: Part = "choose") -> float:
         """Sum of squares on the part to identify and another part minus its expectation for pure noise."""

@@ -1,0 +1,201 @@
+"""The probability of each answer: of every fitted hypothesis, of no discrepancy, and of none of these.
+
+Three questions are answered one after the other, each with the prior of the policy.
+
+1. Which hypothesis of the library? Their evidence on the parts to identify and to choose is compared by the
+   criterion of G. Schwarz (Annals of Statistics 6 (1978), 461-464), which approximates marginal likelihoods
+   with a prior that is worth one sample, narrowed by the bounds of the unknowns. Residuals that are not white
+   noise of the stated size carry less evidence: log likelihoods are divided by the dispersion along the
+   difference of two hypotheses (R. W. M. Wedderburn, Biometrika 61 (1974), 439-447).
+2. An effect, or none? By the same criterion.
+3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
+   calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
+   share. Where noise hides so small a share, the prior decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import comb
+
+import numpy as np
+from scipy.special import logsumexp, ndtr
+
+from estimator.closeloop.detection.detect import Detection
+from estimator.closeloop.detection.importance import TINY, signal_size
+from estimator.closeloop.evidence import Judgement
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.fitted import BLOCKS
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
+from estimator.closeloop.hypotheses.promise import Promise, distinct
+from estimator.closeloop.hypotheses.relations import becomes, includes
+from estimator.record import Array
+
+NO_DISCREPANCY = "no_discrepancy"
+WHOLE: tuple[Part, ...] = ("fit", "unseen")  # the whole record
+SHARES = 4001  # points of the grid of shares that an answer may leave
+SHOWN = 1e-3  # answers that are less probable are not listed
+
+
+def probabilities(
+    baseline: Baseline,
+    detection: Detection,
+    judgement: Judgement,
+    promises: Sequence[Promise],
+    fitted: Sequence[Hypothesis],
+) -> dict[str, float]:
+    """Probability of each answer by its label, most probable first; what is missing to 1 is none of these.
+
+    promises: the screened candidates; fitted: all hypotheses that were fitted. Empty if a dead sensor ended
+    the search, because nothing was compared then. Answers below a thousandth are left out.
+    """
+    if judgement.verdict == "sensor_fault" and not judgement.members:
+        return {}
+    if judgement.verdict == "insufficient_excitation":
+        return {NO_DISCREPANCY: 1 - baseline.policy.prior.effect}
+    if not fitted:
+        small = _of_size(baseline) if detection.detected else _of_screening(baseline, promises)
+        return {NO_DISCREPANCY: small}
+    named = {m.label: m for m in judgement.members}
+    same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
+    found: dict[str, float] = {}
+    for label, p in _of_fits(baseline, promises, fitted).items():
+        name = same.get(label, label)
+        found[name] = found.get(name, 0.0) + p
+    ranked = sorted(found.items(), key=lambda item: -item[1])
+    return {label: p for label, p in ranked if p >= SHOWN or label in named}
+
+
+def _is(h: Hypothesis, member: Hypothesis) -> bool:
+    """Whether h says the same as a member of the answer: a law at its limit, or one parameter of a group."""
+    return becomes(h, member) or includes(member, h)
+
+
+def _of_size(baseline: Baseline) -> float:
+    """Probability that the residual, of which noise is a part, is smaller than what matters.
+
+    The mean square of a residual has the scatter of noise; the worst output and part of the record count.
+    """
+    b, limits, share = baseline, baseline.policy.detection, baseline.problem.form_error
+    noise, signal = b.noise.std**2, signal_size(b.problem) ** 2
+    least = np.minimum(limits.signal_share**2 * signal, limits.noise_share**2 * noise)
+    if share:
+        form = np.maximum(share**2 * signal, (limits.open_form_noises**2 - 1) * noise)
+        least = np.maximum(form, least)
+    sure = []
+    for part in WHOLE[1:] if share else WHOLE:
+        residual = b.hypothesis.of(b.problem, part)
+        error = noise * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
+        beyond = np.mean(residual**2, axis=0) - noise
+        sure.append(np.min((least - beyond) / np.maximum(error, TINY)))
+    return float(ndtr(min(sure)))
+
+
+def _of_screening(baseline: Baseline, promises: Sequence[Promise]) -> float:
+    """Probability of no effect from the gains that linear regression predicts, if nothing was fitted."""
+    prior, base = baseline.policy.prior, baseline.hypothesis
+    kinds = distinct(promises)
+    if not kinds:
+        return 1 - prior.effect
+    price = np.log(_independent(baseline)) / 2
+    single = prior.effect * (1 - prior.outside) * (1 - prior.pair) / len(kinds)
+    dispersion = max(1.0, base.fit.cost / max(len(base.fit.residual), 1))
+    effects = logsumexp([np.log(single) + p.gain / 2 / dispersion - price * _size(p) for p in kinds])
+    nothing = np.log(1 - prior.effect)
+    # where nothing is detected, a mechanism outside the library is as well hidden as one of the library
+    others = effects - np.log((1 - prior.outside) * (1 - prior.pair))
+    return float(np.exp(nothing - np.logaddexp(nothing, others)))
+
+
+def _size(p: Promise) -> int:
+    return sum(len(c.unknowns) for c in p.candidates)
+
+
+def _independent(baseline: Baseline) -> float:
+    """Number of independent samples of the part to identify, at least 2."""
+    return max(len(baseline.hypothesis.fit.residual) / float(np.mean(baseline.noise.redundancy)), 2.0)
+
+
+def _of_fits(
+    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis]
+) -> dict[str, float]:
+    """Probability of each label, and of no discrepancy."""
+    base, prior = baseline.hypothesis, baseline.policy.prior
+    kinds = max(len(distinct(promises)), 1)
+    each = {1: np.log((1 - prior.pair) / kinds), 2: np.log(prior.pair / max(comb(kinds, 2), 1))}
+    price = np.log(_independent(baseline)) / 2
+    best = min(fitted, key=lambda h: h.fit.cost - 2 * baseline.score(h))
+    known: dict[str, float] = {}
+    for h in fitted:
+        value = _evidence(baseline, best, h) - _price(h, price) + each[min(len(h.candidates), 2)]
+        known[h.label] = max(value, known.get(h.label, -np.inf))
+    library = float(logsumexp(list(known.values())))
+    odds = _odds_of_outside(baseline, best)
+    within = np.log(prior.effect * (1 - prior.outside))
+    outside = np.log(prior.effect * prior.outside) + np.log(odds) + library
+    nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
+    whole = logsumexp([within + library, outside, nothing])
+    found = {label: float(np.exp(within + value - whole)) for label, value in known.items()}
+    return {**found, NO_DISCREPANCY: float(np.exp(nothing - whole))}
+
+
+def _price(h: Hypothesis, most: float) -> float:
+    """Loss of log evidence by the freedom of the effects of h; most: for each unknown.
+
+    An unknown costs the logarithm of the width of its prior over its standard error. The prior is worth one
+    sample, or it is uniform within narrower bounds. That of a shape is no wider than its value, so that what
+    a record does not determine costs nothing, such as the rounding of a friction on a shaft that never stops.
+    """
+    shapes = {u.name for c in h.candidates for u in c.shape}
+    found = 0.0
+    for u, value in zip(h.fit.unknowns, h.fit.values, strict=True):
+        if u.name in h.own:
+            wide = abs(float(value)) if u.name in shapes else np.inf
+            width = min((u.high - u.low) / np.sqrt(12), wide)
+            found += float(np.clip(np.log(max(width, TINY) / max(h.fit.std[u.name], TINY)), 0.0, most))
+    return found
+
+
+def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
+    """Log likelihood of h minus that of the best one, over the dispersion of what the best one leaves."""
+    lead = apart = scatter = 0.0
+    for part in ("fit", "choose"):
+        one, other = (baseline.weighted(x, part) for x in (best, h))
+        difference = other - one
+        along = [float(np.sum(block)) for block in np.array_split(one * difference, BLOCKS)]
+        lead += float(np.sum(other**2) - np.sum(one**2)) / 2
+        apart += float(np.sum(difference**2))
+        scatter += float(np.sum(np.square(along)))
+    return -lead * min(1.0, apart / scatter) if scatter > 0 else -lead
+
+
+def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
+    """How much more probable a mechanism outside the library makes what the best hypothesis leaves.
+
+    A right answer leaves a share of the sum of squares beyond noise that is exponentially distributed with
+    the mean of the policy; a mechanism outside leaves any share of it with equal probability.
+    """
+    prior, exact = baseline.policy.prior, not baseline.problem.form_error
+    total, _ = _beyond(baseline, baseline.hypothesis)
+    left, error = _beyond(baseline, best)
+    if total <= 0:
+        return 1.0
+    share = np.linspace(0.0, 1.0, SHARES)
+    seen = np.exp(-0.5 * ((min(left, total) - share * total) / error) ** 2)
+    of_right = np.exp(-share / (prior.left if exact else prior.left_open))
+    right = float(np.sum(of_right * seen) / np.sum(of_right))
+    tiny = np.finfo(float).tiny
+    return max(float(np.mean(seen)), tiny) / max(right, tiny)
+
+
+def _beyond(baseline: Baseline, h: Hypothesis) -> tuple[float, float]:
+    """Sum of squares of h beyond noise over the whole record, and its standard error.
+
+    The error is the scatter of noise, the scatter between blocks, and the uncertainty of the noise's size.
+    """
+    squares: list[Array] = [baseline.in_noise(h.residuals, part) ** 2 - 1 for part in WHOLE]
+    n = sum(s.size for s in squares)
+    blocks = np.array([np.sum(b) for s in squares for b in np.array_split(s, BLOCKS)])
+    scatter = max(2.0 * n, len(blocks) * float(np.var(blocks)))
+    size = (baseline.policy.decision.clean**2 - 1) * n
+    return float(np.sum(blocks)), float(np.hypot(np.sqrt(scatter), size))

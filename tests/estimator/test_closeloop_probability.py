@@ -1,0 +1,165 @@
+"""Probabilities of answers are true: of answers said with 70 %, 70 % are right."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from estimator.closeloop.detection.detect import Detection
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.probability import NO_DISCREPANCY, probabilities
+from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.record import Array, Record, Run
+from tests.helpers.baselines import baseline, fit_with
+from tests.helpers.verdicts import judged
+
+SAMPLES, LIBRARY = 1000, 8
+T = np.arange(float(SAMPLES))
+FIT = T % 100 < 60  # parts of the record: to identify, to choose, to test
+CHOOSE = (T % 100 >= 60) & (T % 100 < 80)
+LAWS = [np.sin(0.05 * T + 0.35 * i) for i in range(LIBRARY)]  # neighbours have a correlation of 0.94
+STRANGER = np.sign(np.sin(0.021 * T))
+SEEN = Detection(0.01, 0.001, {}, 10.0)
+UNSEEN = Detection(0.01, 0.5, {}, 0.1)
+
+
+def asked() -> Problem:
+    signal = 100 * np.sin(T)[:, None]
+    run = Run(T, signal[:, :0], signal, FIT, CHOOSE, T % 100 >= 80)
+    return Problem(lambda _: Path(), Record((run,), (), ("y",), np.ones(1)), {}, {})
+
+
+def fitted(measured: Array, law: int | None, wide: float = np.inf) -> Hypothesis:
+    """The least-squares fit of a law to the part to identify; None for no effect."""
+    if law is None:
+        nothing = fit_with((), np.zeros(0), np.zeros((0, 0)), measured[FIT], np.zeros((FIT.sum(), 0)))
+        return Hypothesis((), nothing, (measured[:, None],))
+    shape = LAWS[law]
+    squares = float(shape[FIT] @ shape[FIT])
+    size = float(shape[FIT] @ measured[FIT]) / squares
+    unknown = Unknown(f"constant_force_{law}_F_0", 0.0, -wide, wide, 1.0)
+    left = measured - size * shape
+    fit = fit_with((unknown,), np.array([size]), np.array([[1 / squares]]), left[FIT], -shape[FIT, None])
+    return Hypothesis((Candidate("constant_force", str(law), (unknown,)),), fit, (left[:, None],))
+
+
+def answered(measured: Array) -> dict[str, float]:
+    found = [fitted(measured, i) for i in range(LIBRARY)]
+    return probabilities(on(measured), SEEN, judged("unexplained"), promised(measured), found)
+
+
+def on(measured: Array) -> Baseline:
+    return baseline(asked(), fitted(measured, None), np.ones(1))
+
+
+def promised(measured: Array) -> list[Promise]:
+    base = fitted(measured, None).fit.cost
+    found = (fitted(measured, i) for i in range(LIBRARY))
+    return [Promise(h.candidates, base - h.fit.cost, {}) for h in found]
+
+
+def drawn(rng: np.random.Generator) -> tuple[str, Array]:
+    """A label and a record: nothing, a law of the library, or a stranger, as probable as the policy says."""
+    prior, noise = DEFAULT.prior, rng.standard_normal(SAMPLES)
+    size = rng.normal(0.0, np.sqrt(2))  # whose information is that of one sample
+    if rng.random() > prior.effect:
+        return NO_DISCREPANCY, noise
+    if rng.random() < prior.outside:
+        return "outside", noise + size * STRANGER
+    law = int(rng.integers(LIBRARY))
+    return f"constant_force@{law}", noise + size * LAWS[law]
+
+
+def test_of_what_is_said_with_a_probability_as_many_are_right():
+    rng = np.random.default_rng(3)
+    said, right = [], []
+    for _ in range(1500):
+        truth, measured = drawn(rng)
+        for label, p in answered(measured).items():
+            said.append(p)
+            right.append(label == truth)
+    said, right = np.array(said), np.array(right)
+    for low, high in ((0.05, 0.2), (0.2, 0.4), (0.4, 0.6), (0.6, 0.8), (0.8, 0.95), (0.95, 1.0)):
+        held = (said >= low) & (said < high)
+        expected, n = said[held].mean(), int(held.sum())
+        assert n > 20
+        chance = np.sqrt(expected * (1 - expected) / n)
+        assert abs(right[held].mean() - expected) < 0.05 + 2 * chance, (low, n, right[held].mean(), expected)
+
+
+def test_what_outside_mechanisms_leave_is_said_to_be_none_of_these():
+    rng = np.random.default_rng(4)
+    rest = [1 - sum(answered(rng.standard_normal(SAMPLES) + STRANGER).values()) for _ in range(20)]
+    assert min(rest) > 0.99
+
+
+@given(st.floats(3.0, 100.0), st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_a_strong_effect_of_the_library_is_certain(size, seed):
+    noise = np.random.default_rng(seed).standard_normal(SAMPLES)
+    found = answered(noise + size * LAWS[2])
+    assert next(iter(found)) == "constant_force@2"
+    assert found["constant_force@2"] > 0.97
+
+
+@given(st.floats(0.0, 3.0), st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_probabilities_are_probabilities(size, seed):
+    found = answered(np.random.default_rng(seed).standard_normal(SAMPLES) + size * LAWS[0])
+    assert all(0 <= p <= 1 for p in found.values())
+    assert sum(found.values()) <= 1 + 1e-9
+    assert list(found.values()) == sorted(found.values(), reverse=True)
+
+
+def test_two_names_for_one_equation_are_equally_probable():
+    noise = np.random.default_rng(5).standard_normal(SAMPLES)
+    measured = noise + 2 * LAWS[0]
+    one = fitted(measured, 0)
+    twin = replace(one, candidates=(replace(one.candidates[0], location="twin"),))
+    found = probabilities(
+        on(measured), SEEN, judged("ambiguous", [one, twin]), promised(measured), [one, twin]
+    )
+    assert found["constant_force@0"] == pytest.approx(found["constant_force@twin"], rel=1e-12)
+    assert found["constant_force@0"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_correlated_residuals_are_less_evidence():
+    """What a slow error of form leaves cannot tell neighbours apart as white noise could."""
+    rng = np.random.default_rng(6)
+    white = rng.standard_normal(SAMPLES)
+    slow = 20 * np.convolve(rng.standard_normal(SAMPLES + 99), np.ones(100) / 100, "valid")
+    sure = answered(white + 3 * LAWS[2])
+    less = answered(white + slow + 3 * LAWS[2])
+    assert sure["constant_force@2"] > 0.97 > less.get("constant_force@2", 0.0)
+
+
+def test_without_fits_the_screening_says_whether_there_is_an_effect():
+    rng, early = np.random.default_rng(7), judged("no_discrepancy")
+    quiet = rng.standard_normal(SAMPLES)
+    for measured, least, most in ((quiet, 0.9, 1.0), (quiet + 0.5 * LAWS[0], 0.0, 0.01)):
+        found = probabilities(on(measured), UNSEEN, early, promised(measured), [])
+        assert least <= found[NO_DISCREPANCY] <= most
+
+
+def test_a_detected_residual_that_is_small_is_as_sure_as_its_size():
+    rng = np.random.default_rng(8)
+    for size, least, most in ((0.2, 0.95, 1.0), (5.0, 0.0, 0.01)):
+        measured = rng.standard_normal(SAMPLES) + size * LAWS[0]
+        found = probabilities(on(measured), SEEN, judged("no_discrepancy"), [], [])
+        assert least <= found[NO_DISCREPANCY] <= most
+
+
+def test_a_record_that_shows_nothing_leaves_the_prior():
+    found = probabilities(on(np.zeros(SAMPLES)), UNSEEN, judged("insufficient_excitation"), [], [])
+    assert found == {NO_DISCREPANCY: 1 - DEFAULT.prior.effect}
+
+
+def test_a_dead_sensor_is_no_comparison():
+    assert probabilities(on(np.zeros(SAMPLES)), SEEN, judged("sensor_fault"), [], []) == {}
