@@ -1,6 +1,6 @@
 """The result of close-loop as lines for the command line."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from scenarios.closing.result import Result
 from scenarios.closing.several_results import (
@@ -19,6 +19,8 @@ TOLD = ("confirmed", "agrees", "differs", "surpassed")  # transfers printed here
 def lines_of(result: Result) -> Iterator[str]:
     """The verdict, effects and errors of one experiment."""
     yield f"{result.verdict}: {result.reason}"
+    if result.probability:
+        yield f"  {probable(result.probability)}"
     for found in result.effects:
         values = ", ".join(f"{n} = {v:.4g} ± {e:.2g}" for n, (v, e) in found.parameters.items())
         yield f"  {found.kind} at {found.location}: {values}"
@@ -28,6 +30,20 @@ def lines_of(result: Result) -> Iterator[str]:
     if result.next_experiment:
         aim = "to tell them apart" if result.verdict == "ambiguous" else "to find out more"
         yield f"  {aim}: {result.next_experiment}"
+
+
+def probable(said: Mapping[str, float], most: int = 3) -> str:
+    """The most probable answers in words, and what is left for none of these."""
+    rest = max(0.0, 1 - sum(said.values()))
+    first = [f"{label.replace('_', ' ')} {share(p)}" for label, p in list(said.items())[:most]]
+    return "probability: " + ", ".join([*first, f"none of these {share(rest)}"])
+
+
+def share(p: float) -> str:
+    """A probability as text; what rounds to 0 or 100 % is not said to be certain."""
+    if 0.0005 <= p < 0.9995:
+        return f"{p:.1%}".replace(".0%", "%").replace("%", " %")
+    return "below 0.1 %" if p < 0.5 else "above 99.9 %"
 
 
 def table_of(found: Results) -> Iterator[str]:

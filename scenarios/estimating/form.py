@@ -66,10 +66,11 @@ def begun_again(
     """
     value, std = (x[-1] for x in joint.values(first.x[-1:], first.std[-1:]))
     found = {n: (float(v), float(s)) for n, v, s in zip(first.names, value, std, strict=True)}
-    return tuple(_moved(p, *found[p.name]) if p.name in form else p for p in parameters)
+    return tuple(moved(p, *found[p.name]) if p.name in form else p for p in parameters)
 
 
-def _moved(p: UnknownParameter, value: float, std: float) -> UnknownParameter:
+def moved(p: UnknownParameter, value: float, std: float) -> UnknownParameter:
+    """The parameter with the value and a multiple of the standard error of a first run as its start."""
     inside = _inside(p.transform.low, p.transform.high)
     return replace(p, start=float(np.clip(value, *inside)), std=min(p.std, WIDER * std))
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from estimator.record import Array
 from scenarios.literature.case import Case
-from scenarios.literature.following import Followed, rmse
+from scenarios.literature.following import BAND, Followed, covered, rmse
 from scenarios.literature.outcome import Finding
 
 SIDES = ("left", "right")
@@ -54,6 +54,7 @@ class Judged:
                                       NEAR, note=note))  # fmt: skip
         mu0 = self.found.value["mu0"]
         made.append(self._finding("RMSE of mu0", rmse(mu0[late], self.mu0[late])))
+        made.append(self._finding(BAND, covered(self.found, "mu0", self.mu0, START_UP)))
         made.append(self._finding("mu0 at the end less its true value", float(mu0[-1] - self.mu0[-1])))
         return made + self._transitions()
 

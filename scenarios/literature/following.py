@@ -10,6 +10,9 @@ import numpy as np
 from estimator.filters.estimator import Diverged, Filter
 from estimator.record import Array
 
+NORMAL_95 = 1.96  # standard deviations of a normal distribution that hold 95 % of it
+BAND = "share of time in which the 95 % band holds the truth"
+
 
 class Named(Protocol):
     """A system whose coordinates have names, and values in units of their own."""
@@ -68,6 +71,16 @@ def rmse(found: Array, true: Array) -> float:
     """Root of the mean squared error; inf where an estimate is missing."""
     error = float(np.sqrt(np.mean(np.square(found - true))))
     return error if np.isfinite(error) else np.inf
+
+
+def covered(found: Followed, name: str, true: Array, since: float = 0.0) -> float:
+    """Share of the samples from `since` s after the start on whose 95 % band of an estimate holds the truth.
+
+    true: (N,); samples without an estimate hold nothing.
+    """
+    late = found.t >= found.t[0] + since
+    off = np.abs(found.value[name] - true)[late]
+    return float(np.mean(off <= NORMAL_95 * found.std[name][late]))
 
 
 def first_below(t: Array, x: Array, limit: float, since: float) -> float:

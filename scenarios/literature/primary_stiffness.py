@@ -10,7 +10,7 @@ from estimator.filters.system import UnknownParameter
 from estimator.record import Array
 from fmus.contact.forces.conditions import CONDITIONS
 from scenarios.literature.case import Case
-from scenarios.literature.following import Followed, rmse
+from scenarios.literature.following import BAND, Followed, covered, rmse
 from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.row import Measured, Row, Tell
@@ -72,6 +72,7 @@ def _judged(case: Case, way: str, found: Followed) -> list[Finding]:
         Finding(case.name, f"{way}: relative RMSE of k_y, {SETTLED:g} s after start and step", "1", error,
                 target=NEAR, note=found.reason),
         Finding(case.name, end, "MN/m", TOTAL * float(k[-1])),
+        Finding(case.name, f"{way}: {BAND}", "1", covered(found, "k_y", true, SETTLED)),
     ]  # fmt: skip
     if case.later:
         after = _within(t - case.when, k, true)

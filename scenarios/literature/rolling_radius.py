@@ -6,7 +6,7 @@ from estimator.filters.bounds import bounded
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Ukf
 from scenarios.literature.case import Case, Record
-from scenarios.literature.following import Followed, follow, rmse
+from scenarios.literature.following import BAND, Followed, covered, follow, rmse
 from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.row import Measured, Row, Tell
@@ -67,6 +67,8 @@ def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
             late = record.t > record.t[0] + 1.0
             rest = MM * rmse(found.value["r_w"][late], true[late])
             findings.append(Finding(case.name, f"{label}: RMSE without the first second", "mm", rest))
+            held = covered(found, "r_w", true, 1.0)
+            findings.append(Finding(case.name, f"{label}: {BAND}", "1", held))
         around = (MM * TRUE - 5.0, MM * TRUE + 5.0)
         panels.append(Panel(case.name, [MM * case.truth("r_w", record.t)], lines, "r_w [mm]", around, True))
     plot = parameter_figure("rolling_radius", panels)

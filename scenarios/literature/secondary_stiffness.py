@@ -10,7 +10,7 @@ from estimator.filters.bounds import bounded
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Ukf
 from scenarios.literature.case import Case, Record
-from scenarios.literature.following import Followed, follow, rmse
+from scenarios.literature.following import BAND, Followed, covered, follow, rmse
 from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.prediction_error import Weighted, identified
@@ -112,6 +112,7 @@ def _judged(case: Case, way: str, found: Followed) -> list[Finding]:
         Finding(
             case.name, f"{way}: k1 at the end", "kN/m", KILO * float(found.value["k1"][-1]), KILO * true[-1]
         ),
+        Finding(case.name, f"{way}: {BAND}", "1", covered(found, "k1", true, SETTLED)),
     ]
 
 
@@ -124,6 +125,8 @@ def _localised(case: Case, found: Followed) -> list[Finding]:
         made.append(
             Finding(case.name, f"{name} at the end less {true:g}", "1", abs(value - true), target=NEAR)
         )
+        over = np.where(found.t >= case.when, true, 1.0)
+        made.append(Finding(case.name, f"{name}: {BAND}", "1", covered(found, name, over, SETTLED)))
     return made
 
 

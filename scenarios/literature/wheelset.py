@@ -1,14 +1,20 @@
 """Shared parts of the wheelset's rows: measurements, filters with and without the alignment, shaping."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
+from estimator.filters.bounds import bounded
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Ukf
 from estimator.filters.unknown_input import Shaped
+from fmus.model import declared
+from fmus.models import model_class
+from scenarios.estimating.form import LEARNT as FORM_LEARNT
+from scenarios.estimating.form import moved
 from scenarios.literature.case import Record
 from scenarios.literature.following import Followed, follow
 
@@ -40,10 +46,34 @@ class Task:
     parameter: UnknownParameter
     declared: Mapping[str, float]
 
-    def known(self, record: Record) -> Followed:
-        """With the alignment known."""
-        with self._joint((), ALIGNMENT) as joint:
+    def known(self, record: Record, more: Sequence[UnknownParameter] = ()) -> Followed:
+        """With the alignment known, and more unknown parameters."""
+        with self._joint((), ALIGNMENT, more) as joint:
             return self._followed(joint, record, record.table(ALIGNMENT))
+
+    def with_form(self, record: Record) -> Followed:
+        """With the alignment known and the form of the contact open, as in the command estimate.
+
+        The scales of the form are unknown, and the filter runs once for each choice of the form. The result
+        is that of the likeliest choice; the scatter between the choices is a part of its error.
+        """
+        choices = model_class("wheelset").form_choices
+        every = (dict(zip(choices, values, strict=True)) for values in product(*choices.values()))
+        found = [replace(self, declared={**self.declared, **choice})._of_scales(record) for choice in every]
+        best, name = max(found, key=lambda f: f.log_likelihood), self.parameter.name
+        scatter = np.var([f.value[name] for f in found], axis=0, ddof=1)
+        wider = {**best.std, name: np.sqrt(best.std[name] ** 2 + scatter)}
+        return replace(best, std=wider, seconds=sum(f.seconds for f in found))
+
+    def _of_scales(self, record: Record) -> Followed:
+        """With the scales of the form unknown; a first run over the first seconds finds where they start.
+
+        A filter that begins with wide uncertainties becomes surer than its linearisation allows.
+        """
+        scales = scales_of_form()
+        first = self.known(_first(record, FORM_LEARNT), scales)
+        again = [moved(p, *(float(x[p.name][-1]) for x in (first.value, first.std))) for p in scales]
+        return self.known(record, again)
 
     def along(self, record: Record, shape: Shaped) -> Followed:
         """Run the filter on the outputs alone, with the alignment estimated as well."""
@@ -52,18 +82,35 @@ class Task:
 
     def shaped(self, record: Record) -> Shaped:
         """The shaping filter of the alignment for which the first seconds of a record are likeliest."""
-        part = record.t < record.t[0] + LEARNT
-        first = Record({name: samples[part] for name, samples in record.columns.items()})
+        first = _first(record, LEARNT)
         shapes = [Shaped("y_irr", DEVIATION, f, "y_irr_dot", d) for f, d in SHAPES]
         return max(shapes, key=lambda shape: self.along(first, shape).log_likelihood)
 
-    def _joint(self, unknown: tuple[Shaped, ...], inputs: tuple[str, ...]) -> Joint:
-        constants = {"V": V, **self.declared}
-        return Joint(self.fmu, MEASURED, STATES, [self.parameter], unknown, inputs, constants, DT)
+    def _joint(
+        self, unknown: tuple[Shaped, ...], inputs: tuple[str, ...], more: Sequence[UnknownParameter] = ()
+    ) -> Joint:
+        constants, parameters = {"V": V, **self.declared}, [self.parameter, *more]
+        return Joint(self.fmu, MEASURED, STATES, parameters, unknown, inputs, constants, DT)
 
     def _followed(self, joint: Joint, record: Record, u: np.ndarray) -> Followed:
         filter = Ukf(joint, joint.start(), joint.noise, variances(NOISE), DT)
         return follow(filter, joint, record.t, u, record.table(MEASURED))
+
+
+def _first(record: Record, length: float) -> Record:
+    """The first seconds of a record; length: s."""
+    part = record.t < record.t[0] + length
+    return Record({name: samples[part] for name, samples in record.columns.items()})
+
+
+def scales_of_form() -> list[UnknownParameter]:
+    """The scales that stand for what the form of the contact leaves open, each from the model's own value."""
+    model = model_class("wheelset")
+    own = declared(model)
+    return [
+        UnknownParameter(name, own[name].start or 0.0, (high - low) / 4, bounded((low, high)))
+        for name, (low, high) in model.form.items()
+    ]
 
 
 def variances(noise: Mapping[str, float]) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Records for the rows by the truth models, which share no code with the FMUs.
 
-From a shell: python -m tests.helpers.rows friction_ukf OUT, then run the row on OUT.
+From a shell: python -m tests.helpers.rows friction_ukf OUT, then run the row on OUT. With --contact other,
+wheel and rail meet in a contact of another form than the FMU's.
 """
 
 from __future__ import annotations
@@ -20,21 +21,25 @@ from tests.helpers.rows_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
 from tests.truth.rig_inputs import Inputs, trapezium
 from tests.truth.vehicle_effects import Law
+from tests.truth.wheelset_motion import OTHER, SAME, Form
 
 WRONG_PATCH = {"a": 3.4e-3, "b": 2.4e-3}  # m; the filter believes in a circle of 2.7 mm
 LARGEST_TORQUE = 852.0  # N.m, thesis 4.5
+CONTACTS = {"same": SAME, "other": OTHER}
 REST = 5.0  # s without torque at the beginning and the end, thesis 4.5
 
 
-def truth(case: Case) -> Record:
-    """The record of a case, by the truth model of its kind."""
+def truth(case: Case, form: Form = SAME) -> Record:
+    """The record of a case, by the truth model of its kind; form: of the wheelset's contact."""
     if "gauge_sd" in case.true:
         return of_ward(case)
     if "alignment_sd" in case.true:
         return of_charles(case)
     if case.judged:
-        return of_mal(case)
-    return {"wheelset": of_wheelset, "testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
+        return of_mal(case, form)
+    if case.model == "wheelset":
+        return of_wheelset(case, form)
+    return {"testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
 
 
 def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
@@ -42,13 +47,13 @@ def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> 
     return {n: true[n] + rng.normal(0.0, std, len(true[n])) for n, std in case.noise.items()}
 
 
-def of_wheelset(case: Case) -> Record:
+def of_wheelset(case: Case, form: Form = SAME) -> Record:
     """A run over random alignment; where parameters jump, the state goes on with the new ones."""
     rng, t = np.random.default_rng(case.seed), case.times
     lead = round(case.lead / case.dt)
     whole = wheelset.random_alignment(rng, np.arange(-lead, len(t)) * case.dt, case.speed)
     true = dict(case.true)
-    form = wheelset.Form(penetration=true.pop("patch", 0.0) > 0)
+    form = replace(form, penetration=true.pop("patch", 0.0) > 0)
     end = lead + len(t) - 1
     jump = min(lead + round(case.when / case.dt), end) if case.later else end
     parts, start = [], None
@@ -104,9 +109,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("row", choices=[*ROWS])
     parser.add_argument("out", type=Path, help="folder in which CASE.csv are made")
+    parser.add_argument(
+        "--contact", choices=[*CONTACTS], default="same", help="form of the wheelset's contact"
+    )
+    parser.add_argument("--case", action="append", help="one of the cases, by default all")
     arguments = parser.parse_args()
     for case in ROWS[arguments.row].cases:
-        print(truth(case).write(arguments.out / f"{case.name}.csv"))
+        if not arguments.case or case.name in arguments.case:
+            made = truth(case, CONTACTS[arguments.contact])
+            print(made.write(arguments.out / f"{case.name}.csv"), flush=True)
 
 
 if __name__ == "__main__":

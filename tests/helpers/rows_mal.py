@@ -19,6 +19,7 @@ from scenarios.literature.case import (
 from tests.truth import wheelset
 from tests.truth.wheelset_motion import (
     SAME,
+    Form,
     Wheelset,
     contact_forces,
     creep,
@@ -34,7 +35,7 @@ SHORTEST = 3.0  # m, wavelength
 WHEELS = (("left", 1.0), ("right", -1.0))
 
 
-def of_mal(case: Case) -> Record:
+def of_mal(case: Case, form: Form = SAME) -> Record:
     """A run over random alignment through all of a case's frictions."""
     rng, t = np.random.default_rng(case.seed), case.times
     run = random_alignment(rng, t, case.speed, DEVIATION, LARGEST, SHORTEST)
@@ -43,10 +44,10 @@ def of_mal(case: Case) -> Record:
     for i, (first, last) in enumerate(pairwise(edges)):
         if i:
             now = replace(now, **dict(case.jumps[i - 1][1]))
-        states = wheelset.simulate(piece(run, first, last), now, start=x)
+        states = wheelset.simulate(piece(run, first, last), now, form=form, start=x)
         x = dict(zip(wheelset.COORDINATES, states[-1], strict=True))
         end = last + 1 if last == len(t) - 1 else last
-        rows += [seen(now, run, k, states[k - first]) for k in range(first, end)]
+        rows += [seen(now, run, k, states[k - first], form) for k in range(first, end)]
     true = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     given = {"y_irr": run.y_irr[::2], "y_irr_dot": run.y_irr_dot[::2]}
     measured = {n: true[n] + rng.normal(0.0, std, len(t)) for n, std in case.noise.items()}
@@ -59,21 +60,24 @@ def piece(run: Run, first: int, last: int) -> Run:
     return Run(run.V, run.t[first : last + 1], run.y_irr[middle], run.y_irr_dot[middle])
 
 
-def seen(p: Wheelset, run: Run, k: int, x: np.ndarray) -> dict[str, float]:
+def seen(p: Wheelset, run: Run, k: int, x: np.ndarray, form: Form = SAME) -> dict[str, float]:
     """All that can be said of sample k at state x (6,); there is no lateral suspension."""
     y_irr, y_irr_dot = float(run.y_irr[2 * k]), float(run.y_irr_dot[2 * k])
     found = dict(zip(wheelset.COORDINATES, x.tolist(), strict=True))
     y, psi, y_dot, psi_dot = x.tolist()[:4]
     friction = (p.mu0, p.A, p.B, p.k_A, p.k_S)
-    F, _, _ = contact_forces(p, SAME, friction, run.V, (y - y_irr, y_dot - y_irr_dot, psi, y_dot, psi_dot))
-    return {**found, "y_ddot": F / p.m_w, **wheels(p, run.V, y_irr, y_irr_dot, x.tolist())}
+    F, _, _ = contact_forces(p, form, friction, run.V, (y - y_irr, y_dot - y_irr_dot, psi, y_dot, psi_dot))
+    return {**found, "y_ddot": F / p.m_w, **wheels(p, run.V, y_irr, y_irr_dot, x.tolist(), form)}
 
 
-def wheels(p: Wheelset, V: float, y_irr: float, y_irr_dot: float, x: list[float]) -> dict[str, float]:
+def wheels(
+    p: Wheelset, V: float, y_irr: float, y_irr_dot: float, x: list[float], form: Form = SAME
+) -> dict[str, float]:
     """Creepages and creep forces [N] of both wheels, each in its own contact."""
     y, psi, y_dot, psi_dot = x[:4]
-    start, rows = table(SAME.smoothed, p.F_n)
+    start, rows = table(form.smoothed, p.F_n, form.penetration)
     _, slope = looked_up(*roll_table(), y - y_irr)
+    reduced = (p.k_A + p.k_S) / 2 if form.spin_reduced else 1.0
     found = {}
     for side, sign in WHEELS:
         growth, delta, *patch = looked_up(start, rows, sign * (y - y_irr))
@@ -83,7 +87,7 @@ def wheels(p: Wheelset, V: float, y_irr: float, y_irr_dot: float, x: list[float]
         spin = (psi_dot - sign * delta * V / p.r0) / V
         mu = p.mu0 * ((1 - p.A) * np.exp(-p.B * np.hypot(along, across)) + p.A)
         slips = (along / V, across / V, spin)
-        F_x, F_y, _ = creep(patch, p.F_n, float(mu), p.k_A, p.k_S, slips, 1.0)
+        F_x, F_y, _ = creep(patch, p.F_n, float(mu), p.k_A, p.k_S, slips, reduced)
         named = {"xi_x": slips[0], "xi_y": slips[1], "F_x": F_x, "F_y": F_y}
         found |= {f"{name}_{side}": value for name, value in named.items()}
     return found

@@ -16,6 +16,7 @@ from scenarios.literature import secondary_stiffness as secondary
 from scenarios.literature.case import Case, Record, recorded
 from scenarios.literature.following import (
     Followed,
+    covered,
     first_below,
     follow,
     rmse,
@@ -25,6 +26,7 @@ from scenarios.literature.row import Row
 from scenarios.literature.twin import twin
 from tests.helpers.native import native
 from tests.helpers.rows import truth
+from tests.truth.wheelset_motion import OTHER, SAME
 
 ANY_MODEL = [pytest.param(m, id=m) for m in ("testrig", "vehicle7dof", "wheelset")]
 
@@ -123,6 +125,18 @@ def test_first_below_counts_from_the_step():
     assert first_below(t, np.ones(5), 0.5, since=1.0) == np.inf
 
 
+def test_the_band_of_normal_errors_covers_in_95_percent_of_the_time():
+    rng, t = np.random.default_rng(1), np.arange(20000.0)
+    std = rng.uniform(0.5, 2.0, len(t))
+    found = Followed(t, {"k": 3.0 + std * rng.standard_normal(len(t))}, {"k": std}, 0.0, 1.0, 1.0)
+    assert covered(found, "k", np.full(len(t), 3.0)) == pytest.approx(0.95, abs=0.01)
+    missed = replace(found, value={"k": np.where(t < 1000, 100.0, found.value["k"])})
+    assert covered(missed, "k", np.full(len(t), 3.0)) < 0.92
+    assert covered(missed, "k", np.full(len(t), 3.0), since=1000.0) == pytest.approx(0.95, abs=0.01)
+    gone = replace(found, value={"k": np.full(len(t), np.nan)})
+    assert covered(gone, "k", np.full(len(t), 3.0)) == 0.0
+
+
 def test_one_missed_target_fails_the_row():
     good, bad = Finding("c", "w", "m", 1.0, target=2.0), Finding("c", "w", "m", 3.0, target=2.0)
     assert Outcome("r", [good], []).ok
@@ -206,6 +220,27 @@ def test_friction_is_found_from_the_outputs_alone_and_the_alignment_with_it():
     found = task.along(record, task.shaped(record))
     assert rmse(found.value["mu0"], case.truth("mu0", record.t)) < 0.5 * friction.SOURCE_RMSE["low"]
     assert friction.alignment_error(found, record) < 0.1
+
+
+@pytest.mark.slow
+def test_with_its_form_open_friction_is_found_on_another_contact():
+    case = case_of("friction_ukf", "dry", duration=40.0)
+    record = truth(case, OTHER)
+    task = friction.task(case, fmu_of("friction_ukf"))
+    right, opened = task.known(record), task.with_form(record)
+    true = case.truth("mu0", record.t)
+    assert covered(right, "mu0", true, 2.0) == 0.0  # a filter that takes the form for right is at its bound
+    assert rmse(opened.value["mu0"], true) < 0.5 * rmse(right.value["mu0"], true)
+    assert opened.nis == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["wet", "static"])
+def test_another_contact_gives_another_record_of_the_same_track(name):
+    row = "friction_ukf" if name == "wet" else "primary_stiffness"
+    case = case_of(row, name, duration=1.0)
+    same, other = truth(case, SAME), truth(case, OTHER)
+    np.testing.assert_array_equal(same.columns["y_irr"], other.columns["y_irr"])
+    assert np.abs(same.columns["y"] - other.columns["y"]).max() > 1e-6
 
 
 @pytest.mark.slow

@@ -1,0 +1,34 @@
+"""Probabilities in words: nothing is said to be certain, and what is left is said."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.closing.lines import probable, share
+
+
+@pytest.mark.parametrize(
+    ("p", "said"),
+    [
+        (0.0, "below 0.1 %"),
+        (0.0123, "1.2 %"),
+        (0.5, "50 %"),
+        (0.9975, "99.8 %"),
+        (0.9996, "above 99.9 %"),
+        (1.0, "above 99.9 %"),
+    ],
+)
+def test_a_share_is_said_to_a_tenth_of_a_percent(p, said):
+    assert share(p) == said
+
+
+@given(st.floats(0.0, 1.0))
+def test_no_probability_is_said_to_be_certain(p):
+    assert share(p) not in ("0 %", "100 %")
+
+
+def test_the_most_probable_answers_are_said_with_what_is_left():
+    said = probable({"viscous_damping@wheel": 0.6, "viscous_damping@roller": 0.3})
+    assert said == "probability: viscous damping@wheel 60 %, viscous damping@roller 30 %, none of these 10 %"
+    many = probable({f"a@{i}": 0.1 for i in range(9)})
+    assert many.count("a@") == 3
