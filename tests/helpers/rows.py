@@ -16,6 +16,7 @@ from scenarios.literature import ROWS
 from scenarios.literature.case import TIME, Case, Record
 from tests.helpers.rows_charles import of_charles
 from tests.helpers.rows_mal import of_mal, piece
+from tests.helpers.rows_torsion import of_torsion
 from tests.helpers.rows_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
 from tests.truth.rig_inputs import Inputs, trapezium
@@ -34,7 +35,10 @@ def truth(case: Case) -> Record:
         return of_charles(case)
     if case.judged:
         return of_mal(case)
-    return {"wheelset": of_wheelset, "testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
+    by_model = {
+        "wheelset": of_wheelset, "testrig": of_rig, "vehicle7dof": of_vehicle, "traction": of_torsion,
+    }  # fmt: skip
+    return by_model[case.model](case)
 
 
 def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
