@@ -44,7 +44,9 @@ class AdhesionController(Model):
     i_g = Parameter("1", 5.0, min=1e-3, doc="ratio of the gearbox, motor over wheel", source=CHOICE)
     J = Parameter("kg.m2", 7.92, min=1e-6, doc="inertia of motor, axle and wheels at the motor",
                   source=f"{MAL}: (I_R + I_L)/i_g^2")  # fmt: skip
-    k_p = Parameter("N.m.s/rad", 200.0, min=0.0, doc="gain of the speed that limits the torque", source=CHOICE)
+    k_p = Parameter(
+        "N.m.s/rad", 200.0, min=0.0, doc="gain of the speed that limits the torque", source=CHOICE
+    )
     omega_o = Parameter("rad/s", 100.0, min=0.1, doc="corner of the filters of load torque and creep",
                         source=CHOICE)  # fmt: skip
     omega_h = Parameter("rad/s", 5.0, min=0.01, doc="corner above which the swing counts", source=CHOICE)

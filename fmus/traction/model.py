@@ -36,7 +36,7 @@ SIGN = {"left": 1.0, "right": -1.0}  # of y there
 
 
 class Traction(Model):
-    """Torsional wheelset with gearbox and motor: rotation, axle torsion and speed under traction and braking."""
+    """Torsional wheelset with gearbox and motor: rotation, torsion and speed under traction and braking."""
 
     name = "Traction"
     step_size = 1e-4

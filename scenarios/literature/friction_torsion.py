@@ -66,14 +66,16 @@ def followed(case: Case, record: Record, fmu: Path) -> Followed:
 def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
     """See Row."""
     findings: list[Finding] = []
-    panels: list[Panel] = []
+    panels: dict[str, list[Panel]] = {}
     for case, record in measured:
         tell(case.name)
         found = followed(case, record, fmu)
         findings += judged(case, found)
-        panels.append(Panel(case.name, [case.truth("mu0", record.t)], {"estimate": Line.of(found, "mu0")},
-                            "mu0", (0.0, 0.6)))  # fmt: skip
-    return Outcome(ROW.name, findings, [parameter_figure("friction_torsion", panels)], NOTES)
+        true, line = case.truth("mu0", record.t), Line.of(found, "mu0")
+        form = OTHER_FORM if case.name.endswith(OTHER_FORM) else ""
+        panels.setdefault(form, []).append(Panel(case.name, [true], {"estimate": line}, "mu0", (0.0, 0.6)))
+    plots = [parameter_figure(f"friction_torsion{form}", drawn) for form, drawn in panels.items()]
+    return Outcome(ROW.name, findings, plots, NOTES)
 
 
 def judged(case: Case, found: Followed) -> list[Finding]:

@@ -1,8 +1,8 @@
 """Truth of a driven wheelset, independent of the product: plain NumPy and SciPy.
 
 Written from Mal et al. 2020, eq. 1 to 17, as they follow from the quantities of its Table 1. Differs in form:
-absolute angles of motor and wheels instead of twists, momenta and matrices instead of single equations, Mal's
-way to Polach's stress gradient, or FASTSIM's tractions; inputs linear between samples; an adaptive stiff method.
+absolute angles of motor and wheels instead of twists, matrices instead of single equations, Mal's way to
+Polach's stress gradient, or FASTSIM's tractions; inputs linear between samples; an adaptive stiff method.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CREEPS = np.geomspace(1e-3, 1e3, 121)  # at which FASTSIM is worked out, in unit
 
 @dataclass(frozen=True)
 class Traction:
-    """Parameters, SI; Mal et al. 2020, Tables 1 and 3 (dry), where they give them. form: polach or fastsim."""
+    """Parameters, SI; Mal et al. 2020, Tables 1 and 3 (dry), if given there. form: polach or fastsim."""
 
     I_left: float = 64.0
     I_right: float = 64.0
@@ -64,7 +64,7 @@ class Traction:
         return matrix
 
     def frequencies(self) -> Array:
-        """Torsional natural frequencies [Hz] of the wheelset that is lifted off the rails, without damping."""
+        """Torsional natural frequencies [Hz] of the wheelset lifted off the rails, without damping."""
         values = eigh(self.shafts(self.k_s, self.k_g), np.diag(self.inertia), eigvals_only=True)
         found: Array = np.sqrt(np.maximum(values[1:], 0.0)) / (2 * np.pi)
         return found
