@@ -65,7 +65,7 @@ class AdhesionController(Model):
     T = Output("N.m", doc="torque request of the motor, traction positive", nominal=1e3)
     T_load = Output("N.m", doc="load torque at the motor, observed", nominal=1e3)
     xi = Output("1", doc="creep of the wheels by the motor's speed, traction positive", nominal=1e-3)
-    slope = Output("1", doc="relative slope of the load torque over the creep", nominal=100.0)
+    load_slope = Output("1", doc="relative slope of the load torque over the creep", nominal=100.0)
     limiting = Output("1", doc="1 where the controller limits the torque that is demanded")
 
     def derivatives(m) -> dict[str, Expr]:
@@ -94,7 +94,7 @@ class AdhesionController(Model):
             "T": m._torque(),
             "T_load": m._load(),
             "xi": m._creep(),
-            "slope": m._slope(),
+            "load_slope": m._slope(),
             "limiting": m._limiting(),
         }
 
