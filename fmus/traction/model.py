@@ -159,7 +159,8 @@ class Traction(Model):
         right = m.theta_left + m.theta_s
         turned = {"left": (m.theta_left, m.omega_left), "right": (right, m.omega_right)}
         twisting = m.omega_m / m.i_g - m.omega_right
-        wheels, contacts = {}, {}
+        wheels: dict[str, Port] = {}
+        contacts: dict[str, Port] = {}
         for side, (angle, speed) in turned.items():
             own = f"T_{side}_ext"
             wheels[f"wheel_{side}"] = Port(angle, speed, {own: 1.0}, "rotation", "turns")

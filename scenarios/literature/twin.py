@@ -38,7 +38,8 @@ def twin(fmu: Path) -> Source:
         rng, t = np.random.default_rng(case.seed), case.times
         inputs = INPUTS[case.model](case, t, rng)
         edges = [0, *(round(when / case.dt) for when, _ in case.jumps), len(t) - 1]
-        start = {**STARTS.get(case.model, lambda speed: {})(case.speed), **case.true}
+        begun = STARTS.get(case.model)
+        start = {**(begun(case.speed) if begun else {}), **case.true}
         found = []
         with Fmu(fmu) as plant:
             states = list(plant.description.states)
