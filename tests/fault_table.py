@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.contracts import test_fuzzed_files
+from tests.helpers.fuzzing import targets
 from tests.helpers.misbehaving import DEATHS, ENDLESS, HARMLESS
 from tests.scenarios import (
     test_command_line,
@@ -55,6 +57,9 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
             told = "exit code of the signal; no traceback, part of a file, process or folder is left"
             what = f"{number.name} at {test_interrupts.MOMENTS} moments"
             yield what, command, told, _file(test_interrupts)
+    for name in targets():
+        told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
+        yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)
     for what in test_command_line.WRONG:
         told = "one line, exit code 2, nothing written"
         yield f"experiment: {what}", "close-loop", told, _file(test_command_line)

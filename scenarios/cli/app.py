@@ -28,6 +28,7 @@ UNWRITABLE = (  # errors of a disk or a folder
     errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM,
 )  # fmt: skip
 
+UNPRINTABLE = "\N{REPLACEMENT CHARACTER}"
 PIPE_CLOSED = 1  # exit code of a command whose output nobody reads, as that of the library click
 
 # libraries' worker processes would each use every core for small matrices
@@ -84,7 +85,7 @@ def run_safely(arguments: Sequence[str]) -> int:
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read
             return _interrupted()
-        said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
+        said.print(f"railfmi: {_line(error)}", markup=False, soft_wrap=True)
         return 2
     except BrokenProcessPool:
         said.print(
@@ -111,7 +112,7 @@ def run_safely(arguments: Sequence[str]) -> int:
         if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
             return _interrupted()
         if _is_of_fmu(error):
-            said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
+            said.print(f"railfmi: {_line(error)}", markup=False, soft_wrap=True)
             return 2
         shown = getattr(error, "format_message", None)  # click's own errors of usage
         if shown is None:
@@ -134,6 +135,12 @@ def _flush_output() -> None:
 def _no_more_output() -> None:
     """Drop what is still to be printed."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _line(error: Exception) -> str:
+    """What an error says, in one line; what it quotes of a file may hold line ends and codes of terminals."""
+    text = " ".join(str(error).splitlines())
+    return "".join(c if c.isprintable() else UNPRINTABLE for c in text)
 
 
 def _of_system(error: OSError) -> str:
