@@ -60,7 +60,7 @@ def supervised(command: Command, arguments: Sequence[str]) -> int:
             return _watched(command, arguments, folder)
     except OSError as error:
         why = error.strerror or error
-        _say(f"no temporary folder can be made ({why}); free space, or set TMPDIR to another folder")
+        _say(f"the command cannot be started ({why}); free space, or set TMPDIR to another folder")
         return FAILED
 
 
