@@ -11,6 +11,12 @@ ENTRIES = 20_000  # files in a package
 UNPACKED = 2.0  # GB that they have together
 STEPS = 20_000_000  # of a simulation of coupled FMUs, which are planned in memory
 
+# files and requests
+TEXT = 64.0  # MB of a file that is read as a whole: a profile, a TOML file, a result
+COLUMNS = 10_000  # of a record
+READING = 600.0  # s, that a record may take to be read by a library which a damaged one may crash
+DRAWS = 10_000  # measurements of a pair by which the reading of points is tested
+
 # the trials of an FMU before it is estimated, see fmus/host/grading/honest.py
 RESTARTS = 1e-4  # of an output's size: what a solver with steps of its own may change by a restart
 PROBED = 200  # outcomes that are kept

@@ -6,7 +6,7 @@ from zipfile import ZipFile
 from fmus import limits
 from fmus.errors import BadInput
 
-GB = 1e9  # bytes
+MB, GB = 1e6, 1e9  # bytes
 
 
 def check_file(path: Path) -> None:
@@ -15,6 +15,22 @@ def check_file(path: Path) -> None:
         raise BadInput(f"the path {str(path)!r} holds a NUL; mend it")
     if path.exists() and not path.is_file():
         raise BadInput(f"{path}: is a folder, a device or a pipe; give the path of a file")
+
+
+def check_text(path: Path) -> None:
+    """Raise BadInput for what is no file, or too large for one that is read as a whole."""
+    check_file(path)
+    size = path.stat().st_size / MB if path.exists() else 0.0
+    if size > limits.TEXT:
+        raise BadInput(f"{path}: has {size:.3g} MB, more than {limits.TEXT:g} MB; is it the right file?")
+
+
+def check_columns(path: Path, number: int) -> None:
+    """Raise BadInput for a record of too many columns."""
+    if number > limits.COLUMNS:
+        raise BadInput(
+            f"{path}: has {number} columns, more than {limits.COLUMNS}; keep those that the experiment names"
+        )
 
 
 def check_packed(packed: ZipFile, path: Path) -> None:

@@ -1,20 +1,18 @@
 """The folder into which a command writes its results."""
 
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
 from fmus.errors import BadInput
+from fmus.files import passing_folder, remove_left, write_at_once
 
 # what commands write into their folder, and by pattern
 FILES = ("result.json", "results.json", "plan.json", "norm.json")
 RESULTS = (*FILES, "*/result.json")
 WRITING = ".writing_"  # begin of the name of a folder of files that are not complete
-LAST = "result.json"  # moved last, so that a folder that holds it is complete
 
 
 def writable(folder: Path) -> Path:
@@ -30,9 +28,7 @@ def writable(folder: Path) -> Path:
         raise BadInput(f"--out {folder}: cannot be made ({why}); name another folder") from error
     if not os.access(folder, os.W_OK):
         raise BadInput(f"--out {folder}: may not be written to; name another folder")
-    for left in folder.glob(f"{WRITING}*"):
-        if not _lives(left.name.removeprefix(WRITING).partition("_")[0]):
-            shutil.rmtree(left, ignore_errors=True)
+    remove_left(folder, WRITING)
     return folder
 
 
@@ -59,36 +55,27 @@ def replaced(folder: Path) -> str:
 def written_at_once(folder: Path) -> Iterator[Path]:
     """A folder for files that are moved to `folder` when all are complete; none is if one fails.
 
-    BadInput if the disk is full or may not be written to.
+    Files in its subfolders keep their place. What says the result is moved last, so that a folder that holds
+    it is complete. BadInput if the disk is full or may not be written to.
     """
     try:
-        with tempfile.TemporaryDirectory(prefix=f"{WRITING}{os.getpid()}_", dir=folder) as part:
-            yield Path(part)
-            for file in sorted(Path(part).iterdir(), key=lambda f: f.name == LAST):
-                file.replace(folder / file.name)
+        with passing_folder(folder, WRITING) as part:
+            yield part
+            files = (file for file in part.rglob("*") if not file.is_dir())
+            for file in sorted(files, key=lambda f: (f.name in FILES, f)):
+                target = folder / file.relative_to(part)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(target)
     except OSError as error:
         raise unwritten(error, folder) from error
 
 
 def written(file: Path, text: str) -> None:
-    """Write a text file; an interrupted write leaves no part of it under its name."""
-    part = file.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(file)
+    """Write a text file; an interrupted write leaves no part of it."""
+    write_at_once(file, text.encode())
 
 
 def unwritten(error: OSError, folder: object) -> BadInput:
     """The error in one line; the folder is named if the error names no file."""
     why = error.strerror or " ".join(str(error).split())
     return BadInput(f"{folder}: cannot be written ({why}); free space, or name another folder")
-
-
-def _lives(process: str) -> bool:
-    """Whether a process of this number runs; another user's does as well."""
-    try:
-        os.kill(int(process), 0)
-    except (ProcessLookupError, ValueError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True

@@ -3,8 +3,17 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.contracts import test_fuzzed_files
+from tests.helpers.fuzzing import targets
 from tests.helpers.misbehaving import DEATHS, ENDLESS, HARMLESS
-from tests.scenarios import test_command_line, test_misbehaving, test_output, test_trials_before
+from tests.scenarios import (
+    test_command_line,
+    test_full_disk,
+    test_interrupts,
+    test_misbehaving,
+    test_output,
+    test_trials_before,
+)
 
 FILE = Path(__file__).parents[1] / "docs" / "faults.md"
 HEAD = """# Faults that the tests try
@@ -33,13 +42,24 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
         yield f"`{fault.what}` in {fault.call}", "run", "nothing: the run is as without it", file
     for what, words in test_trials_before.WRONG.items():
         told = f"refused before it is estimated: {words}; exit code 2"
-        yield f"`{what}`", "estimate, close-loop", told, _file(test_trials_before)
+        yield f"`{what}`", ", ".join(test_trials_before.COMMANDS), told, _file(test_trials_before)
     for what in test_output.SPOILED:
         yield f"model description with {what}", every, "one line, exit code 2", _file(test_output)
     for command in ("run", "compare"):
         for n in range(6):
             told = "one line, exit code 2, no half file"
             yield f"disk full from rename {n + 1} on", command, told, _file(test_output)
+    for command, (_, most) in test_full_disk.CASES.items():
+        told = f"one line, exit code 2, no part of a file, at each of up to {most} places"
+        yield "disk full from any change of a file on", command, told, _file(test_full_disk)
+    for command in test_interrupts.COMMANDS:
+        for number in test_interrupts.SIGNALS:
+            told = "exit code of the signal; no traceback, part of a file, process or folder is left"
+            what = f"{number.name} at {test_interrupts.MOMENTS} moments"
+            yield what, command, told, _file(test_interrupts)
+    for name in targets():
+        told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
+        yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)
     for what in test_command_line.WRONG:
         told = "one line, exit code 2, nothing written"
         yield f"experiment: {what}", "close-loop", told, _file(test_command_line)

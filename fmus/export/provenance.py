@@ -20,6 +20,7 @@ from fmus.effects.effect import Effect
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import Isolation
 from fmus.model import Model
+from fmus.taken import check_packed
 from fmus.variables import Parameter
 
 HERE = Path(__file__).parent
@@ -141,8 +142,10 @@ def isolation_of(fmu: Path, isolation: Isolation | None) -> Isolation | None:
     if isolation is None or not fmu.is_file():
         return isolation  # who opens it says what is wrong with it
     try:
+        with zipfile.ZipFile(fmu) as packed:
+            check_packed(packed, fmu)
         own = "base" not in provenance(fmu) and not altered(fmu)
-    except BadInput:
+    except Exception:  # a package that is damaged, or a record of another form, is not one of ours
         own = False
     return None if own else isolation
 

@@ -28,6 +28,9 @@ UNWRITABLE = (  # errors of a disk or a folder
     errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM,
 )  # fmt: skip
 
+UNPRINTABLE = "\N{REPLACEMENT CHARACTER}"
+PIPE_CLOSED = 1  # exit code of a command whose output nobody reads, as that of the library click
+
 # libraries' worker processes would each use every core for small matrices
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -77,11 +80,12 @@ def run_safely(arguments: Sequence[str]) -> int:
             return _interrupted()
         if code != 130:
             say_notices()
+        _flush_output()
         return code if isinstance(code, int) else 0
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read
             return _interrupted()
-        said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
+        said.print(f"railfmi: {_line(error)}", markup=False, soft_wrap=True)
         return 2
     except BrokenProcessPool:
         said.print(
@@ -94,20 +98,21 @@ def run_safely(arguments: Sequence[str]) -> int:
         return _interrupted()
     except KeyboardInterrupt:
         return _interrupted()
+    except BrokenPipeError:  # as with 'railfmi ... | head'
+        return PIPE_CLOSED
     except OSError as error:
-        if error.errno not in UNWRITABLE:
-            raise
-        where = error.filename or "a file"
-        said.print(
-            f"railfmi: {where}: cannot be written ({error.strerror}); free space, or name another folder",
-            markup=False, soft_wrap=True,
-        )  # fmt: skip
+        if INTERRUPTED.came:
+            return _interrupted()
+        said.print(f"railfmi: {_of_system(error)}", markup=False, soft_wrap=True)
+        return 2
+    except MemoryError:
+        said.print("railfmi: memory ran out; close other programs, use --jobs 1, or cut the record")
         return 2
     except Exception as error:
         if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
             return _interrupted()
         if _is_of_fmu(error):
-            said.print(f"railfmi: {error}", markup=False, soft_wrap=True)
+            said.print(f"railfmi: {_line(error)}", markup=False, soft_wrap=True)
             return 2
         shown = getattr(error, "format_message", None)  # click's own errors of usage
         if shown is None:
@@ -115,6 +120,36 @@ def run_safely(arguments: Sequence[str]) -> int:
         if shown():  # empty if the help was shown
             said.print(f"railfmi: {' '.join(shown().split())}", markup=False, soft_wrap=True)
         return 2
+
+
+def _flush_output() -> None:
+    """Write what was printed, so that output which cannot be written is told."""
+    try:
+        if sys.stdout:  # none if it was closed
+            sys.stdout.flush()
+    except OSError:
+        _no_more_output()
+        raise
+
+
+def _no_more_output() -> None:
+    """Drop what is still to be printed."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _line(error: Exception) -> str:
+    """What an error says, in one line; what it quotes of a file may hold line ends and codes of terminals."""
+    text = " ".join(str(error).splitlines())
+    return "".join(c if c.isprintable() else UNPRINTABLE for c in text)
+
+
+def _of_system(error: OSError) -> str:
+    """One line on an error of the system."""
+    why = error.strerror or " ".join(str(error).split())
+    if error.errno in UNWRITABLE:
+        where = error.filename or "the output"
+        return f"{where}: cannot be written ({why}); free space, or name another folder"
+    return f"{error.filename or 'a file'}: cannot be used ({why}); mend the path, or name another one"
 
 
 def _is_of_fmu(error: Exception) -> bool:

@@ -49,7 +49,7 @@ def conicity(
     """Find where a pair touches, its radius difference and its conicity; write a page, JSON and CSV."""
     from scenarios.conicity.evaluating import Request, evaluated
     from scenarios.conicity.page import write_page
-    from scenarios.output import writable
+    from scenarios.output import writable, written_at_once
 
     radii = [_number("--r0", text) for text in _split(r0 or ["0.46"])]
     request = Request(
@@ -64,8 +64,9 @@ def conicity(
     with said.status("searching for the contact"):
         found = evaluated(request, amplitudes)
         folder = writable(out)
-        found.write(folder)
-        write_page(folder, found, shlex.join(["railfmi", *sys.argv[1:]]))
+        with written_at_once(folder) as part:
+            found.write(part)
+            write_page(part, found, shlex.join(["railfmi", *sys.argv[1:]]))
     typer.echo("equivalent conicity")
     for line in found.lines():
         typer.echo(line)

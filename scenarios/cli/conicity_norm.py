@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from fmus import limits
 from scenarios.cli.console import RESULTS, Out, app, said, will_write
 
 
@@ -21,7 +22,9 @@ def conicity_norm(
     pair: Annotated[
         list[str] | None, typer.Option(help="reference pair, such as A, Amod or AB; by default all")
     ] = None,
-    draws: Annotated[int, typer.Option(min=0, help="measurements in step 2; 0 leaves step 2 out")] = 20,
+    draws: Annotated[
+        int, typer.Option(min=0, max=limits.DRAWS, help="measurements in step 2; 0 leaves step 2 out")
+    ] = 20,
     random: Annotated[float, typer.Option(help="random error of points, m rms")] = 1e-5,
     grid: Annotated[float, typer.Option(help="grid that points are rounded to, m")] = 2e-5,
     spacing: Annotated[float, typer.Option(help="distance of points along the profile, m")] = 2e-4,
@@ -40,7 +43,7 @@ def conicity_norm(
     from scenarios.conicity.norm.pairs import references
     from scenarios.conicity.norm.report import NormReport
     from scenarios.conicity.norm.steps import step_1, step_2
-    from scenarios.output import writable
+    from scenarios.output import writable, written_at_once
 
     pairs = references(pair)
     instrument = Instrument(reader_of(reader, smoothing), random, grid, spacing, seed)
@@ -51,7 +54,8 @@ def conicity_norm(
         measured = list(step_2(pairs, instrument, draws, status.update)) if draws else []
     how = "found from the data" if smoothing is None else f"{smoothing:g} m rms"
     report = NormReport(exact, measured, instrument, reader or f"our own, smoothing {how}")
-    report.write(folder, shlex.join(["railfmi", *sys.argv[1:]]))
+    with written_at_once(folder) as part:
+        report.write(part, shlex.join(["railfmi", *sys.argv[1:]]))
     for line in report.lines():
         typer.echo(line)
     typer.echo(f"page: {folder / 'norm.html'}")

@@ -5,7 +5,19 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
+from fmus import limits
+from scenarios.cli.console import (
+    RESULTS,
+    CallLimit,
+    MemoryLimit,
+    Out,
+    RunLimit,
+    Trust,
+    app,
+    said,
+    show,
+    will_write,
+)
 
 
 @app.command()
@@ -15,17 +27,23 @@ def plan(
     data: Annotated[
         Path | None, typer.Option(help="folder of the data files, if not beside the experiment")
     ] = None,
+    trust_fmu: Trust = False,
+    call_limit: CallLimit = limits.CALL,
+    run_limit: RunLimit = limits.RUN,
+    memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
     """Say which effects an experiment could show and tell apart, and what would help.
 
     Only the time and the inputs are read from the data; the outputs need not exist.
     """
+    from fmus.host.apart.isolation import Isolation
     from scenarios.planning.planning import plan as planned
     from scenarios.planning.result import table_of
 
+    isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
     with said.status("reading the experiment") as status:
-        result = planned(experiment, out, data, status.update, show)
+        result = planned(experiment, out, data, status.update, show, isolation=isolation)
     for line in table_of(result):
         typer.echo(line)
     typer.echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")

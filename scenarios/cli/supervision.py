@@ -5,17 +5,19 @@ not end by itself in time, and removes the processes and folders that are left. 
 together with its process, whatever its exit code, does not pass for one that has finished.
 """
 
+import contextlib
 import ctypes
 import mmap
 import os
-import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
+from fmus.files import passing_folder, remove_left
 from fmus.host import shared
 from fmus.limits import INTERRUPT
 
@@ -23,9 +25,12 @@ Command = Callable[[Sequence[str]], int]
 
 FAILED = 2  # exit code of a command that has not finished
 DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
+REAPER = 36  # of the call prctl: orphans among the descendants become children
 PAGE = 1 << 13  # bytes
+FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary files
+MEMORY_HINT = "; where memory runs out, the system does this"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
-INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 HINTS = {"close-loop": "; the same command with --resume continues from the last checkpoint, if there is one"}
 
 
@@ -48,40 +53,61 @@ def supervised(command: Command, arguments: Sequence[str]) -> int:
     """Run a command in a process of its own; its exit code, or 128 plus the signal that interrupted it."""
     if not hasattr(os, "fork"):
         return command(arguments)
+    place = Path(tempfile.gettempdir())
+    remove_left(place, FOLDER)
     try:
-        folder = tempfile.mkdtemp(prefix="railfmi_")
+        with passing_folder(place, FOLDER) as folder:
+            return _watched(command, arguments, folder)
     except OSError as error:
-        _say(
-            f"no temporary folder can be made ({error.strerror}); free space, or set TMPDIR to another folder"
-        )
+        why = error.strerror or error
+        _say(f"the command cannot be started ({why}); free space, or set TMPDIR to another folder")
         return FAILED
+
+
+def _watched(command: Command, arguments: Sequence[str], folder: Path) -> int:
+    """The exit code of the command, whose temporary files lie in the folder."""
     page = mmap.mmap(-1, PAGE)
     told, tells = os.pipe()
-    child = os.fork()
-    if not child:
-        os.close(told)
-        tempfile.tempdir = os.environ["TMPDIR"] = folder
-        shared.page = page  # what an FMU does in the process is written where this one sees it
-        _work(command, arguments, tells)
-    os.close(tells)
-    try:
-        return Watch(child, told, arguments, page).until_the_end()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    _control(REAPER, 1)  # what leaves the command's group of processes is found nevertheless
+    with _signals_wait():
+        child = os.fork()
+        if not child:
+            os.close(told)
+            tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
+            shared.page = page  # what an FMU does in the process is written where this one sees it
+            _work(command, arguments, tells)
+        os.close(tells)
+        watch = Watch(child, told, arguments, page)
+    return watch.until_the_end()
 
 
 def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
     """Run the command in this process and leave it."""
     os.setsid()
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
+    _control(DEATH_SIGNAL, signal.SIGTERM)
     signal.signal(signal.SIGINT, INTERRUPTED)
     code = 1
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
         code = command(arguments)
     finally:  # also after a mistake in this program, which Python then shows
         os.write(tells, bytes([code]))
     sys.exit(code)
+
+
+@contextlib.contextmanager
+def _signals_wait() -> Iterator[None]:
+    """Signals that come before there is something to do with them come afterwards."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
+
+
+def _control(what: int, value: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(what, value, 0, 0, 0)
 
 
 class Watch:
@@ -90,18 +116,19 @@ class Watch:
     def __init__(self, child: int, told: int, arguments: Sequence[str], page: mmap.mmap) -> None:
         self._child, self._told, self._arguments, self._page = child, told, arguments, page
         self._signal = 0  # that interrupted it
-
-    def until_the_end(self) -> int:
-        """Wait for the end of the command; its exit code."""
         for number in INTERRUPTS:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job of a script in the background
                 signal.signal(number, self._interrupt)
         signal.signal(signal.SIGALRM, self._kill)
         signal.signal(signal.SIGTSTP, self._stop)
+
+    def until_the_end(self) -> int:
+        """Wait for the end of the command; its exit code."""
         _, status = os.waitpid(self._child, 0)
         signal.alarm(0)
         code = self._code()
         self._kill()  # what it has left: workers, compilers; FMUs end with the process that uses them
+        _end_orphans()
         if code is not None:
             return 128 + self._signal if self._signal else code
         if self._signal:
@@ -142,10 +169,32 @@ class Watch:
 
         how = signal.strsignal(-code) if code < 0 else f"exit code {code}"
         who = Page(self._page).doing() or "an FMU, or a library that it loads,"
+        memory = MEMORY_HINT if code == -signal.SIGKILL else ""
         return (
-            f"{who} ended the process of the command before it had finished ({how}); its results are missing "
-            "or incomplete; 'railfmi check' on the FMU shows in which call this happens"
+            f"{who} ended the process of the command before it had finished ({how}{memory}); its results are "
+            "missing or incomplete; 'railfmi check' on the FMU shows in which call this happens"
         )
+
+
+def _end_orphans() -> None:
+    """End what the command has left behind, such as a process that an FMU has sent into the background."""
+    while children := _children():
+        for child in children:
+            _send(os.kill, child, signal.SIGKILL)
+        for child in children:
+            with contextlib.suppress(ChildProcessError):
+                os.waitpid(child, 0)
+
+
+def _children() -> list[int]:
+    """The numbers of this process's children, none where the system does not list them."""
+    found, own = [], f" {os.getpid()} "
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            about = (process / "stat").read_text(errors="replace").rpartition(")")[2]  # " S PARENT ..."
+            if about[2:].startswith(own):
+                found.append(int(process.name))
+    return found
 
 
 def _say(sentence: str) -> None:

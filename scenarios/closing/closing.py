@@ -93,9 +93,7 @@ class Posed:
     @classmethod
     def of(cls, declared: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> "Posed":
         """The question of an experiment; work: folder for the builds of its FMU."""
-        builder = builder_for(declared, work, isolation)
-        if declared.fmu_path:
-            check_honest(declared.fmu_path, isolation or ISOLATED)
+        builder = honest_builder(declared, work, isolation)
         return cls(declared, builder, pose(declared, builder))
 
 
@@ -160,6 +158,14 @@ def closed(
         write_report(part, problem, found, result)
         result.write(part / "result.json")
     return found, result
+
+
+def honest_builder(e: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> Builder:
+    """The builder of the experiment's FMUs; BadInput where an FMU is no function of what is set in it."""
+    builder = builder_for(e, work, isolation)
+    if e.fmu_path:
+        check_honest(e.fmu_path, isolation or ISOLATED)
+    return builder
 
 
 def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATED) -> Builder:

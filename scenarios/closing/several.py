@@ -36,7 +36,7 @@ from scenarios.closing.several_results import (
 )
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 Done = Callable[[Result], None]
 OURS = ("index.html", "table.csv", "results.json")  # written beside the folders of the experiments
@@ -78,8 +78,9 @@ def close_loops(
             PLANTS.close()
             found = campaign.results()
             if campaign.folder is not None and found.results:
-                found.write(campaign.folder)
-                write_page(campaign.folder, found)
+                with written_at_once(campaign.folder) as part:
+                    found.write(part)
+                    write_page(part, found)
     return found
 
 

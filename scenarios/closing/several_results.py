@@ -1,6 +1,7 @@
 """The results of several experiments, as they are written to results.json and table.csv."""
 
 import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -14,6 +15,7 @@ from estimator.closeloop.several.standing import Standing
 from estimator.closeloop.several.transfer import Status, Traced, Transfer
 from scenarios.closing.page.glossary import glossary
 from scenarios.closing.result import Effect, Figure, Result
+from scenarios.output import written
 
 Table = dict[str, str | float]
 COLUMNS = (
@@ -94,15 +96,13 @@ class Results:
         return [self._row(r) for r in self.results]
 
     def write(self, folder: Path) -> None:
-        """Write results.json and table.csv; an interrupted write leaves no partial file under these names."""
-        part = folder / "results.part"
-        part.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
-        part.replace(folder / "results.json")
-        with part.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, COLUMNS)
-            writer.writeheader()
-            writer.writerows(self.table)
-        part.replace(folder / "table.csv")
+        """Write results.json and table.csv; an interrupted write leaves no part of a file."""
+        written(folder / "results.json", json.dumps(asdict(self), indent=1))
+        table = io.StringIO(newline="")
+        writer = csv.DictWriter(table, COLUMNS)
+        writer.writeheader()
+        writer.writerows(self.table)
+        written(folder / "table.csv", table.getvalue())
 
     def _row(self, r: Result) -> Table:
         output = max(r.error, key=lambda o: r.error[o]["after"] / r.error[o]["noise"])

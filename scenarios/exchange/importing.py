@@ -23,7 +23,7 @@ from fmus.host.master.recording import TIME
 from fmus.units import conversion
 from scenarios.exchange.settings import PLACE
 from scenarios.exchange.toml_text import toml_text
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 from scenarios.simulating.expression import in_formula
 from scenarios.simulating.reading import load_scenario
 
@@ -46,15 +46,16 @@ def import_ssp(package: str | Path, out: str | Path, tell: Tell = lambda _: None
     folder = writable(Path(out))
     for line in (*system.ignored, *_changed(files)):
         tell(f"{package}: {line}")
-    for path, data in files.items():
-        if path.startswith(f"{RESOURCES}/") or path in {c.source for c in system.components}:
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_bytes(data)
-    try:
-        table = _scenario(system, files, folder, lambda line: tell(f"{package}: {line}"))
-    except BadInput as error:
-        raise BadInput(f"{package}: {error}") from error
-    (folder / FILE).write_text(toml_text(table), encoding="utf-8")
+    with written_at_once(folder) as part:
+        for path, data in files.items():
+            if path.startswith(f"{RESOURCES}/") or path in {c.source for c in system.components}:
+                (part / path).parent.mkdir(parents=True, exist_ok=True)
+                (part / path).write_bytes(data)
+        try:
+            table = _scenario(system, files, part, lambda line: tell(f"{package}: {line}"))
+        except BadInput as error:
+            raise BadInput(f"{package}: {error}".replace(str(part), str(folder))) from error
+        (part / FILE).write_text(toml_text(table), encoding="utf-8")
     return load_scenario(folder / FILE).file
 
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from fmus.errors import BadInput, did_you_mean
-from fmus.taken import check_file
+from fmus.taken import check_text
 from scenarios.experiment.declaration import Table
 
 T = TypeVar("T", bound=Table)
@@ -31,7 +31,7 @@ SAID = MappingProxyType(
 
 def read_toml(file: Path, kind: str) -> dict[str, Any]:
     """The top table of a TOML file; `kind` is the word for the file in messages, "an experiment.toml"."""
-    check_file(file)
+    check_text(file)
     try:
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:

@@ -13,6 +13,7 @@ from scenarios.literature.case import Source, recorded
 from scenarios.literature.outcome import Outcome
 from scenarios.literature.row import Row, Tell
 from scenarios.literature.twin import twin
+from scenarios.output import writable
 
 __all__ = ["ROWS", "Outcome", "Row", "run_row"]
 
@@ -53,6 +54,7 @@ def run_row(
         if wanted not in known:
             raise BadInput(f"row {name}: has no case '{wanted}'; {did_you_mean(wanted, known)}")
     chosen = [known[wanted] for wanted in cases] if cases else list(row.cases)
+    target = writable(out)
     with TemporaryDirectory(prefix="railfmi_row_") as folder:
         used = fmu or build_native(model_class(row.model)(), Path(folder))
         measured = []
@@ -60,7 +62,7 @@ def run_row(
             tell(f"{case.name}: the record")
             measured.append((case, _source(records, used)(case)))
         outcome = row.rebuilt(measured, used, tell)
-    outcome.write(out)
+    outcome.write(target)
     return outcome
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from scenarios.drawing.sheet import Plot
+from scenarios.output import writable, written_at_once
 
 Bound = Literal["<=", ">="]
 
@@ -70,14 +71,14 @@ class Outcome:
         return not self.missed
 
     def write(self, folder: Path) -> None:
-        """Write result.json, table.md and the figures."""
-        folder.mkdir(parents=True, exist_ok=True)
+        """Write result.json, table.md and the figures; none is if one cannot be written."""
         found = [{**vars(f), "met": f.met} for f in self.findings]
         whole = {"row": self.row, "ok": self.ok, "findings": found, "notes": list(self.notes)}
-        (folder / "result.json").write_text(json.dumps(whole, indent=1), encoding="utf-8")
-        (folder / "table.md").write_text(table(self.findings), encoding="utf-8")
-        for plot in self.plots:
-            plot.write(folder)
+        with written_at_once(writable(folder)) as part:
+            (part / "result.json").write_text(json.dumps(whole, indent=1), encoding="utf-8")
+            (part / "table.md").write_text(table(self.findings), encoding="utf-8")
+            for plot in self.plots:
+                plot.write(part)
 
 
 def table(findings: Sequence[Finding]) -> str:

@@ -15,13 +15,14 @@ from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
 from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
-from scenarios.closing.closing import Builder, builder_for, problem_of
+from fmus.host.apart.isolation import ISOLATED, Isolation
+from scenarios.closing.closing import Builder, honest_builder, problem_of
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.given import Given, given
 from scenarios.experiment.parts import spread
 from scenarios.experiment.record import load_planned
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 from scenarios.planning.result import PlanResult, result_of
 
 Tell = Callable[[str], None]
@@ -34,6 +35,7 @@ def plan(
     tell: Tell = lambda _: None,
     show: Show = lambda _: None,
     data: pd.DataFrame | None = None,
+    isolation: Isolation | None = ISOLATED,
 ) -> PlanResult:
     """Run `railfmi plan` and return the result that is written as plan.json.
 
@@ -43,14 +45,15 @@ def plan(
     data_dir: folder of the data files, by default the folder of the experiment.
     show: gets the table of conversions as lines, before anything is simulated.
     data: the record, in place of the data file; units by column in data.attrs["units"].
-    Raises BadInput if the experiment is wrong.
+    isolation: limits of the process in which a foreign FMU runs; None runs it in this process.
+    Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit.
     """
     begun = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="railfmi_plan_") as work:
         e = given(experiment, data_dir, data, Path(work))
         folder = None if out is None else writable(Path(out))
         try:
-            question = question_of(e, builder_for(e, Path(work)))
+            question = question_of(e, honest_builder(e, Path(work), isolation))
             show(conversion_lines(question.problem.record))
             found = planned(question, tell)
             result = result_of(e, found, time.monotonic() - begun)
@@ -58,8 +61,9 @@ def plan(
                 from scenarios.planning.page import write_page  # loads Matplotlib
 
                 tell("writing the page")
-                write_page(folder, found, result)
-                result.write(folder / "plan.json")
+                with written_at_once(folder) as part:
+                    write_page(part, found, result)
+                    result.write(part / "plan.json")
         finally:
             PLANTS.close()
     return result

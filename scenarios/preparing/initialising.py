@@ -1,5 +1,6 @@
 """`railfmi init`: draft an experiment from an FMU and a record."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from fmus.host.archive import describe
 from scenarios.drawing.typography import aligned
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
-from scenarios.output import writable
+from scenarios.output import unwritten, writable
 from scenarios.preparing.draft import Draft, doubtful, draft, sure, toml_of, with_column
 from scenarios.preparing.survey import survey
 
@@ -60,7 +61,7 @@ def init(
     is not sure; None takes the likeliest. force: whether an existing experiment.toml may be replaced.
     Raises BadInput if nothing in the record looks like an output of the FMU.
     """
-    model, record, folder = Path(fmu), Path(data), Path(out)
+    model, record, folder = Path(fmu), Path(data), Path(out).absolute()
     file = folder / "experiment.toml"
     if file.exists() and not force:
         raise BadInput(f"{file}: exists already; give another --out, or --force to replace it")
@@ -76,15 +77,19 @@ def init(
             "the command on a terminal, where it asks"
         )
     text = toml_of(made, writable(folder))
-    part = file.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    try:  # what is written must be accepted by close-loop
-        load_record(load_experiment(part), description)
+    part = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        part.write_text(text, encoding="utf-8")
+        load_record(load_experiment(part), description)  # what is written must be accepted by close-loop
+        part.replace(file)
     except BadInput as error:
         part.replace(file)
         said = str(error).replace(str(part), str(file))
         raise BadInput(f"{file} was written, but has to be completed by hand: {said}") from error
-    part.replace(file)
+    except OSError as error:
+        raise unwritten(error, folder) from error
+    finally:
+        part.unlink(missing_ok=True)
     return Initialised(file, made)
 
 

@@ -11,7 +11,7 @@ from fmus.host.archive import describe, problems
 from fmus.host.description import FmuDescription
 from scenarios.drawing.sheet import INK, NOISE, Plot, envelope, name_axes, sheet, sheets
 from scenarios.drawing.typography import aligned, unit
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 from scenarios.preparing.survey import Raster, survey
 
 MOST_POWER = 0.99  # of a channel's variance lies below the frequency that is told
@@ -26,14 +26,18 @@ def inspect(file: str | Path, out: str | Path | None = None, time: str | None = 
     path = Path(file)
     if path.suffix.lower() == ".fmu":
         return [*_of_fmu(path)]
-    lines = list[str]()
+    lines, plots = list[str](), list[Plot]()
+    folder = None if out is None else Path(out).absolute()
     for i, raster in enumerate(survey(path, time)):
         lines += [*_of_raster(raster)]
-        if out is not None and raster.channels:
-            folder = writable(Path(out))
-            for plot in _plots(raster, f"_{i + 1}" if i else ""):
-                plot.write(folder)
-                lines.append(f"picture: {folder / plot.name}.png")
+        if folder is not None and raster.channels:
+            more = list(_plots(raster, f"_{i + 1}" if i else ""))
+            lines += [f"picture: {folder / plot.name}.png" for plot in more]
+            plots += more
+    if folder is not None and plots:
+        with written_at_once(writable(folder)) as part:
+            for plot in plots:
+                plot.write(part)
     return lines
 
 

@@ -19,7 +19,7 @@ from scenarios.closing.closing import Posed, experiment_of
 from scenarios.drawing.sheet import BEFORE, INK, Plot, envelope, legend, name_axes, sheet, sheets
 from scenarios.drawing.typography import unit
 from scenarios.experiment.conversions import conversion_lines
-from scenarios.output import writable
+from scenarios.output import writable, written_at_once
 
 SHOWN = 0.25  # of the record is drawn, from its beginning
 # of simulations in a whole run, a third and three times of the 89 that the motor of the tutorial took, since
@@ -87,6 +87,7 @@ def dry_run(
     FMU crashes or passes a limit.
     """
     declared = experiment_of(experiment, data_dir)
+    folder = None if out is None else writable(Path(out))
     with tempfile.TemporaryDirectory(prefix="railfmi_trial_") as work:
         problem = Posed.of(declared, Path(work), isolation).problem
         try:
@@ -98,7 +99,7 @@ def dry_run(
         finally:
             PLANTS.close()
         candidates = len(problem.builder.offers) + len(FAULTS) * len(problem.record.outputs)
-        pictures = () if out is None else tuple(_drawn(problem, simulated, writable(Path(out))))
+        pictures = () if folder is None else _pictures(problem, simulated, folder)
     return Trial(problem, simulated, seconds, candidates, jobs or cpu_count(), pictures)
 
 
@@ -123,7 +124,16 @@ def duration(seconds: float) -> str:
     return f"{seconds / 3600:.2g} h"
 
 
-def _drawn(problem: Problem, simulated: Array, folder: Path) -> Iterator[Path]:
+def _pictures(problem: Problem, simulated: Array, folder: Path) -> tuple[Path, ...]:
+    """The files of the drawings."""
+    with written_at_once(folder) as part:
+        plots = list(_drawn(problem, simulated))
+        for plot in plots:
+            plot.write(part)
+    return tuple(folder / f"{plot.name}.png" for plot in plots)
+
+
+def _drawn(problem: Problem, simulated: Array) -> Iterator[Plot]:
     """Measured and simulated outputs over the first part of the record."""
     record, run = problem.record, problem.record.runs[0]
     units = {v.name: v.unit for v in describe(problem.builder(())).variables.values()}
@@ -139,5 +149,4 @@ def _drawn(problem: Problem, simulated: Array, folder: Path) -> Iterator[Path]:
             name_axes(ax, "", unit(units.get(name)) or "1", name)
         axes[some[-1][1]].set_xlabel("time in s", fontsize=9)
         legend(figure, axes[some[0][1]])
-        Plot(f"dry_run{ending}", figure, "Measured and simulated outputs.").write(folder)
-        yield folder / f"dry_run{ending}.png"
+        yield Plot(f"dry_run{ending}", figure, "Measured and simulated outputs.")

@@ -13,12 +13,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
+from fmus.taken import check_text
 from scenarios.closing.page.glossary import values_words
 from scenarios.estimating.result import main_values
 from scenarios.output import FILES, WRITING
 
 PAGES = ("report.html", "estimate.html", "conicity.html", "plan.html", "norm.html", "index.html", "table.md")
-LARGEST = 64 * 2**20  # bytes of a result; what commands write has at most a few MB
 Standing = Literal["good", "doubtful", "bad"]
 Table = Mapping[str, Any]
 
@@ -73,7 +73,7 @@ def entries(folder: Path) -> Iterator[Entry]:
 
 def entry(file: Path) -> Entry:
     """The entry of one file; one that cannot be read has the reason as its answer."""
-    written = datetime.fromtimestamp(file.stat().st_mtime)
+    written = datetime.fromtimestamp(file.lstat().st_mtime)
     try:
         table = _table(file)
         kind = next((k for k in KINDS if k.keys <= table.keys()), None)
@@ -81,7 +81,7 @@ def entry(file: Path) -> Entry:
             unknown = "a result that this version does not know"
             return Entry("other", file.parent.name, unknown, "doubtful", file, written)
         said = kind.read(table)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         why = f"cannot be read: {' '.join(str(error).split())[:200]}"
         return Entry("unreadable", file.parent.name, why, "bad", file, written)
     seconds = table.get("wall_seconds")
@@ -93,8 +93,7 @@ def entry(file: Path) -> Entry:
 
 
 def _table(file: Path) -> Table:
-    if (size := file.stat().st_size) > LARGEST:
-        raise ValueError(f"{size / 2**20:.0f} MiB, a result has at most {LARGEST // 2**20}")
+    check_text(file)
     table = json.loads(file.read_text(encoding="utf-8"))
     if not isinstance(table, dict):
         raise ValueError("no table of keys and values")

@@ -102,7 +102,7 @@ SIGNALS = {
     "segfault": "Segmentation",
     "stack": "Segmentation", "thread": "Segmentation", "jump": "Segmentation", "readonly": "Segmentation",
     "illegal": "Illegal instruction", "bus": "Bus error", "divide": "Floating point exception",
-    "kill": "Killed", "terminate": "Terminated", "trap": "trap",
+    "kill": "Killed", "terminate": "Terminated", "trap": "trap", "alarm": "Alarm clock",
 }  # fmt: skip
 EXITS = {"exit0": "exit code 0", "exit1": "exit code 1", "_exit0": "exit code 0", "_exit7": "exit code 7"}
 HANGS = ("endless", "sleep", "deadlock")
@@ -122,8 +122,13 @@ DEATHS = (
         if call not in ("late", "reset")
     ),
     Fault("memory", "late", "fmi2DoStep.*memory|fmi2DoStep.*Aborted"),
+    Fault("shared_memory", "late", "fmi2DoStep.*needs more than .* of memory"),
+    Fault("cut_off", "late", "fmi2DoStep.*closed the connection"),
 )
-ENDLESS = tuple(_death(what, call) for what in HANGS for call in ("late", "leave", "instantiate"))
+ENDLESS = (
+    *(_death(what, call) for what in HANGS for call in ("late", "leave", "instantiate")),
+    *(_death(what, "late") for what in ("stop", "cuts_memory")),
+)
 
 
 @cache
@@ -170,6 +175,6 @@ HARMLESS = tuple(
     Fault(what, "step", "")
     for what in (
         "none", "warning", "null_message", "log_flood", "print_flood", "no_line", "closes_output",
-        "directory", "locale", "rounding", "ignores_signals", "leak", "child",
+        "directory", "locale", "rounding", "ignores_signals", "leak", "child", "background",
     )
 )  # fmt: skip

@@ -1,17 +1,24 @@
 """SIGINT and SIGTERM end every command, in words, and leave no process and no folder behind."""
 
+import contextlib
+import fcntl
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from fmus.files import remove_left
 from fmus.host.master.recording import read_recording
-from tests.helpers.misbehaving import EXPERIMENT, SCENARIO, write_data
+from scenarios.cli.supervision import FOLDER
+from tests.helpers.full_disk import whole
+from tests.helpers.misbehaving import EXPERIMENT, SCENARIO, Fault, bad_fmu, write_data
 from tests.helpers.paths import SHIPPED
 
 SWALLOWS = """if t > 0.05:
@@ -23,6 +30,17 @@ SWALLOWS = """if t > 0.05:
             {then}
 self.x += dt * (self.u - self.k * self.x)"""
 PATIENCE = 120  # s, for a busy machine; a command that hangs is named
+MOMENTS = 15  # of each signal
+COMMANDS = {
+    "run": ["run", "scenario.toml"],
+    "estimate": ["estimate", "experiment.toml"],
+    "close-loop": ["close-loop", "experiment.toml", "--jobs", "2"],
+    "plan": ["plan", "experiment.toml"],
+    "inspect": ["inspect", "data.csv"],
+    "init": ["init", "bad.fmu", "data.csv"],
+    "conicity": ["conicity", "--wheel", "S1002", "--rail", "60E1", "--amplitude", "0.003"],
+    "build": ["build", "testrig", "--kind", "native"],
+}
 SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 
@@ -43,6 +61,15 @@ def ended(
     process.send_signal(number)
     said, _ = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(command, process.returncode, said, "")
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """A folder as it is while a command uses it."""
+    lock = os.open(folder, os.O_RDONLY)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    yield
+    os.close(lock)
 
 
 def assert_tidied(folder: Path) -> None:
@@ -133,6 +160,71 @@ def test_a_loop_says_how_to_go_on(tmp_path, step, number):
     assert "--resume" in done.stdout
     assert begun.exists()
     assert_tidied(tmp_path / "temporary")
+
+
+def test_what_an_fmu_sends_into_the_background_ends_with_the_command(tmp_path, tmp_path_factory):
+    """It has left the command's session and its parent, as a daemon does."""
+    bad_fmu(tmp_path, Fault("background", "step", ""), tmp_path_factory.mktemp("compiled"))
+    (tmp_path / "temporary").mkdir()
+    command = ["run", str(tmp_path / "scenario.toml"), "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, "-m", "scenarios.cli", *command], capture_output=True, text=True, timeout=PATIENCE,
+        env=os.environ | {"TMPDIR": str(tmp_path / "temporary")},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert_tidied(tmp_path / "temporary")
+
+
+def test_the_next_command_tidies_up_after_a_killed_one(tmp_path):
+    """SIGKILL leaves it no time; a folder that is in use stays."""
+    left, used = tmp_path / f"{FOLDER}left", tmp_path / f"{FOLDER}used"
+    for folder in (left, used):
+        folder.mkdir()
+    (left / "library.so").touch()
+    with locked(used):
+        remove_left(tmp_path, FOLDER)
+    assert not left.exists()
+    assert used.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_interrupt_at_any_moment_leaves_nothing(command, tmp_path, tmp_path_factory):
+    """At 30 moments: the exit code of the signal, no traceback, no part of a file, no process, no folder."""
+    bad_fmu(tmp_path, Fault("none", "none", ""), tmp_path_factory.mktemp("compiled"))
+    temporary, out = tmp_path / "temporary", tmp_path / "out"
+    temporary.mkdir()
+    arguments = [*COMMANDS[command], "--out", str(out)]
+    begun = time.monotonic()
+    code, said = interrupted(arguments, tmp_path, temporary, None, 0.0)
+    assert code in (0, 1), said
+    lasts = time.monotonic() - begun
+    rng = np.random.default_rng(1)
+    for number in MOMENTS * list(SIGNALS):
+        shutil.rmtree(out, ignore_errors=True)
+        code, said = interrupted(arguments, tmp_path, temporary, number, rng.uniform(0.05, lasts))
+        assert code in (0, 1, SIGNALS[number], -number), said  # finished, told, or not even begun
+        assert "Traceback" not in said
+        assert_tidied(temporary)
+        assert all(map(whole, (f for f in out.rglob("*") if f.is_file())))
+        assert not list(out.rglob(".writing_*"))
+
+
+def interrupted(
+    arguments: Sequence[str], folder: Path, temporary: Path, number: int | None, after: float
+) -> tuple[int, str]:
+    """Exit code and output of a command that got a signal after so many seconds, or none."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "scenarios.cli", *arguments], text=True, cwd=folder,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | {"TMPDIR": str(temporary)},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    if number is not None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(after)
+        process.send_signal(number)
+    said, _ = process.communicate(timeout=PATIENCE)
+    return process.returncode, said
 
 
 @pytest.mark.slow

@@ -16,6 +16,8 @@ COMMANDS = {
     "estimate": ["estimate", "experiment.toml", *LIMITS],
     "close-loop": ["close-loop", "experiment.toml", "--jobs", "1", *LIMITS],
     "compare": ["compare", "bad.fmu", "bad.fmu", "experiment.toml", *LIMITS],
+    "plan": ["plan", "experiment.toml", *LIMITS],
+    "close-loop --dry-run": ["close-loop", "--dry-run", "experiment.toml", *LIMITS],
 }
 EVERY = [(command, fault) for fault in (*DEATHS, *ENDLESS) for command in COMMANDS]
 # every third fault, by turns through the commands; endless ones take as long as their limit
@@ -49,7 +51,7 @@ def test_an_end_is_one_sentence_and_exit_code_2(command, fault, tmp_path, compil
     assert code == 2
     assert len(lines) == 1, lines
     assert "bad.fmu: " in lines[0]
-    carried = command == "close-loop" and fault.call in (
+    carried = command.startswith(("close-loop", "plan")) and fault.call in (
         "load",
         "instantiate",
         "get",

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import signal
 import subprocess
 import sys
 import zipfile
@@ -11,13 +12,17 @@ import numpy as np
 import pytest
 
 from fmus import limits
+from fmus.contact.geometry.points import read_points
 from fmus.errors import BadInput
+from fmus.export.provenance import PLACE, isolation_of
 from fmus.export.ssp.reading import read_package
+from fmus.host.apart.isolation import ISOLATED
 from fmus.host.archive import describe
 from scenarios.cli.app import run_safely
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.validation import read_toml
 from scenarios.output import WRITING, writable, written_at_once
+from scenarios.reporting.entries import entries
 from tests.helpers.misbehaving import Fault, bad_fmu
 
 FINE = Fault("none", "none", "")
@@ -51,14 +56,24 @@ def test_a_mistake_is_no_full_disk(tmp_path):
 
 
 def test_what_a_killed_command_left_is_removed(tmp_path):
-    asked = [sys.executable, "-c", "import os; print(os.getpid())"]
-    gone = subprocess.run(asked, capture_output=True, text=True)
-    left, living = tmp_path / f"{WRITING}{gone.stdout.strip()}_x", tmp_path / f"{WRITING}{os.getpid()}_x"
-    for folder in (left, living):
-        folder.mkdir()
-    writable(tmp_path)
-    assert not left.exists()
-    assert living.exists()
+    dies = f"from scenarios.output import *; w = written_at_once(Path({str(tmp_path)!r})); w.__enter__(); "
+    killed = [sys.executable, "-c", dies + "import signal; os.kill(os.getpid(), signal.SIGKILL)"]
+    assert subprocess.run(killed).returncode == -signal.SIGKILL
+    [left] = tmp_path.iterdir()
+    with written_at_once(tmp_path) as living:
+        writable(tmp_path)
+        assert not left.exists()
+        assert living.exists()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_in_subfolders_keep_their_place(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "old.csv").touch()
+    with written_at_once(tmp_path) as part:
+        (part / "data").mkdir()
+        (part / "data" / "new.csv").touch()
+    assert sorted(f.name for f in (tmp_path / "data").iterdir()) == ["new.csv", "old.csv"]
 
 
 @pytest.mark.parametrize("broken", range(6))
@@ -118,8 +133,54 @@ def test_pipes_and_devices_are_not_read(tmp_path):
             read_toml(file, "a scenario")
     with pytest.raises(BadInput, match="device or a pipe"):
         read_sheet(tmp_path / "data.csv")
+    with pytest.raises(BadInput, match="device or a pipe"):
+        read_points(tmp_path / "data.csv", "wheel")
+    with pytest.raises(BadInput, match="device or a pipe"):
+        read_package(tmp_path / "data.csv")
+    (tmp_path / "result.json").symlink_to(tmp_path / "gone")
+    (tmp_path / "sub").mkdir()
+    os.mkfifo(tmp_path / "sub" / "plan.json")
+    answers = [entry.answer for entry in entries(tmp_path)]
+    assert len(answers) == 2
+    assert "No such file" in answers[0]
+    assert "device or a pipe" in answers[1]
     with pytest.raises(BadInput, match="holds a NUL"):
         read_sheet(tmp_path / "a\0.csv")
+
+
+def test_output_that_cannot_be_printed_is_told(tmp_path, tmp_path_factory):
+    """Standard output buffers: without a look at the end it failed after the exit code was known."""
+    bad_fmu(tmp_path, FINE, tmp_path_factory.mktemp("library"))
+    command = [sys.executable, "-m", "scenarios.cli", "inspect", str(tmp_path / "bad.fmu")]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("railfmi: the output: cannot be written (No space left on device)")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_files_of_too_much_are_refused_before_they_are_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(limits, "TEXT", 1e-3)
+    monkeypatch.setattr(limits, "COLUMNS", 100)
+    (tmp_path / "large.toml").write_text("# a comment\n" * 200)
+    with pytest.raises(BadInput, match=r"has 0\.0024 MB, more than 0\.001 MB"):
+        read_toml(tmp_path / "large.toml", "a scenario")
+    with pytest.raises(BadInput, match=r"more than 0\.001 MB"):
+        read_points(tmp_path / "large.toml", "rail")
+    (tmp_path / "wide.csv").write_text(",".join(f"c{i}" for i in range(101)) + "\n")
+    with pytest.raises(BadInput, match="has 101 columns, more than 100"):
+        read_sheet(tmp_path / "wide.csv")
+
+
+@pytest.mark.parametrize(
+    "record", [b"[]", b'{"sha256": []}', b'{"sha256": 3}', b"[" * 9999, b"\xff", b"{}", b'{"base": 1}']
+)
+def test_a_record_of_provenance_of_another_form_is_a_foreign_fmu(record, tmp_path, tmp_path_factory):
+    """Who forges one must not end the command with an error of Python's."""
+    fmu = bad_fmu(tmp_path, FINE, tmp_path_factory.mktemp("library"))
+    with zipfile.ZipFile(fmu, "a") as packed:
+        packed.writestr(PLACE, record)
+    assert isolation_of(fmu, ISOLATED) is ISOLATED
 
 
 SPOILED = {

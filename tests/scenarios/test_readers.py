@@ -364,6 +364,17 @@ def test_between_blanks_no_cell_can_be_empty(tmp_path):
         read_sheet(lines(tmp_path, "t n m\n0 1 2\n1 2\n", "log.txt"))
 
 
+def test_a_mat_file_that_crashes_its_library_is_refused(tmp_path):
+    """SciPy 1.17 ends the process with a segmentation fault at this byte, of the flags of an array."""
+    file = tmp_path / "data.mat"
+    write_mat(file, {"t": np.arange(9.0), "x": np.arange(9.0)}, {})
+    data = bytearray(file.read_bytes())
+    data[145] = 255
+    file.write_bytes(data)
+    with pytest.raises(BadInput, match=r"not a sound MAT file \(it brings down the process that reads it"):
+        read_sheet(file)
+
+
 @pytest.mark.parametrize("kind", [kind for kind in WRITERS if kind != BLANKS])
 def test_a_lost_number_is_refused_in_all_formats(tmp_path, kind):
     columns = table()

@@ -16,6 +16,9 @@ WRONG = {
 }
 
 
+COMMANDS = ("estimate", "close-loop", "close-loop --dry-run", "plan")
+
+
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
     monkeypatch.setattr(honest, "folder", lambda: tmp_path / "cache")
@@ -23,7 +26,7 @@ def own_cache(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("what", WRONG)
-@pytest.mark.parametrize("command", ["estimate", "close-loop", "close-loop --dry-run"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_it_is_refused_in_one_line(command, what, own_cache, tmp_path, tmp_path_factory, capfd):
     bad_fmu(tmp_path, Fault(what, "none", ""), tmp_path_factory.mktemp("library"))
     assert (

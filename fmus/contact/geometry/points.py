@@ -13,6 +13,7 @@ import numpy as np
 from fmus.contact.arguments import Array
 from fmus.contact.geometry.profile import Kind
 from fmus.errors import BadInput
+from fmus.taken import check_text
 
 COMMENT = re.compile(r'\s*(?:[#%!"]|//)')
 FEWEST = 30  # points a profile needs
@@ -37,6 +38,7 @@ class Points:
 def read_points(path: str | Path, kind: Kind) -> Points:
     """The points of a file in metres; BadInput, one sentence with file and line, for what is no profile."""
     file = Path(path)
+    check_text(file)
     try:
         text = file.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:

@@ -20,7 +20,7 @@ from fmus.export.ssp.system import (
     Link,
     System,
 )
-from fmus.taken import check_packed
+from fmus.taken import check_file, check_packed
 
 etree: Any = import_module("lxml.etree")  # by name because it comes without types; FMPy brings it
 Start = tuple[float, str | None]  # a value and its unit
@@ -51,6 +51,7 @@ def read_package(package: str | Path) -> tuple[System, dict[str, bytes]]:
 
 
 def _unzipped(path: Path) -> dict[str, bytes]:
+    check_file(path)
     try:
         with zipfile.ZipFile(path) as packed:
             check_packed(packed, path)

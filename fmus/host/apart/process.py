@@ -2,17 +2,21 @@
 
 import contextlib
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from math import inf
+from pathlib import Path
 from threading import Event, Lock, Thread
 
 PRINTED = 8  # lines of output that are kept
 LONGEST = 1 << 12  # bytes of a line
 WAITING = 0.005  # s, between looks at whether it has ended
+SESSION = 3  # place of the session's number in what /proc says of a process, after its name
 KILOBYTE = 1024  # bytes, in which the system gives the memory
 
 
@@ -52,9 +56,17 @@ class Process:
             return "still running"
         return signal.strsignal(-self.code) or "" if self.code < 0 else f"exit code {self.code}"
 
-    def wait(self) -> None:
-        """Wait until it has ended."""
-        while not self.ended:
+    def memory(self, whole: bool) -> int:
+        """Bytes of memory that it takes now; whole: together with the processes that it started."""
+        if not isinstance(self._started, subprocess.Popen):
+            return 0
+        own = self._started.pid
+        return sum(map(_resident, _session(own) if whole else [own]))
+
+    def wait(self, patience: float = inf) -> None:
+        """Wait until it has ended, but not longer than so many seconds."""
+        until = time.monotonic() + patience
+        while not self.ended and time.monotonic() < until:
             time.sleep(WAITING)
 
     def read(self, patience: float) -> None:
@@ -86,3 +98,20 @@ class Process:
                 self.printed.append(" ".join(line.decode("utf-8", "replace").split()))
             stream.close()
         self.wait()
+
+
+def _session(leader: int) -> Iterator[int]:
+    """The numbers of the processes of a session, by that of its leader."""
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            about = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()
+            if int(about[SESSION]) == leader:
+                yield int(process.name)
+
+
+def _resident(process: int) -> int:
+    """Bytes of memory, also shared ones, that a process takes; 0 if it has ended."""
+    try:
+        return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * resource.getpagesize()
+    except OSError:
+        return 0

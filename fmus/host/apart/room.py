@@ -24,6 +24,7 @@ from fmus.limits import GRACE, LAST_WORDS
 T = TypeVar("T")
 
 TICK = 0.1  # s, between looks at what the FMU does
+WEIGHING = 0.5  # s, between looks at the memory of all of its processes
 FIRST = 1 << 16  # bytes of the shared memory at first
 GB = 10**9  # bytes
 FULL = 0.8  # of the memory that it may use, from which a process may have ended for the lack of it
@@ -46,7 +47,7 @@ class Room:
         names = (self._block.name, self._page_memory.name, repr(isolation.memory))
         self._process = Process(SERVING, (str(there.fileno()), *names), there.fileno())
         there.close()
-        self._stop_by = float("inf")
+        self._stop_by, self._weighed = float("inf"), 0.0
         self._close = Finalize(self, _end, (self._process, here), exitpriority=20)
 
     def call(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> T:
@@ -113,7 +114,7 @@ class Room:
             elif how == "mistake":
                 raise RuntimeError(f"in the process of the FMUs:\n{value}")
             elif how == "memory":
-                raise self._over(f"needs more than {self.isolation.memory:g} GB of memory", "memory")
+                raise self._over(self._too_much, "memory")
             else:
                 return value if how == "done" else Away(self, *value)
 
@@ -147,8 +148,21 @@ class Room:
             raise self._over("did not stop when it was asked to")
         if still > limits.call:
             raise self._over(f"did not come back within {limits.call:g} s", "call")
+        if self._memory(now) > limits.memory * GB:  # what the system's own limit does not count
+            raise self._over(self._too_much, "memory")
         if taken > limits.run:
             raise self._over(f"was only reached after {limits.run:g} s, the most for a simulation", "run")
+
+    def _memory(self, now: float) -> int:
+        """Bytes that the process takes; from time to time with the processes that its FMUs started."""
+        whole = now > self._weighed + WEIGHING
+        if whole:
+            self._weighed = now
+        return self._process.memory(whole)
+
+    @property
+    def _too_much(self) -> str:
+        return f"needs more than {self.isolation.memory:g} GB of memory"
 
     def _over(self, what: str, limit: str = "") -> FmuEnded:
         """End the process for a reason."""
@@ -158,7 +172,9 @@ class Room:
         return self._kill(f"{where}{option}{self._words()}; {HINT}")
 
     def _died(self) -> FmuEnded:
-        self._process.wait()
+        self._process.wait(GRACE)
+        if not self._process.ended:  # an FMU may close every file of its process and go on
+            return self._over("closed the connection of the process that runs it")
         doing, peak = self.page.doing(), self._process.peak / GB
         where = f"{doing} " if doing else "an FMU "
         limit = self.isolation.memory

@@ -11,6 +11,7 @@ import socket
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import count
 from typing import Any
 
@@ -29,17 +30,21 @@ def serve(connection: int, block: str, page: str, memory: float) -> None:
     """Answer until the other end closes."""
     PAGE.move(Memory(name=page).map)
     PAGE.idle()
-    _limited(memory)
+    limit_process(memory)
     channel = Channel(socket.socket(fileno=connection), Memory(name=block), trusted=True)
     CHANNELS.append(channel)
     while True:
         try:
             unused, keep, function, args, kwargs = channel.receive()
+            for number in unused:
+                KEPT.pop(number, None)
+            channel.send(_answer(keep, function, args, kwargs))
         except EOFError:
             return
-        for number in unused:
-            KEPT.pop(number, None)
-        channel.send(_answer(keep, function, args, kwargs))
+        except OSError as error:  # an FMU has closed the files of this process
+            with suppress(OSError):
+                print(f"the connection of this process was cut ({error.strerror})", flush=True)
+            return
         PAGE.idle()
 
 
@@ -88,7 +93,7 @@ def asking(number: int) -> Callable[..., Any]:
     return ask
 
 
-def _limited(memory: float) -> None:
+def limit_process(memory: float) -> None:
     """No more memory than so many GB; no core files; end with the process that asks; print line by line."""
     for which, size in ((resource.RLIMIT_DATA, int(memory * GB)), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(which)[1]
@@ -104,5 +109,6 @@ if __name__ == "__main__":
     from fmus.host.apart import serving
 
     serving.serve(int(sys.argv[1]), sys.argv[2], sys.argv[3], float(sys.argv[4]))
-    sys.stdout.flush()
+    with suppress(OSError):
+        sys.stdout.flush()
     os._exit(0)  # FMUs that are still open may fail in an orderly end

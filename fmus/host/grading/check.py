@@ -6,8 +6,11 @@ import signal
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from fmus.errors import BadInput
 from fmus.host.archive import describe
@@ -25,6 +28,9 @@ class Check:
     sentence: str
 
 
+KEYS = {field.name for field in fields(Check)}
+
+
 @dataclass(frozen=True)
 class Grade:
     """All outcomes of one FMU, in the order of `fmus.host.grading.trials.TRIALS`."""
@@ -39,14 +45,17 @@ class Grade:
 
 
 def grade(path: str | Path, patience: float = PATIENCE) -> Grade:
-    """Try an FMU out, for at most `patience` seconds a process; BadInput where the file is no usable FMU.
+    """Try an FMU out, for at most `patience` seconds; BadInput where the file is no usable FMU.
 
     It runs in a process of its own, so that an FMU that crashes or hangs fails its trial and nothing else.
     """
     name = describe(path).name
+    until = time.monotonic() + patience
     checks: list[Check] = []
-    while len(checks) < len(TRIALS):
-        checks += _tried(Path(path), len(checks), patience)
+    while len(checks) < len(TRIALS) and (left := until - time.monotonic()) > 0:
+        checks += _tried(Path(path), len(checks), left)
+    late = f"It was not tried, since the trials before took the {patience:g} s that all may take."
+    checks += [Check(title, False, late) for title in list(TRIALS)[len(checks) :]]
     return Grade(name, tuple(checks))
 
 
@@ -56,17 +65,29 @@ def _tried(path: Path, first: int, patience: float) -> list[Check]:
         results = Path(folder) / "results.jsonl"
         results.touch()
         end = _process([str(path), str(results), str(first)], patience)
-        lines = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
+        lines = list(_lines(results.read_bytes()))
     for line in lines:
         if "unusable" in line:
-            raise BadInput(line["unusable"])
+            raise BadInput(str(line["unusable"]))
         if "traceback" in line:
             raise RuntimeError(f"{path}: the check itself failed:\n{line['traceback']}")
-    done = [Check(**line) for line in lines]
+    done = [Check(**line) for line in lines if line.keys() == KEYS]
     missing = list(TRIALS)[first + len(done) :]
     if missing:
         done.append(Check(missing[0], False, end or "It ended the process that ran it."))
     return done
+
+
+def _lines(data: bytes) -> Iterator[dict[str, Any]]:
+    """What the process wrote, up to where an FMU has written into its file."""
+    for text in data.splitlines():
+        try:
+            line = json.loads(text)
+        except ValueError:
+            return
+        if not isinstance(line, dict):
+            return
+        yield line
 
 
 def _process(arguments: list[str], patience: float) -> str:
@@ -77,6 +98,6 @@ def _process(arguments: list[str], patience: float) -> str:
     try:
         ended = subprocess.run(command, env=paths, stdout=quiet, stderr=quiet, timeout=patience, check=False)
     except subprocess.TimeoutExpired:
-        return f"It did not come to an end within {patience:g} s."
+        return f"It did not come to an end within {patience:.0f} s."
     how = signal.strsignal(-ended.returncode) if ended.returncode < 0 else f"exit code {ended.returncode}"
     return f"It brings down the process that runs it ({how}); keep it out of processes that must live."

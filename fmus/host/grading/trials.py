@@ -14,9 +14,11 @@ from typing import TypeAlias
 import numpy as np
 
 from fmus.errors import BadInput
+from fmus.host.apart.serving import limit_process
 from fmus.host.archive import Archive, problems
 from fmus.host.fmu import FmuError
 from fmus.host.grading.bench import Bench, difference
+from fmus.limits import MEMORY
 
 Outcome: TypeAlias = tuple[bool | None, str]
 RESTART = 1e-9  # relative; a restart may round where an uninterrupted run does not
@@ -209,6 +211,8 @@ def main(path: str, results: str, first: str) -> None:
                     write(title=title, passed=passed, sentence=sentence)
         except BadInput as error:
             write(unusable=str(error))
+        except MemoryError:
+            sys.exit(f"it needs more than {MEMORY:g} GB of memory")
         except Exception:
             write(traceback=traceback.format_exc())
 
@@ -221,4 +225,5 @@ def _outcome(trial: Callable[[Bench], Outcome], bench: Bench) -> Outcome:
 
 
 if __name__ == "__main__":
+    limit_process(MEMORY)
     main(*sys.argv[1:])

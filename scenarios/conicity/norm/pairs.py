@@ -16,6 +16,7 @@ from fmus.contact.geometry.exact import exact_profile
 from fmus.contact.geometry.profile import Profile
 from fmus.contact.geometry.table import contact_table
 from fmus.errors import BadInput, did_you_mean
+from fmus.taken import check_text
 from scenarios.conicity.evaluating import AMPLITUDES, STEP, conicities
 
 RAIL, WHEEL = "EN15302_RailA", "EN15302_Wheel"
@@ -98,6 +99,7 @@ def printed(folder: Path | None, pair: Reference, what: str) -> pd.DataFrame | N
     file = None if folder is None else folder / f"Wheel{pair.name}RailA_{what}.csv"
     if file is None or not file.is_file():
         return None
+    check_text(file)
     try:
         table = pd.read_csv(file)
     except (ValueError, OSError) as error:

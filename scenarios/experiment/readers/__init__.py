@@ -7,7 +7,7 @@ from typing import Any
 
 from fmus.errors import BadInput
 from fmus.registry import classes_in
-from fmus.taken import check_file
+from fmus.taken import check_columns, check_file
 from scenarios.experiment.readers.reader import NO_OPTIONS, Reader
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -50,4 +50,6 @@ def read_sheet(
         known = ", ".join(sorted(READERS))
         raise BadInput(f"{file}: has no known format; convert it to one of {known}")
     check_file(file)
-    return reader.read(file, time, columns, options)
+    sheet = reader.read(file, time, columns, options)
+    check_columns(file, len(sheet.cells.columns))
+    return sheet

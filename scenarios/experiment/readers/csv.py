@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from fmus.errors import BadInput
+from fmus.taken import check_text
 from scenarios.experiment.readers.header import units_of
 from scenarios.experiment.readers.layout import BLANKS, Layout, layout_of
 from scenarios.experiment.readers.reader import Reader
@@ -83,6 +84,7 @@ def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
 def _units(file: Path) -> dict[str, str]:
     """Units by column from the file beside it, empty if there is none."""
     beside = file.with_name(file.name + ".units.json")
+    check_text(beside)
     try:
         units = json.loads(beside.read_text(encoding="utf-8"))
     except FileNotFoundError:

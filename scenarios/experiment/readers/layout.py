@@ -2,6 +2,7 @@
 
 import csv
 import gzip
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from fmus.errors import BadInput
+from fmus.taken import check_columns
 from scenarios.experiment.readers.header import is_line_of_units, is_number
 
 LOOKED_AT = 1000  # lines below the names, from which separator and decimal sign are read
@@ -58,9 +60,10 @@ def layout_of(file: Path, options: Mapping[str, Any]) -> Layout:
     separator = options.get("sep") or options.get("delimiter") or _separator(file, lines)
     rows = list(_rows(lines, separator))
     names = [cell.strip() for cell in rows[0]]
+    check_columns(file, len(names))
     if not any(names):
         raise BadInput(f"{file}: is empty or has no column names in line {above + 1}; write them there")
-    twice = sorted({name for name in names if name and names.count(name) > 1})
+    twice = sorted(name for name, n in Counter(names).items() if name and n > 1)
     if twice:
         raise BadInput(f"{file}: column '{twice[0]}' occurs twice in line {above + 1}; rename one")
     units = rows[1] if len(rows) > 2 and is_line_of_units(rows[1]) else []

@@ -24,6 +24,7 @@ class Mat(Reader):
 
     kind: ClassVar[str] = "MAT"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
+    fragile: ClassVar[bool] = True  # SciPy 1.17 ends with a segmentation fault at some damages
 
     def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """Version 7.3 is HDF5 and is read with h5py; earlier versions are read with scipy."""

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -10,16 +11,23 @@ from typing import Any, ClassVar
 import pandas as pd
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import FmuEnded, Isolation
+from fmus.host.apart.room import room_of
+from fmus.limits import READING
 from scenarios.experiment.readers.sheet import Sheet
 
 NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
 class Reader(ABC):
-    """A data format: `kind` is the word for its files, `suffixes` are the file endings in lower case."""
+    """A data format: `kind` is the word for its files, `suffixes` are the file endings in lower case.
+
+    fragile: whether a damaged file may crash the library that reads it; it is tried in another process first.
+    """
 
     kind: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
+    fragile: ClassVar[bool] = False
 
     def read(
         self,
@@ -35,6 +43,8 @@ class Reader(ABC):
         except OSError as error:
             reason = f"data file cannot be read ({error.strerror}); correct its path"
             raise BadInput(f"{file}: {reason}") from error
+        if self.fragile:
+            self._try_apart(file, time, columns, options)
         try:
             return self.sheet(file, time, columns, **options)
         except (BadInput, Warning):  # warnings are errors where somebody made them so
@@ -51,6 +61,19 @@ class Reader(ABC):
                 f"{file}: is not a sound {self.kind} file ({said}); record or export it again"
             ) from error
 
+    def _try_apart(
+        self, file: Path, time: str | None, columns: Collection[str] | None, options: Mapping[str, Any]
+    ) -> None:
+        """Raise BadInput where the file ends a process that reads it."""
+        room = room_of(Isolation(run=READING))
+        try:
+            room.call(_read_for_trial, self, file.absolute(), time, columns, dict(options))
+        except FmuEnded as error:
+            raise BadInput(
+                f"{file}: is not a sound {self.kind} file (it brings down the process that reads it); "
+                "record or export it again"
+            ) from error
+
     def __call__(self, file: Path) -> pd.DataFrame:
         """All columns of a file whose columns share their rows."""
         return self.read(file).cells
@@ -61,6 +84,13 @@ class Reader(ABC):
 
         options: of the format's library, as the experiment gives them in [data].
         """
+
+
+def _read_for_trial(reader: Reader, file: Path, *asked: Any) -> None:
+    """Read a file and forget it; what is wrong with it is told where it is read again."""
+    time, columns, options = asked
+    with suppress(Exception):
+        reader.sheet(file, time, columns, **options)
 
 
 def library(module: str, package: str, file: Path) -> ModuleType:

@@ -90,6 +90,28 @@ static void end_by(const char *fault) {
             memset(more, 1, 1 << 26);
         }
     if (is(fault, "jump")) ((void (*)(void))(size_t)0x10)();
+    if (is(fault, "cut_off")) { /* as a daemon closes what it has inherited, and goes on */
+        for (int n = 3; n < 1024; n++) close(n);
+        while (forever) {}
+    }
+    if (is(fault, "cuts_memory")) {
+        for (int n = 3; n < 1024; n++)
+            if (ftruncate(n, 0)) continue;
+        while (forever) {}
+    }
+    if (is(fault, "shared_memory")) { /* 0.8 GB, which no limit of the system on data counts */
+        for (int n = 0; n < 12; n++) {
+            char *more = mmap(NULL, 1 << 26, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+            if (more == MAP_FAILED) abort();
+            memset(more, 1, 1 << 26);
+        }
+        sleep(1000);
+    }
+    if (is(fault, "stop")) raise(SIGSTOP);
+    if (is(fault, "alarm")) {
+        alarm(1);
+        for (;;) sleep(1000);
+    }
     if (is(fault, "readonly")) {
         char *page = mmap(NULL, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         page[0] = 1;
@@ -126,6 +148,11 @@ static int disturb(Model *m) {
     if (is(f, "traps")) feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
     if (is(f, "ignores_signals")) { signal(SIGINT, SIG_IGN); signal(SIGTERM, SIG_IGN); }
     if (is(f, "leak")) memset(malloc(1 << 16), 1, 1 << 16);
+    if (is(f, "background") && m->steps == 0 && fork() == 0) { /* leaves session and parent */
+        setsid();
+        if (fork() == 0) sleep(600);
+        _exit(0);
+    }
     if (is(f, "child") && m->steps == 0 && fork() == 0) { sleep(600); _exit(0); }
     return OK;
 }

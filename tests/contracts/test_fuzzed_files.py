@@ -1,0 +1,32 @@
+"""Whatever is spoiled in a file from outside: what reads it answers, or raises BadInput."""
+
+import random
+
+import pytest
+
+from scenarios.cli.app import run_safely
+from tests.helpers.fuzzing import spoiled, targets, wrong
+
+QUICK, MANY = 40, 2000
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("count", [QUICK, pytest.param(MANY, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", targets())
+def test_a_spoiled_file_is_read_or_bad_input(name, count, tmp_path):
+    target, rng = targets()[name], random.Random(count)
+    assert not wrong(target, target.good, tmp_path)
+    for _ in range(count):
+        data = spoiled(target.good, rng)
+        told = wrong(target, data, tmp_path)
+        assert not told, (data, told)
+
+
+def test_a_message_is_one_line_whatever_it_quotes(tmp_path, capfd):
+    """A name in a file may hold line ends, and codes that a terminal obeys."""
+    (tmp_path / "scenario.toml").write_text('id = "a"\n"\\u001b[2Jtwo\\nlines" = 1\n')
+    assert run_safely(["run", str(tmp_path / "scenario.toml"), "--out", str(tmp_path / "out")]) == 2
+    said = capfd.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert said.rstrip("\n").isprintable()
+    assert "[2Jtwo lines" in said
