@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, show, will_write
+from scenarios.cli.console import RESULTS, Out, app, show, will_write
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command()
@@ -24,8 +25,9 @@ def plan(
     from scenarios.planning.result import table_of
 
     will_write(out)
-    with said.status("reading the experiment") as status:
+    with progress("reading the experiment") as status:
         result = planned(experiment, out, data, status.update, show)
+    found(result)
     for line in table_of(result):
-        typer.echo(line)
-    typer.echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")
+        echo(line)
+    echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")

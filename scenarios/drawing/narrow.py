@@ -1,0 +1,35 @@
+"""A figure for a narrow screen: the same axes above one another, with text of the same size."""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+
+WIDTH = 3.9  # inches: about the width of a telephone, so that 9 pt stays 9 pt
+LEAST = 2.0  # inches, height of a panel that stood beside others
+ENTRY = 16  # letters of an entry of a legend, of which two go beside each other
+
+
+def make_narrow(figure: Figure) -> None:
+    """Change a figure to the narrow width, with one panel in a row."""
+    height = figure.get_size_inches()[1]
+    panels = [ax for ax in figure.axes if ax.get_subplotspec() is not None]
+    rows = {_row(ax) for ax in panels}
+    if len(panels) > len(rows):
+        grid = GridSpec(len(panels), 1, figure)
+        for k, ax in enumerate(panels):
+            ax.set_subplotspec(grid[k])
+            ax.tick_params(labelbottom=True)
+        height = max(height / len(rows), LEAST) * len(panels)
+    figure.set_size_inches(WIDTH, height)
+    for legend in figure.legends:
+        long = any(len(text.get_text()) > ENTRY for text in legend.get_texts())
+        legend.set_ncols(1 if long else 2)
+    for ax in panels:
+        for axis in (ax.xaxis, ax.yaxis):
+            axis._autolabelpos = True  # Matplotlib has no call that undoes set_label_coords
+    figure.set_layout_engine("constrained")
+
+
+def _row(ax: Axes) -> tuple[int, int]:
+    spec = ax.get_subplotspec()
+    return (spec.rowspan.start, spec.rowspan.stop) if spec is not None else (0, 0)
