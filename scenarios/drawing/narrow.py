@@ -3,6 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.transforms import IdentityTransform, blended_transform_factory
 
 WIDTH = 3.9  # inches: about the width of a telephone, so that 9 pt stays 9 pt
 LEAST = 2.0  # inches, height of a panel that stood beside others
@@ -25,9 +26,17 @@ def make_narrow(figure: Figure) -> None:
         long = any(len(text.get_text()) > ENTRY for text in legend.get_texts())
         legend.set_ncols(1 if long else 2)
     for ax in panels:
-        for axis in (ax.xaxis, ax.yaxis):
-            axis._autolabelpos = True  # Matplotlib has no call that undoes set_label_coords
+        _free_labels(ax)
     figure.set_layout_engine("constrained")
+
+
+def _free_labels(ax: Axes) -> None:
+    """Let the labels of the axes follow the ticks again; Matplotlib cannot undo set_label_coords."""
+    here, screen = ax.transAxes, IdentityTransform()
+    ax.xaxis.label.set(position=(0.5, 0), transform=blended_transform_factory(here, screen))
+    ax.yaxis.label.set(position=(0, 0.5), transform=blended_transform_factory(screen, here))
+    for axis in (ax.xaxis, ax.yaxis):
+        axis._autolabelpos = True
 
 
 def _row(ax: Axes) -> tuple[int, int]:

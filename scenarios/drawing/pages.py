@@ -1,7 +1,7 @@
 """Pages from templates: what is written into them is escaped, and a value that is missing is an error."""
 
 import re
-from html import escape
+from html import escape, unescape
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ def _labelled(table: str) -> str:
     """A table whose cells carry the headings of their columns; one with cells over several rows stays."""
     if "rowspan" in table or "colspan" in table:
         return table.replace("<table", '<table data-whole="true"', 1)
-    heads = [escape(" ".join(TAG.sub("", head).split())) for head in HEAD.findall(table)]
+    heads = [escape(" ".join(unescape(TAG.sub("", head)).split())) for head in HEAD.findall(table)]
     return ROW.sub(lambda row: _labelled_row(row[0], heads), table)
 
 
