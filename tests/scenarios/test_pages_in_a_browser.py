@@ -1,4 +1,4 @@
-"""The report in headless Chromium: it fits the widths of a desk and of a hand, its charts live, nothing fails."""
+"""The report in headless Chromium: it fits a desk and a telephone, its charts live, and nothing fails."""
 
 import json
 import re
@@ -22,9 +22,10 @@ FRAME = """<body style="margin:0"><iframe src="{page}" style="border:0;width:{wi
 <pre></pre><script>
 onload = () => setTimeout(() => {{
   const page = document.querySelector("iframe").contentDocument, whole = page.documentElement;
-  const wide = [...page.querySelectorAll("figure, img, canvas, table, h1, p")].filter(
-    (e) => e.getBoundingClientRect().right > whole.clientWidth + 1 && !e.closest(".wide, pre"));
-  const charts = [...page.querySelectorAll(".chart canvas")].filter((c) => c.getBoundingClientRect().width > 0);
+  const wide = [...page.querySelectorAll("body *")].filter((e) => !e.closest(".wide, pre, details:not([open])") &&
+    e.getBoundingClientRect().right > whole.clientWidth + 1);
+  const drawn = (c) => c.getBoundingClientRect().width > 0;
+  const charts = [...page.querySelectorAll(".chart canvas")].filter(drawn);
   document.querySelector("pre").textContent = JSON.stringify({{
     inner: whole.clientWidth, scroll: whole.scrollWidth, wide: wide.map((e) => e.tagName),
     charts: charts.length, silent: [...page.images].filter((i) => !i.alt).length,
