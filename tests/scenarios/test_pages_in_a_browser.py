@@ -22,7 +22,8 @@ FRAME = """<body style="margin:0"><iframe src="{page}" style="border:0;width:{wi
 <pre></pre><script>
 onload = () => setTimeout(() => {{
   const page = document.querySelector("iframe").contentDocument, whole = page.documentElement;
-  const wide = [...page.querySelectorAll("body *")].filter((e) => !e.closest(".wide, pre, details:not([open])") &&
+  const aside = ".wide, pre, details:not([open])";
+  const wide = [...page.querySelectorAll("body *")].filter((e) => !e.closest(aside) &&
     e.getBoundingClientRect().right > whole.clientWidth + 1);
   const drawn = (c) => c.getBoundingClientRect().width > 0;
   const charts = [...page.querySelectorAll(".chart canvas")].filter(drawn);
