@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
 from fmus.host.instance import Array, CallFailed, Instance
 from fmus.host.rows import AT_ONCE, Inputs, Rows, base_of, offers_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class FmuError(RuntimeError):
@@ -107,6 +110,42 @@ class Fmu:
         )
         self.time = float(t[-1])
         return y
+
+    def simulate_frame(
+        self,
+        t: Array,
+        inputs: "Mapping[str, Any] | pd.DataFrame | None" = None,
+        outputs: Sequence[str] | None = None,
+        start: Mapping[str, float] | None = None,
+    ) -> "pd.DataFrame":
+        """As `simulate`, as a table with the index `time`, s, and the units in `attrs["units"]`.
+
+        inputs: by name, samples or one number each, by default the FMU's own values. outputs: by default all.
+        start: states and parameters that differ from the FMU's own values.
+        """
+        import pandas as pd  # takes longer to load than a simulation
+
+        t = np.asarray(t, dtype=float)
+        given = {} if inputs is None else {str(name): x for name, x in inputs.items()}
+        samples = {
+            n: np.full(len(t), x) if np.ndim(x) == 0 else np.asarray(x, float) for n, x in given.items()
+        }
+        for name, x in samples.items():
+            if len(x) not in (len(t), len(t) - 1):
+                raise BadInput(f"{self.name}: input '{name}' has {len(x)} samples for {len(t)} times")
+        names = list(self.description.outputs if outputs is None else outputs)
+        y = self.simulate(t, samples, names, start or {})
+        table = pd.DataFrame(y, columns=names, index=pd.Index(t, name="time"))
+        variables = self.description.variables
+        table.attrs["units"] = {n: variables[n].unit for n in names if variables[n].unit is not None}
+        return table
+
+    def __repr__(self) -> str:
+        about = self.description
+        count = (
+            f"{len(about.inputs)} inputs, {len(about.outputs)} outputs, {len(about.parameters)} parameters"
+        )
+        return f"<Fmu {about.name} ({self.name}), FMI {about.fmi_version}: {count}, at {self.time:g} s>"
 
     def _news(self, t: Array, u: Array) -> tuple[Array | None, Array | None]:
         """Times and inputs to send to another process; None if they are those of the last simulation."""

@@ -13,11 +13,12 @@ from pkgutil import iter_modules
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import NOTICES, app, said, say_notices
+from scenarios.cli.console import NOTICES, app, say_notices
 from scenarios.cli.supervision import INTERRUPTED, supervised
+from scenarios.cli.voice import VOICE, said
 
 FOLDER = Path(__file__).parent
-NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision")
+NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision", "voice")
 COMMANDS = {  # module by the name of its command
     module.name.replace("_", "-"): module.name
     for module in iter_modules([str(FOLDER)])
@@ -71,7 +72,37 @@ def _listed() -> None:
 
 
 def run_safely(arguments: Sequence[str]) -> int:
-    """Run a command line; errors in the input become one line and exit code 2."""
+    """Run a command line; errors in the input become one line and exit code 2.
+
+    With --json, the answer or the error is one object on the output.
+    """
+    VOICE.begin()
+    code = _run_safely([*arguments, *_completed()])
+    if VOICE.as_json:
+        command = next((a for a in arguments if a in COMMANDS), "")
+        try:
+            print(VOICE.document(command, code, VOICE.error))
+            _flush_output()
+        except BrokenPipeError:
+            return PIPE_CLOSED
+        except OSError as error:
+            return _wrong(_of_system(error))
+    return code
+
+
+def _completed() -> list[str]:
+    """The words of a command line that a shell asks to complete."""
+    return os.environ.get("COMP_WORDS", "").split()[1:] if "_RAILFMI_COMPLETE" in os.environ else []
+
+
+def _wrong(sentence: object) -> int:
+    """Say what was wrong with the input; the exit code."""
+    VOICE.error = _line(sentence)
+    said.print(f"railfmi: {VOICE.error}", markup=False, soft_wrap=True)
+    return 2
+
+
+def _run_safely(arguments: Sequence[str]) -> int:
     INTERRUPTED.told = False
     try:
         NOTICES.clear()
@@ -85,15 +116,12 @@ def run_safely(arguments: Sequence[str]) -> int:
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read
             return _interrupted()
-        said.print(f"railfmi: {_line(error)}", markup=False, soft_wrap=True)
-        return 2
+        return _wrong(error)
     except BrokenProcessPool:
-        said.print(
-            "railfmi: a worker process ended before its work was done, because an FMU ended it or memory ran "
-            "out; 'railfmi check' on the FMU tells whether it does so, and --jobs 1 needs the least memory",
-            markup=False, soft_wrap=True,
-        )  # fmt: skip
-        return 2
+        return _wrong(
+            "a worker process ended before its work was done, because an FMU ended it or memory ran "
+            "out; 'railfmi check' on the FMU tells whether it does so, and --jobs 1 needs the least memory"
+        )
     except typer.Abort:
         return _interrupted()
     except KeyboardInterrupt:
@@ -103,22 +131,19 @@ def run_safely(arguments: Sequence[str]) -> int:
     except OSError as error:
         if INTERRUPTED.came:
             return _interrupted()
-        said.print(f"railfmi: {_of_system(error)}", markup=False, soft_wrap=True)
-        return 2
+        return _wrong(_of_system(error))
     except MemoryError:
-        said.print("railfmi: memory ran out; close other programs, use --jobs 1, or cut the record")
-        return 2
+        return _wrong("memory ran out; close other programs, use --jobs 1, or cut the record")
     except Exception as error:
         if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
             return _interrupted()
         if _is_of_fmu(error):
-            said.print(f"railfmi: {_line(error)}", markup=False, soft_wrap=True)
-            return 2
+            return _wrong(error)
         shown = getattr(error, "format_message", None)  # click's own errors of usage
         if shown is None:
             raise
         if shown():  # empty if the help was shown
-            said.print(f"railfmi: {' '.join(shown().split())}", markup=False, soft_wrap=True)
+            return _wrong(" ".join(shown().split()))
         return 2
 
 
@@ -137,7 +162,7 @@ def _no_more_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _line(error: Exception) -> str:
+def _line(error: object) -> str:
     """What an error says, in one line; what it quotes of a file may hold line ends and codes of terminals."""
     text = " ".join(str(error).splitlines())
     return "".join(c if c.isprintable() else UNPRINTABLE for c in text)

@@ -12,7 +12,8 @@ from fmus.model import Model
 from fmus.models import MODELS, model_with
 from fmus.option import Choice
 from scenarios.cli.build_options import with_build_options
-from scenarios.cli.console import Out, app, said
+from scenarios.cli.console import Out, app
+from scenarios.cli.voice import echo, found, progress, said
 
 
 @app.command()
@@ -41,10 +42,14 @@ def build(
     given = {name: value for name, value in options.items() if value is not None}
     made = [model_with(name, effect or [], given) for name in models or MODELS]
     write = _writer(kind, fmi, platform or [], compiler)
+    files: list[Path] = []
     for model in made:
         for line in model.notes():
             said.print(line, markup=False, soft_wrap=True)
-        typer.echo(write(model, out))
+        with progress(f"building {model.name}, {len(files) + 1} of {len(made)}"):
+            files.append(write(model, out))
+        echo(files[-1])
+    found(files)
 
 
 def _writer(kind: str, fmi: int, platforms: list[str], compiler: str | None) -> Callable[[Model, Path], Path]:

@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 from scenarios.cli.console import app
+from scenarios.cli.voice import found, progress
 
 
 @app.command()
@@ -14,7 +15,9 @@ def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
     """Check if railfmi can use an FMU: validation, restart, repeatability, instances, state, tunables."""
     from fmus.host.grading.check import grade
 
-    result = grade(fmu)
+    with progress("trying the FMU"):
+        result = grade(fmu)
+    found(result)
     signs = {True: "[green]passed[/]", False: "[red]FAILED[/]", None: "[dim]not offered[/]"}
     report = Console(highlight=False, soft_wrap=True)
     for entry in result.checks:

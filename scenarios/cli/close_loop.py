@@ -15,11 +15,11 @@ from scenarios.cli.console import (
     Trust,
     app,
     interrupted,
-    said,
     show,
     will_write,
 )
 from scenarios.cli.supervision import INTERRUPTED
+from scenarios.cli.voice import echo, found, progress
 
 if TYPE_CHECKING:
     from fmus.host.apart.isolation import Isolation
@@ -76,7 +76,7 @@ def _one(
     from scenarios.closing.lines import lines_of
 
     try:
-        with said.status("reading the experiment") as status:
+        with progress("reading the experiment") as status:
             result = run(experiment, out, data, status.update, jobs, seed, resume, isolation, show)
     except KeyboardInterrupt:
         raise interrupted(RESUME) from None
@@ -87,9 +87,10 @@ def _one(
     except FmuEnded as error:
         kept = "; --resume continues from the checkpoints" if (out / STAGES).is_dir() else ""
         raise FmuEnded(f"{error}{kept}") from error
+    found(result)
     for line in lines_of(result):
-        typer.echo(line)
-    typer.echo(f"report: {out / 'report.html'}")
+        echo(line)
+    echo(f"report: {out / 'report.html'}")
 
 
 def _several(
@@ -100,26 +101,27 @@ def _several(
     from scenarios.closing.lines import table_of
     from scenarios.closing.several import close_loops as run_all
 
-    with said.status("reading the experiments") as status:
-        found = run_all(
+    with progress("reading the experiments") as status:
+        all_found = run_all(
             experiments,
             out,
             data,
             status.update,
-            lambda r: typer.echo(f"{r.experiment}: {r.verdict} ({r.wall_seconds:.0f} s)"),
+            lambda r: echo(f"{r.experiment}: {r.verdict} ({r.wall_seconds:.0f} s)"),
             jobs,
             seed,
             resume,
             isolation,
             show,
         )
-    if found.results:
-        for line in table_of(found):
-            typer.echo(line)
-        typer.echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
-    if found.interrupted:
+    found(all_found)
+    if all_found.results:
+        for line in table_of(all_found):
+            echo(line)
+        echo(f"table: {out / 'table.csv'}; page: {out / 'index.html'}")
+    if all_found.interrupted:
         raise interrupted(
-            f"{len(found.results)} of {len(experiments)} experiments are finished; "
+            f"{len(all_found.results)} of {len(experiments)} experiments are finished; "
             "the same command with --resume goes on from here"
         )
 
@@ -131,8 +133,8 @@ def _try(
     from scenarios.preparing.trial import dry_run as tried
 
     for experiment in experiments:
-        with said.status("simulating the record once"):
+        with progress("simulating the record once"):
             folder = out if len(experiments) == 1 else out / experiment.stem
             trial = tried(experiment, folder, data, jobs, isolation)
         for line in trial.lines():
-            typer.echo(line)
+            echo(line)

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import RESULTS, CallLimit, MemoryLimit, Out, RunLimit, app, said, will_write
+from scenarios.cli.console import RESULTS, CallLimit, MemoryLimit, Out, RunLimit, app, will_write
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command()
@@ -31,9 +32,10 @@ def compare(
 
     isolation = Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
-    with said.status("reading the experiment") as status:
-        found = side_by_side(a, b, experiment, out, tolerance, data, status.update, isolation)
-    for line in found.lines():
-        typer.echo(line)
-    if not found.ok:
+    with progress("reading the experiment") as status:
+        result = side_by_side(a, b, experiment, out, tolerance, data, status.update, isolation)
+    found(result)
+    for line in result.lines():
+        echo(line)
+    if not result.ok:
         raise typer.Exit(1)

@@ -10,7 +10,8 @@ from typing import Annotated, TypeVar
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import RESULTS, Out, app, said, will_write
+from scenarios.cli.console import RESULTS, Out, app, will_write
+from scenarios.cli.voice import echo, found, progress
 
 Item = TypeVar("Item")
 SIDES = "; given twice (or as LEFT,RIGHT), first the left, then the right one"
@@ -61,16 +62,17 @@ def conicity(
     )  # fmt: skip
     amplitudes = None if not amplitude else [_number("--amplitude", text) for text in _split(amplitude)]
     will_write(out)
-    with said.status("searching for the contact"):
-        found = evaluated(request, amplitudes)
+    with progress("searching for the contact"):
+        result = evaluated(request, amplitudes)
         folder = writable(out)
         with written_at_once(folder) as part:
-            found.write(part)
-            write_page(part, found, shlex.join(["railfmi", *sys.argv[1:]]))
-    typer.echo("equivalent conicity")
-    for line in found.lines():
-        typer.echo(line)
-    typer.echo(f"page: {folder / 'conicity.html'}")
+            result.write(part)
+            write_page(part, result, shlex.join(["railfmi", *sys.argv[1:]]))
+    found(result.result())
+    echo("equivalent conicity")
+    for line in result.lines():
+        echo(line)
+    echo(f"page: {folder / 'conicity.html'}")
 
 
 def _profiles(given: list[str]) -> list[str]:

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from fmus import limits
-from scenarios.cli.console import RESULTS, Out, app, said, will_write
+from scenarios.cli.console import RESULTS, Out, app, will_write
+from scenarios.cli.voice import echo, progress
 
 
 @app.command("conicity-norm")
@@ -49,7 +50,7 @@ def conicity_norm(
     instrument = Instrument(reader_of(reader, smoothing), random, grid, spacing, seed)
     will_write(out)
     folder = writable(out)
-    with said.status("step 1") as status:
+    with progress("step 1") as status:
         exact = [step_1(one, reference) for one in pairs]
         measured = list(step_2(pairs, instrument, draws, status.update)) if draws else []
     how = "found from the data" if smoothing is None else f"{smoothing:g} m rms"
@@ -57,7 +58,7 @@ def conicity_norm(
     with written_at_once(folder) as part:
         report.write(part, shlex.join(["railfmi", *sys.argv[1:]]))
     for line in report.lines():
-        typer.echo(line)
-    typer.echo(f"page: {folder / 'norm.html'}")
+        echo(line)
+    echo(f"page: {folder / 'norm.html'}")
     if not report.ok:
         raise typer.Exit(1)

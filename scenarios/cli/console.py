@@ -1,18 +1,62 @@
 """Parts shared by all commands: the application, the console for progress, common options."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from importlib.metadata import version
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import typer
-from rich.console import Console
 
 from scenarios.cli.supervision import INTERRUPTED
+from scenarios.cli.voice import VOICE, said
 from scenarios.output import replaced
 
-app = typer.Typer(
-    name="railfmi", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
+LOUDNESS = {  # options of every command, by what they set
+    "quiet": typer.Option("-q", "--quiet", help="say nothing but the answer and errors"),
+    "verbose": typer.Option("-v", "--verbose", help="tell each step of the progress in a line of its own"),
+    "as_json": typer.Option("--json", help="print the answer as one JSON object"),
+}
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class App(typer.Typer):
+    """The application; each of its commands has the options that all have."""
+
+    def command(self, *args: Any, **more: Any) -> Callable[[Function], Function]:
+        """As of Typer."""
+        register = super().command(*args, **more)
+
+        def add(command: Function) -> Function:
+            register(_with_loudness(command))
+            return command
+
+        return add
+
+
+def _with_loudness(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that also takes the common options and tells the voice of them."""
+
+    @wraps(command)
+    def told(*args: Any, **given: Any) -> Any:
+        for name in LOUDNESS:
+            setattr(VOICE, name, given.pop(name))
+        return command(*args, **given)
+
+    own = [*signature(command).parameters.values()]
+    new = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, option])
+        for name, option in LOUDNESS.items()
+    ]
+    shape: Any = told
+    shape.__signature__ = Signature([*own, *new])
+    shape.__annotations__ = {**command.__annotations__, **{p.name: p.annotation for p in new}}
+    return told
+
+
+app = App(
+    name="railfmi", no_args_is_help=True, pretty_exceptions_enable=False,
     help="FMI models for railway dynamics, and the tracing of model error in measured data.",
 )  # fmt: skip
 
@@ -30,9 +74,6 @@ def railfmi(
     ] = False,
 ) -> None:
     """Keeps one command that is loaded alone a command."""
-
-
-said = Console(stderr=True, highlight=False)
 
 
 def interrupted(sentence: str) -> typer.Exit:
@@ -66,10 +107,12 @@ def will_write(folder: Path) -> None:
 def say_notices() -> None:
     """Print what is to be said at the end of a command."""
     while NOTICES:
-        said.print(f"railfmi: {NOTICES.pop(0)}", markup=False, soft_wrap=True)
+        notice = NOTICES.pop(0)
+        if not VOICE.quiet:
+            said.print(f"railfmi: {notice}", markup=False, soft_wrap=True)
 
 
 def show(lines: Sequence[str]) -> None:
     """Print lines that stay, above the progress."""
-    for line in lines:
+    for line in () if VOICE.quiet else lines:
         said.print(line, markup=False, soft_wrap=True)

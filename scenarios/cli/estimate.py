@@ -14,10 +14,10 @@ from scenarios.cli.console import (
     RunLimit,
     Trust,
     app,
-    said,
     show,
     will_write,
 )
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command()
@@ -38,10 +38,11 @@ def estimate(
 
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
-    with said.status("reading the experiment") as status:
+    with progress("reading the experiment") as status:
         result = filtered(experiment, out, data, tell=status.update, isolation=isolation, show=show)
+    found(result)
     for line in result.lines():
-        typer.echo(line)
-    typer.echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
+        echo(line)
+    echo(f"estimates: {out / 'estimate.csv'}; page: {out / 'estimate.html'}")
     if not result.consistent:
         raise typer.Exit(1)

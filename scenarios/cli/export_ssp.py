@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from fmus.errors import BadInput
-from scenarios.cli.console import RESULTS, app, said
+from scenarios.cli.console import RESULTS, app
+from scenarios.cli.voice import echo, progress
 
 
 @app.command("export-ssp")
@@ -26,7 +27,7 @@ def export_scenario(
 
     if kind not in ("native", "python"):
         raise BadInput(f"--kind {kind}: not a kind of FMU; use 'native' or 'python'")
-    with said.status("reading the scenario") as status:
+    with progress("reading the scenario") as status:
         package = export_ssp(
             scenario,
             out,
@@ -36,4 +37,4 @@ def export_scenario(
             platform or (),
             status.update,
         )
-    typer.echo(package)
+    echo(package)

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said
+from scenarios.cli.console import RESULTS, Out, app
+from scenarios.cli.voice import echo, progress
 
 
 @app.command("import-ssp")
@@ -15,6 +16,6 @@ def import_package(
     """Read an SSP package and write a scenario folder for `railfmi run`."""
     from scenarios.exchange import import_ssp
 
-    with said.status("reading the package") as status:
+    with progress("reading the package") as status:
         scenario = import_ssp(package, out, status.update)
-    typer.echo(scenario)
+    echo(scenario)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import Out, app
+from scenarios.cli.voice import echo
 
 
 @app.command("init")
@@ -27,8 +28,8 @@ def init(
     asks = sys.stdin.isatty() and sys.stdout.isatty()
     made = drafted(fmu, data, out, time, _ask if asks else None, force)
     for line in made.lines():
-        typer.echo(line)
-    typer.echo(f"experiment: {made.file}; look at it, then: railfmi close-loop {made.file} --dry-run")
+        echo(line)
+    echo(f"experiment: {made.file}; look at it, then: railfmi close-loop {made.file} --dry-run")
 
 
 def _ask(question: str, answers: Sequence[str], default: str) -> str:
@@ -37,4 +38,4 @@ def _ask(question: str, answers: Sequence[str], default: str) -> str:
         answer: str = typer.prompt(f"{question}, of {', '.join(answers)}", default=default)
         if answer in answers:
             return answer
-        typer.echo(f"'{answer}' is none of them")
+        echo(f"'{answer}' is none of them")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import RESULTS, Out, app
+from scenarios.cli.voice import echo, progress
 
 
 @app.command("inspect")
@@ -17,5 +18,7 @@ def inspect(
     """Channels, units, rates, gaps, clipping and spectra of a record; variables and access of an FMU."""
     from scenarios.preparing.inspecting import inspect as looked_at
 
-    for line in looked_at(file, out, time):
-        typer.echo(line)
+    with progress("reading the file"):
+        lines = looked_at(file, out, time)
+    for line in lines:
+        echo(line)

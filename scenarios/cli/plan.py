@@ -14,10 +14,10 @@ from scenarios.cli.console import (
     RunLimit,
     Trust,
     app,
-    said,
     show,
     will_write,
 )
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command()
@@ -42,8 +42,9 @@ def plan(
 
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
-    with said.status("reading the experiment") as status:
+    with progress("reading the experiment") as status:
         result = planned(experiment, out, data, status.update, show, isolation=isolation)
+    found(result)
     for line in table_of(result):
-        typer.echo(line)
-    typer.echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")
+        echo(line)
+    echo(f"plan: {out / 'plan.json'}; page: {out / 'plan.html'}")

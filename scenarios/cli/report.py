@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import app
+from scenarios.cli.voice import echo, found
 
 
 @app.command()
@@ -20,6 +21,8 @@ def report(
     from scenarios.reporting.report import report as gathered
 
     where = folder if out is None else out
-    for line in gathered(folder, where).lines():
-        typer.echo(line)
-    typer.echo(f"page: {where / PAGE}; table: {where / TABLE}")
+    summary = gathered(folder, where)
+    found(summary)
+    for line in summary.lines():
+        echo(line)
+    echo(f"page: {where / PAGE}; table: {where / TABLE}")

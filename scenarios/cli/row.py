@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from scenarios.cli.console import RESULTS, Out, app, said, will_write
+from scenarios.cli.console import RESULTS, Out, app, will_write
+from scenarios.cli.voice import echo, said
 
 
 @app.command("row")
@@ -27,12 +28,12 @@ def rebuild(
 
     if name is None:
         for row in ROWS.values():
-            typer.echo(f"{row.name:<22} {row.title} ({row.source})")
+            echo(f"{row.name:<22} {row.title} ({row.source})")
         return
     will_write(out)
     outcome = run_row(name, out, records, cases=case, tell=lambda line: said.print(line, markup=False))
-    for found in outcome.missed:
-        typer.echo(f"not met: {found.case}: {found.what} = {found.ours:.4g}, target {found.wanted}")
-    typer.echo(f"{outcome.met} of {outcome.aimed} targets met; table: {out / 'table.md'}")
+    for miss in outcome.missed:
+        echo(f"not met: {miss.case}: {miss.what} = {miss.ours:.4g}, target {miss.wanted}")
+    echo(f"{outcome.met} of {outcome.aimed} targets met; table: {out / 'table.md'}")
     if not outcome.ok:
         raise typer.Exit(1)

@@ -15,9 +15,9 @@ from scenarios.cli.console import (
     Trust,
     app,
     interrupted,
-    said,
     will_write,
 )
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command("run")
@@ -37,20 +37,19 @@ def run_scenarios(
     def done(result: Result) -> None:
         held = sum(finding.holds for finding in result.expectations)
         if result.interrupted_at is not None:
-            typer.echo(
-                f"{result.id}: interrupted at {result.interrupted_at:g} s; the recording up to then is kept"
-            )
+            echo(f"{result.id}: interrupted at {result.interrupted_at:g} s; the recording up to then is kept")
         else:
             took = f"{result.wall_seconds:.1f} s"
-            typer.echo(f"{result.id}: {held} of {len(result.expectations)} expectations met ({took})")
+            echo(f"{result.id}: {held} of {len(result.expectations)} expectations met ({took})")
         for finding in result.failed:
-            typer.echo(f"  not met: {finding.sentence}; {finding.because}")
+            echo(f"  not met: {finding.sentence}; {finding.because}")
 
     will_write(out)
-    with said.status("reading the scenarios") as status:
+    with progress("reading the scenarios") as status:
         isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
         results = run_all(scenarios, out, status.update if watch else (lambda _: None), done, isolation)
-    typer.echo(f"results: {out}")
+    found(results)
+    echo(f"results: {out}")
     if any(r.interrupted_at is not None for r in results):
         raise interrupted("the recording up to then is kept")
     if not all(r.ok for r in results):

@@ -15,6 +15,7 @@ from scenarios.closing.figures.errors import error_plot
 from scenarios.closing.figures.forces import OTHERS, force_plots, laws_found
 from scenarios.closing.figures.free_form import free_form_plot
 from scenarios.closing.figures.headline import headline_plot
+from scenarios.closing.figures.simulated import simulation_chart, simulation_plots
 from scenarios.closing.page import error_table, sections
 from scenarios.closing.page.case import Case
 from scenarios.closing.page.glossary import effect_words, glossary, hypothesis_words
@@ -28,6 +29,7 @@ from scenarios.closing.page.rejected import (
 )
 from scenarios.closing.page.wording import missed_words, story
 from scenarios.closing.result import Result, best_wrong
+from scenarios.drawing.chart.chart import scripts, styles
 from scenarios.drawing.pages import rendered
 from scenarios.drawing.sheet import Plot
 from scenarios.drawing.typography import number, unit
@@ -66,6 +68,10 @@ def _figures(case: Case, folder: Path) -> Values:
         return [plot.embedded(folder) for plot in plots]
 
     return {
+        "simulation_figures": embed(simulation_plots(problem, found, words, free)),
+        "chart": simulation_chart(problem, found, words, free),
+        "chart_scripts": scripts(),
+        "chart_styles": styles(),
         "headline_figure": embed([headline_plot(problem, found, words, free)]),
         "record_figures": embed(record_plots(problem, words)),
         "force_figures": embed(force_plots(found, words)),

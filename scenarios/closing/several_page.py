@@ -11,6 +11,7 @@ from scenarios.closing.page.glossary import effect_words, values_words
 from scenarios.closing.result import Result
 from scenarios.closing.several_results import Carried, Joint, Results
 from scenarios.drawing.pages import rendered
+from scenarios.drawing.sheet import Plot
 from scenarios.drawing.typography import (
     NOTHING,
     number,
@@ -113,5 +114,10 @@ def _joint(j: Joint, folder: Path) -> Values:
         "rise": number(j.rise),
         "chance": number(j.p_value, 2),
         "caption": plot.caption,
-        "figure": plot.embedded(folder)["source"],
+        **_pictures(plot, folder),
     }
+
+
+def _pictures(plot: Plot, folder: Path) -> Values:
+    made = plot.embedded(folder)
+    return {"figure": made["source"], "narrow": made["narrow"]}

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from estimator.record import Array, Record
+from scenarios.drawing.narrow import make_narrow
 
 # colours differ in lightness, for printing in grey and for the colour-blind
 INK, BEFORE, AFTER, LAW = "#1d2733", "#d98f3e", "#123f6b", "#a3122a"
@@ -37,17 +38,32 @@ class Plot:
 
     def write(self, folder: Path) -> bytes:
         """Write as PNG and SVG into a folder; returns the PNG."""
-        small = BytesIO()
-        _drawn(self.figure).quantize(COLOURS).save(small, "png", compress_level=6)
-        (folder / f"{self.name}.png").write_bytes(small.getvalue())
+        picture = png(self.figure)
+        (folder / f"{self.name}.png").write_bytes(picture)
         _settle(self.figure)
         self.figure.savefig(folder / f"{self.name}.svg", metadata={"Date": None})
-        return small.getvalue()
+        return picture
 
     def embedded(self, folder: Path) -> dict[str, str]:
-        """Write into a folder; returns name, caption and the picture as the source of an image in a page."""
-        code = base64.b64encode(self.write(folder)).decode()
-        return {"name": self.name, "caption": self.caption, "source": f"data:image/png;base64,{code}"}
+        """Write into a folder; returns name, caption, and pictures as sources of images in a page.
+
+        source: as it is written; narrow: for a telephone, the panels above one another.
+        """
+        source = _source(self.write(folder))
+        make_narrow(self.figure)
+        small = _source(png(self.figure))
+        return {"name": self.name, "caption": self.caption, "source": source, "narrow": small}
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as a small PNG; it is laid out by this."""
+    small = BytesIO()
+    _drawn(figure).quantize(COLOURS).save(small, "png", compress_level=6)
+    return small.getvalue()
+
+
+def _source(picture: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
 def _drawn(figure: Figure) -> Image.Image:

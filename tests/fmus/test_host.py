@@ -160,3 +160,28 @@ def test_an_fmu_that_cannot_start_says_why(drive):
         with pytest.raises(FmuError, match="No module named 'a_package_that_is_not_installed'") as refused:
             Fmu(archive)
     assert "\n" not in str(refused.value)
+
+
+def test_a_simulation_as_a_table_has_names_times_and_units(drive):
+    t = np.linspace(0.0, 1.0, 11)
+    force = 50 * np.sin(t)
+    with Fmu(drive) as fmu:
+        table = fmu.simulate_frame(t, {"F": force}, ["q_dot", "q"], {"q": 2.0})
+        assert_array_equal(table.to_numpy(), fmu.simulate(t, {"F": force}, ["q_dot", "q"], {"q": 2.0}))
+        assert table.index.name == "time"
+        assert_array_equal(table.index, t)
+        assert table.attrs["units"] == {"q_dot": "m/s", "q": "m"}
+        held = fmu.simulate_frame(t, {"F": 50.0})
+        assert list(held) == list(fmu.description.outputs)
+        assert_array_equal(held["q"], fmu.simulate(t, {"F": np.full(11, 50.0)}, ["q"], {})[:, 0])
+        with pytest.raises(BadInput, match="input 'F' has 3 samples for 11 times"):
+            fmu.simulate_frame(t, {"F": force[:3]})
+
+
+def test_an_fmu_says_what_it_is(drive):
+    with Fmu(drive) as fmu:
+        fmu.restart(1.5)
+        shown = repr(fmu)
+    assert "Drive.fmu), FMI 2.0: " in shown
+    assert f"{len(fmu.description.outputs)} outputs" in shown
+    assert shown.endswith("at 1.5 s>")

@@ -1,6 +1,7 @@
 """The report: one file that holds all it shows, with the numbers of the result."""
 
 import base64
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -30,14 +31,30 @@ def page(demo: tuple[Result, Path]) -> str:
 
 def words(page: str) -> str:
     """What a reader sees of a page."""
-    return re.sub(r"\s+", " ", re.sub(r"<style.*?</style>|<[^>]+>", " ", page, flags=re.S))
+    return re.sub(
+        r"\s+", " ", re.sub(r"<style.*?</style>|<script.*?</script>|<[^>]+>", " ", page, flags=re.S)
+    )
 
 
 def test_the_page_asks_for_nothing_else(page: str) -> None:
     assert not re.search(r"""(src|href)\s*=\s*["'](https?:)?//""", page)
-    assert "<script" not in page
+    assert "<script src" not in page
     assert "@import" not in page
     assert len(page) < LARGEST
+
+
+def test_measured_against_simulated_is_the_first_figure(page: str) -> None:
+    """Also without scripts, where the picture is shown."""
+    first = page.index("<figure")
+    assert page[first:].startswith('<figure id="chart-simulated" class="charted">')
+    [data] = re.findall(r'<script type="application/json">(.*?)</script>', page, re.S)
+    panels = json.loads(data)["panels"]
+    assert {p["title"].split(",")[0] for p in panels} == {"omega_w", "omega_r"}
+    for panel in panels:
+        measured, before, after = (np.array(s["y"]) for s in panel["series"])
+        assert [s["name"] for s in panel["series"]] == ["measured", "before (calibrated)", "after"]
+        assert np.std(measured - after) < np.std(measured - before)
+    assert page.index("<img") > first
 
 
 def test_every_embedded_figure_is_a_picture_and_lies_beside_the_page(

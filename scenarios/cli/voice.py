@@ -1,0 +1,150 @@
+"""What a command says and how loudly: its answer on the output, everything else on the error stream."""
+
+import dataclasses
+import json
+import math
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+COUNT = re.compile(r"(\d+) of (\d+)")
+PATIENCE = 2.0  # s, from which on progress is told
+INTERVAL = 10.0  # s, between two lines of progress where there is no terminal
+TICK = 0.5  # s, between two drawings of the progress
+
+said = Console(stderr=True, highlight=False)
+
+
+class Voice:
+    """What the options -v, -q and --json ask for, and with --json what the answer is made of."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Before a command: as loud as usual, nothing answered."""
+        self.quiet = self.verbose = self.as_json = False
+        self.lines: list[str] = []
+        self.result: Any = None
+        self.error = ""
+
+    def echo(self, line: object) -> None:
+        """A line of the answer."""
+        self.lines.append(str(line))
+        if not self.as_json:
+            print(line)
+
+    def found(self, result: object) -> None:
+        """What the answer is made of, for --json; of several, a list."""
+        self.result = plain(result)
+
+    def document(self, command: str, code: int, error: str = "") -> str:
+        """The answer as JSON."""
+        value = {"command": command, "exit": code, "result": self.result, "lines": self.lines}
+        return json.dumps(value | ({"error": error} if error else {}), indent=1, ensure_ascii=False)
+
+
+VOICE = Voice()
+echo, found = VOICE.echo, VOICE.found
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: dataclasses as objects, paths as text, null for a number that is not finite."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(v) for v in value]
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):  # of NumPy
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value)
+
+
+class Progress:
+    """The step that a command is at, with its count, the elapsed and the expected time.
+
+    clock: s; show: takes the text that is shown or, off a terminal, printed.
+    """
+
+    def __init__(self, text: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._begin = self._since = clock()
+        self._text = text
+        self._first = 0
+
+    def update(self, text: str) -> None:
+        """The step has changed, or its count."""
+        if COUNT.sub("", text) != COUNT.sub("", self._text):
+            self._since = self._clock()
+            self._first = _count(text)[0]
+        self._text = text
+
+    def __str__(self) -> str:
+        now = self._clock()
+        done, all_ = _count(self._text)
+        left = ""
+        if all_ > done > self._first:
+            each = (now - self._since) / (done - self._first)
+            left = f", about {span(each * (all_ - done))} left in this step"
+        return f"{self._text} ({span(now - self._begin)}{left})"
+
+
+def _count(text: str) -> tuple[int, int]:
+    """The count in a text such as 'fitting, 3 of 40'; zeros without one."""
+    counted = COUNT.search(text)
+    return (int(counted[1]), int(counted[2])) if counted else (0, 0)
+
+
+def span(seconds: float) -> str:
+    """A time as it is read: 8 s, 3 min 20 s."""
+    whole = round(seconds)
+    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60:02d} s"
+
+
+@contextmanager
+def progress(text: str) -> Iterator[Progress]:
+    """Tell on the error stream what a command is at, once it takes longer than two seconds.
+
+    On a terminal one line is drawn again and again; elsewhere there is a line now and then, with -v one for
+    each step, with -q none.
+    """
+    shown, over = Progress(text), threading.Event()
+    teller = threading.Thread(target=_tell, args=(shown, over), daemon=True)
+    if not VOICE.quiet:
+        teller.start()
+    try:
+        yield shown
+    finally:
+        over.set()
+        if not VOICE.quiet:
+            teller.join()
+
+
+def _tell(shown: Progress, over: threading.Event) -> None:
+    if said.is_terminal and not VOICE.verbose:
+        if over.wait(PATIENCE):
+            return
+        with said.status(str(shown)) as status:
+            while not over.wait(TICK):
+                status.update(str(shown))
+        return
+    last, step = time.monotonic() + PATIENCE - INTERVAL, ""
+    while not over.wait(TICK):
+        now, text = time.monotonic(), shown._text
+        due = now - last >= INTERVAL or (VOICE.verbose and COUNT.sub("", text) != COUNT.sub("", step))
+        if due:
+            said.print(f"railfmi: {shown}", markup=False, soft_wrap=True)
+            last, step = now, text
