@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 
-from scenarios.closing.result import Result
+from scenarios.closing.result import Result, none_of_these
 from scenarios.closing.several_results import (
     Carried,
     Joint,
     Results,
     effect_text,
 )
-from scenarios.drawing.typography import aligned
+from scenarios.drawing.typography import aligned, chance
 
 SHOWN = ("experiment", "verdict", "gap closed", "output", "before", "after", "noise", "seconds", "effects")
 
@@ -34,16 +34,8 @@ def lines_of(result: Result) -> Iterator[str]:
 
 def probable(said: Mapping[str, float], most: int = 3) -> str:
     """The most probable answers in words, and what is left for none of these."""
-    rest = max(0.0, 1 - sum(said.values()))
-    first = [f"{label.replace('_', ' ')} {share(p)}" for label, p in list(said.items())[:most]]
-    return "probability: " + ", ".join([*first, f"none of these {share(rest)}"])
-
-
-def share(p: float) -> str:
-    """A probability as text; what rounds to 0 or 100 % is not said to be certain."""
-    if 0.0005 <= p < 0.9995:
-        return f"{p:.1%}".replace(".0%", "%").replace("%", " %")
-    return "below 0.1 %" if p < 0.5 else "above 99.9 %"
+    first = [f"{label.replace('_', ' ')} {chance(p)}" for label, p in list(said.items())[:most]]
+    return "probability: " + ", ".join([*first, f"none of these {chance(none_of_these(said))}"])
 
 
 def table_of(found: Results) -> Iterator[str]:

@@ -24,6 +24,7 @@ from scenarios.closing.page.rejected import (
     chance_words,
     decided,
     detection_words,
+    probable_rows,
     rejected,
     tried,
 )
@@ -114,6 +115,7 @@ def _rejection(case: Case) -> Values:
         "best": hypothesis_words(case.found.chosen or case.found.base),
         "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
         "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
+        "probable": list(probable_rows(case.result.probability)),
         "decision": [decided(c) for c in case.found.judgement.checks],
         "detection": detection_words(case.problem, case.found),
         "chance": chance_words(case.found, case.diagnostics) if case.diagnostics else "",

@@ -114,6 +114,11 @@ class Result(Shown):
         written(path, json.dumps(asdict(self), indent=1))
 
 
+def none_of_these(said: Mapping[str, float]) -> float:
+    """The probability that the probabilities of all answers leave for a mechanism outside the library."""
+    return max(0.0, 1 - sum(said.values()))
+
+
 def result_of(
     name: str,
     problem: Problem,

@@ -48,6 +48,13 @@ def percent(share: float) -> str:
     return f"100{HELD}%" if share >= 0.9995 else f"{_fixed(round(100 * share, 1) + 0.0, 1)}{HELD}%"
 
 
+def chance(p: float) -> str:
+    """A probability as text; what rounds to 0 or 100 % is not said to be certain."""
+    if 0.0005 <= p < 0.9995:
+        return f"{p:.1%}".replace(".0%", "%").replace("%", " %")
+    return "below 0.1 %" if p < 0.5 else "above 99.9 %"
+
+
 def unit(text: str | None) -> str:
     """A unit of the FMU as it is printed: N.m.s2/rad2 -> N·m·s²/rad²; empty for a pure number."""
     if not text or text == "1" or len(set(text.split("/"))) == 1 < len(text.split("/")):

@@ -4,7 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.closing.lines import probable, share
+from scenarios.closing.lines import probable
+from scenarios.closing.page.rejected import probable_rows
+from scenarios.drawing.typography import chance
 
 
 @pytest.mark.parametrize(
@@ -19,12 +21,12 @@ from scenarios.closing.lines import probable, share
     ],
 )
 def test_a_share_is_said_to_a_tenth_of_a_percent(p, said):
-    assert share(p) == said
+    assert chance(p) == said
 
 
 @given(st.floats(0.0, 1.0))
 def test_no_probability_is_said_to_be_certain(p):
-    assert share(p) not in ("0 %", "100 %")
+    assert chance(p) not in ("0 %", "100 %")
 
 
 def test_the_most_probable_answers_are_said_with_what_is_left():
@@ -32,3 +34,13 @@ def test_the_most_probable_answers_are_said_with_what_is_left():
     assert said == "probability: viscous damping@wheel 60 %, viscous damping@roller 30 %, none of these 10 %"
     many = probable({f"a@{i}": 0.1 for i in range(9)})
     assert many.count("a@") == 3
+
+
+def test_the_page_says_what_the_line_says_in_words():
+    rows = list(probable_rows({"actuator_lag@T_P + viscous_damping@wheel": 0.8, "no_discrepancy": 0.1}))
+    assert rows == [
+        ("actuator lag at T_P and viscous damping at wheel", "80 %"),
+        ("no discrepancy", "10 %"),
+        ("none of these", "10 %"),
+    ]
+    assert list(probable_rows({})) == []

@@ -1,6 +1,6 @@
 """The rejected hypotheses with the reasons, and the test for a discrepancy, in words."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,9 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
-from scenarios.closing.page.glossary import candidate_words, title
-from scenarios.drawing.typography import HELD, number, percent
+from scenarios.closing.page.glossary import candidate_words, effect_words, title
+from scenarios.closing.result import none_of_these
+from scenarios.drawing.typography import HELD, chance, number, percent
 
 NIL = 0.05  # a score or a significance below this is shown as zero
 
@@ -38,6 +39,16 @@ def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
     others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
     others.sort(key=lambda h: found.baseline.lead(best, h)[0])
     return [_row(problem, found, h) for h in others]
+
+
+def probable_rows(said: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+    """Each answer in words with its probability, and what is left; nothing if none is said."""
+    for label, p in said.items():
+        parts = (part.partition("@") for part in label.split(" + "))
+        words = (f"{effect_words(kind)} at {at}" if at else kind.replace("_", " ") for kind, _, at in parts)
+        yield " and ".join(words), chance(p)
+    if said:
+        yield "none of these", chance(none_of_these(said))
 
 
 def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
