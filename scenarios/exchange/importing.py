@@ -1,4 +1,4 @@
-"""Read an SSP 1.0 package of railfmi or of another tool, and write it as a folder with a scenario."""
+"""Read an SSP package of railfmi or of another tool, and write it as a folder with a scenario."""
 
 import re
 import tomllib
@@ -30,6 +30,7 @@ from scenarios.simulating.reading import load_scenario
 Tell = Callable[[str], None]
 Descriptions = Mapping[str, FmuDescription]
 STEP = 1e-3  # s, if neither the package nor its FMUs declare a step
+SECONDS = 1.0  # simulated if the package states no end
 FILE = "scenario.toml"
 KEPT = ("id", "question", "order", "extrapolation", "seed", "record", "sensors", "events", "expect", "figure")
 
@@ -40,7 +41,7 @@ def import_ssp(package: str | Path, out: str | Path, tell: Tell = lambda _: None
     A package of railfmi becomes the scenario that it was made from, with any changes made to its structure or
     its values. The scenario of another tool's package expects only that the outputs stay finite.
     tell: called with lines on parts that are left out or were changed.
-    Raises BadInput if it is not an SSP 1.0 package, or contains parts that cannot be simulated here.
+    Raises BadInput if it is no SSP package of version 1 or 2, or has parts that cannot be simulated here.
     """
     system, files = read_package(package)
     folder = writable(Path(out))
@@ -63,6 +64,8 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
     ours = _settings(files)
     sources = _sources(system, files)
     members = [c for c in system.components if c.name not in sources]
+    if not members:
+        raise BadInput("holds no FMU that could be simulated; export it with its components")
     fmus = {c.name: describe(folder / c.source) for c in members}
     names = _names(members)
     inputs: dict[str, Any] = {}
@@ -70,7 +73,7 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
         "id": re.sub(r"[^A-Za-z0-9_.-]", "_", system.name).lstrip("_.-") or "package",
         "question": system.description or f"Do the FMUs of {system.name} run together?",
         **{key: ours[key] for key in KEPT if key in ours},
-        "duration": _duration(system),
+        "duration": _duration(system, tell),
         "step": _step(system, ours, fmus),
     }
     table["fmus"] = {names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, tell) for c in members}
@@ -117,11 +120,12 @@ def _names(members: list[Component]) -> dict[str, str]:
     return names
 
 
-def _duration(system: System) -> float:
-    if system.stop is None or system.start != 0.0:
-        found = f"{system.start:g} to {'no end' if system.stop is None else format(system.stop, 'g')}"
-        raise BadInput(f"its default experiment goes from {found}; give it startTime 0 and a stopTime, s")
-    return system.stop
+def _duration(system: System, tell: Tell) -> float:
+    if system.start != 0.0:
+        raise BadInput(f"its default experiment starts at {system.start:g} s; give it startTime 0")
+    if system.stop is None:
+        tell(f"states no stopTime; {SECONDS:g} s are simulated, 'duration' in {FILE} changes that")
+    return SECONDS if system.stop is None else system.stop
 
 
 def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
