@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from scenarios.cli.console import app
-from scenarios.cli.voice import found, progress
+from scenarios.cli.voice import echo_coloured, found, progress
 
 
 @app.command()
@@ -19,8 +18,7 @@ def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
         result = grade(fmu)
     found(result)
     signs = {True: "[green]passed[/]", False: "[red]FAILED[/]", None: "[dim]not offered[/]"}
-    report = Console(highlight=False, soft_wrap=True)
     for entry in result.checks:
-        report.print(f"{signs[entry.passed]:<24} {entry.title}: {entry.sentence}")
+        echo_coloured(f"{signs[entry.passed]:<24} {entry.title}: {entry.sentence}")
     if not result.ok:
         raise typer.Exit(1)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.text import Text
 
 COUNT = re.compile(r"(\d+) of (\d+)")
 PATIENCE = 2.0  # s, from which on progress is told
@@ -40,6 +41,12 @@ class Voice:
         if not self.as_json:
             print(line)
 
+    def echo_coloured(self, line: str) -> None:
+        """A line of the answer with colours, as the library rich writes them."""
+        self.lines.append(Text.from_markup(line).plain)
+        if not self.as_json:
+            Console(highlight=False, soft_wrap=True).print(line)
+
     def found(self, result: object) -> None:
         """What the answer is made of, for --json; of several, a list."""
         self.result = plain(result)
@@ -51,7 +58,7 @@ class Voice:
 
 
 VOICE = Voice()
-echo, found = VOICE.echo, VOICE.found
+echo, echo_coloured, found = VOICE.echo, VOICE.echo_coloured, VOICE.found
 
 
 def plain(value: Any) -> Any:
