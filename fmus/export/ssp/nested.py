@@ -101,13 +101,13 @@ def _note_units(node: Any, path: Path, level: Level) -> None:
 
 
 def _leg(node: Any, path: Path, level: Level) -> Leg:
-    start, end = (
+    begin, end = (
         _end(path, node.get(f"{e}Element"), node.get(f"{e}Connector"), level) for e in ("start", "end")
     )
     line = one(node, "ssc:LinearTransformation")
     gain, offset = (number(line, key) for key in ("factor", "offset"))
     plain = node.get("suppressUnitConversion", "false") in ("true", "1")
-    leg = Leg(start, end, 1.0 if gain is None else gain, offset or 0.0, plain)
+    leg = Leg(begin, end, 1.0 if gain is None else gain, offset or 0.0, plain)
     for name in {n for e in ("start", "end") if (n := node.get(f"{e}Element"))} - level.elements[path].keys():
         raise BadInput(f"{leg}: there is no component '{name}'; correct the connection")
     for other in ("Boolean", "Integer", "Enumeration"):
