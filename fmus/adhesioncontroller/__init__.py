@@ -1,1 +1,0 @@
-"""Controller that keeps the creep of a driven wheelset at the peak of adhesion."""

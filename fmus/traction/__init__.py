@@ -1,1 +1,0 @@
-"""Torsional wheelset with gearbox and motor; equations in README.md."""
