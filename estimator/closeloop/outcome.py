@@ -51,7 +51,7 @@ class Outcome:
     @property
     def probability(self) -> dict[str, float]:
         """Probability of each answer; see `probabilities`."""
-        fits = (*self.singles, *self.pairs)
+        fits = [h for h in (*self.singles, *self.pairs) if h.candidates]
         return probabilities(self.baseline, self.detection, self.judgement, self.promises, fits)
 
     @property

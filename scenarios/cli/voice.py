@@ -153,5 +153,5 @@ def _tell(shown: Progress, over: threading.Event) -> None:
         now, text = time.monotonic(), shown._text
         due = now - last >= INTERVAL or (VOICE.verbose and COUNT.sub("", text) != COUNT.sub("", step))
         if due:
-            said.print(f"railfmi: {shown}", markup=False, soft_wrap=True)
+            said.print(f"... {shown}", markup=False, soft_wrap=True)
             last, step = now, text

@@ -70,7 +70,6 @@ class Result(Shown):
     experiment: str
     verdict: Verdict
     decision: list[dict[str, Any]]
-    probability: dict[str, float]
     policy: str
     effects: list[Effect]
     alternatives: list[Alternative]
@@ -89,6 +88,7 @@ class Result(Shown):
     free_form: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     start_values: dict[str, dict[str, Any]] = field(default_factory=dict)
+    probability: dict[str, float] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
         """See Shown.lines."""
@@ -136,7 +136,6 @@ def result_of(
         experiment=name,
         verdict=found.judgement.verdict,
         decision=[_check(c) for c in found.judgement.checks],
-        probability={label: round(p, 4) for label, p in found.probability.items()},
         policy=problem.policy.version,
         effects=list(_unique(e for h in members for e in effects_of(h))),
         alternatives=alternatives(problem, found),
@@ -163,6 +162,7 @@ def result_of(
         free_form=_curve(curve) if curve else {},
         seconds={stage: round(s, 2) for stage, s in found.seconds.items()},
         start_values=start_values(problem, found),
+        probability={label: round(p, 4) for label, p in found.probability.items()},
     )
 
 

@@ -51,7 +51,7 @@ def test_a_pair_is_written_as_page_json_and_csv(tmp_path, capsys):
     page = (tmp_path / "conicity.html").read_text()
     assert f"Equivalent conicity {at_3:.3f} at 3 mm" in page
     assert page.count('<img src="data:image/png;base64,') == 3
-    assert not re.findall(r'(?:src|href)="(?!data:)', page)  # it loads no other file
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', page)  # it loads no other file
     for name in ("contact", "difference", "conicity"):
         assert (tmp_path / f"{name}.png").stat().st_size > 5000
         assert (tmp_path / f"{name}.svg").is_file()

@@ -53,14 +53,14 @@ def test_progress_off_a_terminal_is_plain_lines_after_a_while(monkeypatch, quiet
             time.sleep(0.02)
 
     with progress("first, 1 of 3") as told:
-        waited("railfmi: first, 1 of 3 (", not quiet)
+        waited("... first, 1 of 3 (", not quiet)
         told.update("second")
-        waited("railfmi: second (", verbose)
+        waited("... second (", verbose)
     voice.VOICE.begin()
     said = out.getvalue()
     assert "\x1b" not in said
-    assert ("railfmi: first, 1 of 3 (" in said) is not quiet
-    assert ("railfmi: second (" in said) is verbose
+    assert ("... first, 1 of 3 (" in said) is not quiet
+    assert ("... second (" in said) is verbose
 
 
 @dataclass(frozen=True)
