@@ -142,6 +142,12 @@ class Filter(ABC):
         self._memory: Adapted = start.memory or Adapted(np.full(m, np.nan), np.ones(m), 1.0, np.zeros(m))
         self.factored(start.x, start.P, start.t)
 
+    def resume(self, estimate: Estimate) -> None:
+        """Go back to an estimate that this filter returned, or on to one; the next step starts from there."""
+        self.now = estimate
+        if estimate.memory is not None:
+            self._memory = estimate.memory
+
     def factored(self, x: Array, P: Array, t: float) -> Array:
         """A factor of P (n, n), computed once; raises Diverged if there is none."""
         if self._factored is not P:

@@ -13,6 +13,7 @@ from estimator.filters.bounds import (
     coded,
     grown,
 )
+from estimator.filters.sensor_noise import Correlated
 from estimator.filters.unknown_input import UnknownInput
 from estimator.record import Array
 
@@ -48,7 +49,11 @@ class Layout:
 
 
 def layout(
-    n: int, others: int, transforms: Sequence[Transform], inputs: int, unknown: Sequence[UnknownInput]
+    n: int,
+    others: int,
+    transforms: Sequence[Transform],
+    inputs: int,
+    unknown: Sequence[UnknownInput | Correlated],
 ) -> Layout:
     """The layout for n states and the given numbers of other states and known inputs."""
     fed, at = [], 0

@@ -11,8 +11,12 @@ from estimator.record import Array
 
 if TYPE_CHECKING:
     from estimator.filters.history import Steps
+    from estimator.filters.modes import Mode
     from estimator.filters.system import Joint
     from estimator.filters.ukf import Spread
+
+
+OWN = ("modes", "stay", "members", "seed", "iterations")  # options that only some filters take
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,8 @@ class Request:
 
     R: covariance of the measurement noise, (m, m); dt: usual time step, s; u: inputs of the first sample,
     (n_u,); gate, adapt: options of the filter, None if not used; spread: sigma points of a UKF.
+    modes, stay: see estimator.filters.modes; members: of an ensemble, or number of particles, None for the
+    filter's own number; seed: of its random numbers; iterations: largest number of one correction.
     """
 
     R: Array
@@ -29,12 +35,22 @@ class Request:
     gate: Gate | None
     adapt: Adaptation | None
     spread: Spread
+    modes: tuple[Mode, ...] = ()
+    stay: float | None = None
+    members: int | None = None
+    seed: int = 0
+    iterations: int = 10
 
 
 class Estimator(ABC):
-    """A filter that an experiment can choose; `name` is the value of the key `filter`."""
+    """A filter that an experiment can choose; `name` is the value of the key `filter`.
+
+    takes: options of its own among `OWN`; smooths: whether its estimates can be smoothed backwards.
+    """
 
     name: ClassVar[str]
+    takes: ClassVar[frozenset[str]] = frozenset()
+    smooths: ClassVar[bool] = True
 
     @classmethod
     @abstractmethod

@@ -17,6 +17,7 @@ from estimator.access.recipe import Way
 from estimator.filters.bounds import Transform
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.filters.layout import collect, layout
+from estimator.filters.sensor_noise import Correlated
 from estimator.filters.unknown_input import UnknownInput
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
@@ -62,8 +63,9 @@ class UnknownState:
 class Joint:
     """A System (see estimator.filters.estimator) that simulates an FMU.
 
-    x = states, coordinates of the parameters (`transform`), states of the unknown inputs; y = outputs. The
-    other states of the FMU are not estimated; they follow the mean. Close the object after use.
+    x = states, coordinates of the parameters (`transform`), states of the unknown inputs and of `errors`, the
+    correlated noise of outputs; y = outputs. The other states of the FMU are not estimated; they follow the mean.
+    Close the object after use.
     way: an access to use instead of the one that the probe chooses; compiled: False avoids numba.
     """
 
@@ -80,15 +82,17 @@ class Joint:
         t0: float = 0.0,
         way: Way | None = None,
         compiled: bool = True,
+        errors: Sequence[Correlated] = (),
     ) -> None:
         self._stack = ExitStack()
         self._steps: dict[float, tuple[Array, Array]] = {}
         self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
         self.outputs, self.inputs = tuple(outputs), tuple(inputs)
-        self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
+        self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), (*unknown, *errors)
         fed = [n for w in unknown for n in w.feeds]
         mine = [s.name for s in states]
-        self.names = (*mine, *(p.name for p in parameters), *(n for w in unknown for n in w.states))
+        self.names = (*mine, *(p.name for p in parameters), *(n for w in self.unknown for n in w.states))
+        self._added = [(self.outputs.index(e.output), self.names.index(e.states[0])) for e in errors]
         known = self.archive.description.states or continuous_states(self.archive)
         self.others = tuple(n for n in known if n not in mine)
         self._constants = dict(constants or {})
@@ -130,9 +134,14 @@ class Joint:
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """See System; the FMU is evaluated only if an output is not a state."""
         if self._direct is not None:
-            return X[:, self._direct]
-        values = self.rows(X, u, carried)
-        return self._asked(self.copies.evaluate, values, t)[:, self._seen]
+            seen = X[:, self._direct]
+        else:
+            seen = self._asked(self.copies.evaluate, self.rows(X, u, carried), t)[:, self._seen]
+        if self._added:
+            seen = seen.copy()
+            for output, state in self._added:
+                seen[:, output] += X[:, state]
+        return seen
 
     def rows(self, X: Array, u: Array, carried: Array) -> Array:
         """Values to set in the FMU for each row (k, n) of X, with the present unknown inputs, (k, n_put)."""

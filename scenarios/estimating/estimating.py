@@ -185,6 +185,7 @@ def result_of(
         alarms=alarms(joint, h, s.options),
         process_noise={state.name: state.noise for state in joint.states},
         process_noise_share=found.share,
+        tuned=found.tuned,
         access=access.sentence,
         refused={way.name.lower(): why for way, why in access.refused.items()},
         samples=len(h.t),

@@ -1,7 +1,7 @@
 """The work of estimate: noise that is not declared, what the data can tell, the filter's run."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from estimator.filters.identifiability import (
     before,
     information,
 )
+from estimator.filters.modes import Mode
 from estimator.filters.named import Request
 from estimator.filters.process_noise import LEARNT_FROM, likeliest
 from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
+from estimator.filters.tuning import TUNED_FROM, tuned
 from estimator.filters.ukf import Spread
 from estimator.record import Array
 from fmus.aside import all_set_aside
@@ -50,6 +52,7 @@ class Findings:
     after: Identifiability | None
     share: float | None  # of the states' motion that is noise, where it was found from the data
     forms: tuple[Form, ...] = ()  # what each choice of the model's form would have given
+    tuned: dict[str, dict[str, float | None]] = field(default_factory=dict)  # noise found by likelihood
 
 
 def find(s: Setup, archive: Archive, tell: Tell) -> Findings:
@@ -100,6 +103,10 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
     if s.form:
         tell("learning where the parameters of the model's form begin")
         s = _begun_again(s, archive, share or 0.0)
+    noise: dict[str, dict[str, float | None]] = {}
+    if s.options.tune:
+        tell("tuning the noise by likelihood")
+        s, noise = tuned_noise(s, archive, share or 0.0)
     joint = s.joint(archive, share or 0.0)
     try:
         tell("weighing what the data can tell")
@@ -116,7 +123,7 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
     except BaseException:
         joint.close()
         raise
-    return Findings(s, joint, history, value, std, known, learnt, share)
+    return Findings(s, joint, history, value, std, known, learnt, share, tuned=noise)
 
 
 def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
@@ -140,7 +147,11 @@ def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
         Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None
     )
     spread = Spread(o.alpha, o.beta, o.kappa)
-    asked = Request(np.diag(s.noise**2), dt, s.samples.u[0], gate, adapt, spread)
+    modes = tuple(Mode({n: (g.start, g.std) for n, g in m.at.items()}, m.process) for m in o.modes)
+    asked = Request(
+        np.diag(s.noise**2), dt, s.samples.u[0], gate, adapt, spread, modes, o.stay, o.members, o.seed,
+        o.iterations,
+    )  # fmt: skip
     return filters()[o.filter].of(joint, start, asked)
 
 
@@ -157,6 +168,40 @@ def _noise_share(s: Setup, archive: Archive) -> float:
             return -np.inf if found.broken else found.log_likelihood
 
     return likeliest(log_likelihood)
+
+
+def tuned_noise(s: Setup, archive: Archive, share: float) -> tuple[Setup, dict[str, dict[str, float | None]]]:
+    """The setup with the noise of outputs, states or both that is likeliest in its first samples.
+
+    Beside it by name the value found and its standard error, None where the record does not determine it.
+    """
+    first, o = s.samples.first(TUNED_FROM), s.options
+    states = [n.name for n in s.states] if "process" in o.tune else []
+    given = [o.process_std.get(n.name, share * scale) for n, scale in zip(s.states, s.scale.tolist(), strict=True)]
+    start = [*(s.noise.tolist() if "measurement" in o.tune else []), *(given if states else [])]
+
+    def at(values: Array) -> Setup:
+        m = len(values) - len(states)
+        driven = o.process_std | dict(zip(states, values[m:].tolist(), strict=True))
+        noise = values[:m] if m else s.noise
+        return replace(s, noise=noise, options=o.model_copy(update={"process_std": driven}))
+
+    def log_likelihood(values: Array) -> float:
+        tried = at(values)
+        with tried.joint(archive, share) as joint:
+            try:
+                found = filtered(filter_of(tried, joint, joint.start(float(first.t[0]))), first)
+            except Diverged:
+                return -np.inf
+            return -np.inf if found.broken else found.log_likelihood
+
+    found = tuned(log_likelihood, np.maximum(start, 1e-300))
+    names = [*(s.outputs if "measurement" in o.tune else ()), *(f"{n} (process)" for n in states)]
+    said = {
+        name: {"value": value, "std_error": error if np.isfinite(error) else None}
+        for name, value, error in zip(names, found.value.tolist(), found.std_error.tolist(), strict=True)
+    }
+    return at(found.value), said
 
 
 def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:

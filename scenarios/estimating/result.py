@@ -20,6 +20,7 @@ from estimator.filters.consistency import (
 )
 from estimator.filters.history import History
 from estimator.filters.identifiability import Identifiability
+from estimator.filters.sensor_noise import Correlated
 from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.aside import blocks, let_go
@@ -53,6 +54,7 @@ class EstimateResult(Shown):
     innovations: by output, the noise, the rms over its expected value (1 if model and noise are right), the
     largest correlation, the p value of whiteness, and the share of measurements rejected by the gate.
     checks: the consistency tests of the filter; consistent: whether it passes all of them.
+    tuned: by output and state, the noise that was found by likelihood and its standard error.
     rms_error: errors of the estimates, only if true values were given.
     """
 
@@ -76,6 +78,7 @@ class EstimateResult(Shown):
     diverged: bool
     reason: str
     rms_error: dict[str, float] = field(default_factory=dict)
+    tuned: dict[str, dict[str, float | None]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -162,7 +165,7 @@ def estimated(
         return {}
     kinds = ["state"] * len(joint.states)
     kinds += ["form" if p.name in form else "parameter" for p in joint.parameters]
-    kinds += ["input"] * (len(h.names) - len(kinds))
+    kinds += ["noise" if isinstance(w, Correlated) else "input" for w in joint.unknown for _ in w.states]
     value, std = joint.values(h.x[-1:], h.std[-1:])
     low, high = (joint.values(h.x[-1:] + s * BAND * h.std[-1:], h.std[-1:])[0][0] for s in (-1, 1))
     variables = joint.archive.description.variables

@@ -11,6 +11,7 @@ from estimator.access.recipe import Way
 from estimator.filters.history import Samples, samples
 from estimator.filters.observability import needed
 from estimator.filters.process_noise import motion
+from estimator.filters.sensor_noise import Correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.unknown_input import UnknownInput
 from estimator.noise import white_noise
@@ -23,7 +24,9 @@ from fmus.model import declared
 from fmus.models import model_class
 from scenarios.estimating.form import choices, parameters_of_form
 from scenarios.estimating.unknowns import (
+    check_filter,
     check_options,
+    in_time,
     inputs_of,
     parameters_of,
     states_of,
@@ -80,14 +83,17 @@ class Setup:
         return Joint(
             archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,
             dt=s.step, t0=float(s.t[0]),
+            errors=[Correlated(n, c.std, c.time) for n, c in self.options.correlated.items()],
         )  # fmt: skip
 
 
 def set_up(e: Experiment, options: Options, record: Record, archive: Archive) -> Setup:
     """All that the filter needs before its first sample; raises BadInput for wrong names or values."""
     d = archive.description
-    run = record.runs[0]
     check_options(e, options, d)
+    check_filter(e, options)
+    record = in_time(e, options, record)
+    run = record.runs[0]
     every = 1
     if e.estimate and e.estimate.rate:
         every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))

@@ -1,11 +1,15 @@
 """The unknown parameters, inputs and states of an experiment, with their start values and deviations."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import inf, sqrt
 
 import numpy as np
 
+from estimator.filters import filters
 from estimator.filters.bounds import Transform, bounded
+from estimator.filters.delayed import punctual
+from estimator.filters.named import OWN
 from estimator.filters.system import UnknownParameter, UnknownState
 from estimator.filters.unknown_input import (
     DAMPING,
@@ -20,6 +24,7 @@ from scenarios.experiment.declaration import EstimatedParameter, Options
 from scenarios.experiment.experiment import Experiment
 
 FIRST = 10.0  # start deviation of a measured state, in standard deviations of its noise
+WHOLE = 0.01  # samples by which a delay may differ from a whole number of them
 ROUGH = 0.1  # start deviation of a declared but unmeasured state, as a share of its usual size
 
 
@@ -38,6 +43,39 @@ def check_options(e: Experiment, o: Options, d: FmuDescription) -> None:
             if name not in known:
                 where = f"{e.file}: [estimate.options] {key} '{name}'"
                 raise BadInput(f"{where} is not estimated; {did_you_mean(name, known)}")
+
+
+def check_filter(e: Experiment, o: Options) -> None:
+    """Raise BadInput if an option does not go with the filter, or names an output that is not measured."""
+    where, chosen = f"{e.file}: [estimate.options]", filters()[o.filter]
+    for key in OWN:
+        if key in o.model_fields_set and key not in chosen.takes:
+            able = [name for name, kind in filters().items() if key in kind.takes]
+            raise BadInput(f"{where} {key} does not apply to filter = '{o.filter}'; it is for {', '.join(able)}")
+    if o.smooth and not chosen.smooths:
+        raise BadInput(f"{where} smooth is not possible with filter = '{o.filter}'; leave it out")
+    for key, table in (("correlated", o.correlated), ("delay", o.delay)):
+        for name in table:
+            if name not in e.outputs:
+                raise BadInput(f"{where} {key} '{name}' is not an output; {did_you_mean(name, e.outputs)}")
+
+
+def in_time(e: Experiment, o: Options, record: Record) -> Record:
+    """The record with outputs at the samples at which they were measured, if some of them arrive late."""
+    run = record.runs[0]
+    if not o.delay:
+        return record
+    step = float(np.median(np.diff(run.t)))
+    delays = []
+    for name in record.outputs:
+        samples = o.delay.get(name, 0.0) / step
+        delays.append(round(samples))
+        if abs(samples - delays[-1]) > WHOLE or delays[-1] >= len(run.t):
+            raise BadInput(
+                f"{e.file}: [estimate.options] delay of '{name}' is {samples:.4g} samples of {step:.4g} s; give "
+                f"a multiple of the time step, shorter than the record"
+            )
+    return replace(record, runs=(replace(run, y=punctual(run.y, delays)), *record.runs[1:]))
 
 
 def parameters_of(e: Experiment, o: Options, d: FmuDescription) -> Iterator[UnknownParameter]:

@@ -176,13 +176,36 @@ class Alarm(Table):
         return self
 
 
+class Guess(Table):
+    """Start value and standard deviation of an unknown, in the FMU's unit."""
+
+    start: Number
+    std: Positive
+
+
+class ModeOf(Table):
+    """A mode of the filters `imm` and `rbpf`: where unknowns start, and the factor of the process noise."""
+
+    at: dict[str, Guess] = {}
+    process: Positive = 1.0
+
+
+class CorrelatedNoise(Table):
+    """Noise of an output that is correlated in time, beside its white noise; time: s, to 1/e."""
+
+    std: Positive
+    time: Positive
+
+
 class Options(Table):
     """How an estimate is made: filter, noise, gating, smoothing, alarms; the rest is derived from the data.
 
     process_std: noise that drives a state, its unit/sqrt(s). walk: how far a parameter wanders in a second,
     its unit/sqrt(s). initial_std: what is known of a state's start. damping: of an unknown input's process.
     input_parts: in how many parts inputs act between two samples. alarms: in place of those that the model
-    declares. form: whether what the form of the model leaves open is estimated too.
+    declares. form: whether what the form of the model leaves open is estimated too. correlated, delay (s): of
+    outputs. tune: noise that is found by likelihood. modes, stay (s), members, seed, iterations: of filters
+    that take them.
     """
 
     filter: Filter = "ukf"
@@ -201,6 +224,14 @@ class Options(Table):
     beta: Number = 2.0
     kappa: Number = 0.0
     alarms: dict[str, Alarm] = {}
+    correlated: dict[str, CorrelatedNoise] = {}
+    delay: dict[str, Positive] = {}
+    tune: tuple[Literal["measurement", "process"], ...] = ()
+    modes: tuple[ModeOf, ...] = ()
+    stay: Positive | None = None
+    members: Annotated[int, Field(strict=True, ge=1)] | None = None
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    iterations: Annotated[int, Field(strict=True, ge=1)] = 10
 
 
 class Estimate(Table):

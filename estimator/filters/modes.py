@@ -1,0 +1,101 @@
+"""Modes: competing assumptions about a system, between which a filter of several models decides.
+
+A mode states where some unknowns start, and how much process noise acts. A system that changes its mode gets new
+parameters, drawn from the distribution that the entered mode states; its states are continuous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fmus.errors import BadInput, did_you_mean
+
+if TYPE_CHECKING:
+    from estimator.filters.estimator import Estimate
+    from estimator.filters.system import Joint
+    from estimator.record import Array
+
+
+@dataclass(frozen=True)
+class Mode:
+    """at: start value and standard deviation by name, in the FMU's units; process: factor of Q."""
+
+    at: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    process: float = 1.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a mode states in the filter's coordinates: x and variances (n,), nan where it says nothing.
+
+    redrawn: (n,) which of these are parameters, and so are drawn anew whenever the mode is entered.
+    """
+
+    x: Array
+    variance: Array
+    redrawn: Array
+    process: float = 1.0
+
+    def begun(self, start: Estimate) -> Estimate:
+        """The start of a filter in this mode."""
+        return start._replace(
+            **dict(zip(("x", "P"), self._put(start.x, start.P, np.isfinite(self.x)), strict=True))
+        )
+
+    def enter(self, x: Array, P: Array) -> tuple[Array, Array]:
+        """Mean (n,) and covariance (n, n) after the mode is entered from another one."""
+        return self._put(x, P, self.redrawn)
+
+    def _put(self, x: Array, P: Array, where: Array) -> tuple[Array, Array]:
+        x, P = np.where(where, self.x, x), np.where(where[:, None] | where, 0.0, P)
+        return x, P + np.diag(np.where(where, self.variance, 0.0))
+
+
+def entries(joint: Joint, modes: Sequence[Mode]) -> tuple[Entry, ...]:
+    """The modes in the coordinates of a joint system; raises BadInput for a name or value it does not have."""
+    return tuple(_entry(joint, mode, i) for i, mode in enumerate(modes, 1))
+
+
+def _entry(joint: Joint, mode: Mode, number: int) -> Entry:
+    n = len(joint.names)
+    x, variance, redrawn = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, np.bool_)
+    parameters = {p.name: p for p in joint.parameters}
+    for name, (start, std) in mode.at.items():
+        where = f"[estimate.options] modes, number {number}: '{name}'"
+        if name not in joint.names:
+            raise BadInput(f"{where} is not estimated; {did_you_mean(name, joint.names)}")
+        i = joint.names.index(name)
+        x[i], variance[i] = start, std**2
+        if name in parameters:
+            transform, redrawn[i] = parameters[name].transform, True
+            try:
+                x[i] = transform.z(start)
+            except BadInput as error:
+                raise BadInput(f"{where}: start {error}") from error
+            variance[i] = (std / transform.slope(x[i])) ** 2
+    return Entry(x, variance, redrawn, mode.process)
+
+
+def transitions(n: int, stay: float | None, dt: float) -> Array:
+    """Probabilities (n, n) of a change from mode i to mode j over dt [s]; stay: mean time in a mode, s, or None.
+
+    A mode is left at a constant rate, to each of the others with the same probability.
+    """
+    if stay is None or n < 2:
+        return np.eye(n)
+    p = float(np.exp(-dt / stay))
+    found: Array = np.full((n, n), (1 - p) / (n - 1))
+    np.fill_diagonal(found, p)
+    return found
+
+
+def mixed(weights: Array, x: Array, P: Array) -> tuple[Array, Array]:
+    """Mean (n,) and covariance (n, n) of a mixture of normal distributions: weights (k,), x (k, n), P (k, n, n)."""
+    mean = weights @ x
+    off = x - mean
+    spread: Array = np.einsum("k,kij->ij", weights, P) + np.einsum("k,ki,kj->ij", weights, off, off)
+    return mean, (spread + spread.T) / 2
