@@ -1,8 +1,8 @@
 """Measurements that arrive late, by a known time for each output, while the filter runs.
 
-The filter goes back to the last sample for which everything has arrived, whose estimate is kept, and steps forward
-again with what is there by now. This is exact for whatever filter: it equals one whose state is extended by its
-past values, and for n steps of delay it takes n + 1 steps for each sample.
+The filter goes back to the last sample for which everything has arrived, whose estimate is kept, and steps
+forward again with what is there by now. This is exact for whatever filter: it equals one whose state is
+extended by its past values, and for n steps of delay it takes n + 1 steps for each sample.
 """
 
 from collections import deque
@@ -26,8 +26,8 @@ class _Sample(NamedTuple):
 class Delayed:
     """A filter whose outputs arrive late by `delays` (m,) samples; `step` takes what arrives at each sample.
 
-    The estimate that `step` returns is that of the present, from all that has arrived. Its innovation, NIS and
-    likelihood are those of the sample that is now complete, so that no measurement counts twice.
+    The estimate that `step` returns is that of the present, from all that has arrived. Its innovation, NIS
+    and likelihood are those of the sample that is now complete, so that no measurement counts twice.
     """
 
     def __init__(self, filter: Filter, delays: Sequence[int]) -> None:

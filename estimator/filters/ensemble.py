@@ -1,8 +1,8 @@
 """Ensemble Kalman filter: the distribution is a sample of states, and no derivative or covariance is stored.
 
-Process noise is drawn at random. The correction is deterministic, one measured channel after the other (Whitaker
-and Hamill, Mon. Weather Rev. 130 (2002) 1913), so that measurements need no random perturbations. A covariance of
-few members is itself random: its errors fall with the root of their number.
+Process noise is drawn at random. The correction is deterministic, one measured channel after the other
+(Whitaker and Hamill, Mon. Weather Rev. 130 (2002) 1913), so that measurements need no random perturbations. A
+covariance of few members is itself random: its errors fall with the root of their number.
 """
 
 from typing import NamedTuple, Self

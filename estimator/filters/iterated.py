@@ -1,8 +1,9 @@
-"""Iterated unscented filter: the outputs are linearised about the corrected estimate until it no longer moves.
+"""Iterated unscented filter: the outputs are linearised about the corrected estimate until it no longer
+moves.
 
 Source: García-Fernández, Svensson, Morelande and Särkkä, IEEE Trans. Signal Process. 63 (2015) 5561 (iterated
-posterior linearisation). It differs from the filter of ukf.py only where a measured output is not linear in x: an
-acceleration or a force, not a measured state.
+posterior linearisation). It differs from the filter of ukf.py only where a measured output is not linear in
+x: an acceleration or a force, not a measured state.
 """
 
 from dataclasses import dataclass, field
@@ -76,6 +77,6 @@ class Iterated(Ukf):
         draw(x, checked(x, P, self.names, at.t), self._scale, X)
         expect(self.system.h(X, at.u, at.t, at.carried), self._Wm, self._Wc, Y, y, S)
         cross(Y, y, X, x, self._Wc, Psi)
-        H = np.linalg.lstsq(P, Psi.T, rcond=None)[0].T
+        H: Array = np.linalg.lstsq(P, Psi.T, rcond=None)[0].T
         rest: Array = S - H @ P @ H.T
         return H, y, (rest + rest.T) / 2

@@ -1,7 +1,7 @@
 """Modes: competing assumptions about a system, between which a filter of several models decides.
 
-A mode states where some unknowns start, and how much process noise acts. A system that changes its mode gets new
-parameters, drawn from the distribution that the entered mode states; its states are continuous.
+A mode states where some unknowns start, and how much process noise acts. A system that changes its mode gets
+new parameters, drawn from the distribution that the entered mode states; its states are continuous.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fmus.errors import BadInput, did_you_mean
 if TYPE_CHECKING:
     from estimator.filters.estimator import Estimate
     from estimator.filters.system import Joint
-    from estimator.record import Array
+    from estimator.record import Array, BoolArray
 
 
 @dataclass(frozen=True)
@@ -37,26 +37,25 @@ class Entry:
 
     x: Array
     variance: Array
-    redrawn: Array
+    redrawn: BoolArray
     process: float = 1.0
 
     def begun(self, start: Estimate) -> Estimate:
         """The start of a filter in this mode."""
-        return start._replace(
-            **dict(zip(("x", "P"), self._put(start.x, start.P, np.isfinite(self.x)), strict=True))
-        )
+        x, P = self._put(start.x, start.P, np.isfinite(self.x))
+        return start._replace(x=x, P=P)
 
     def enter(self, x: Array, P: Array) -> tuple[Array, Array]:
         """Mean (n,) and covariance (n, n) after the mode is entered from another one."""
         return self._put(x, P, self.redrawn)
 
-    def _put(self, x: Array, P: Array, where: Array) -> tuple[Array, Array]:
+    def _put(self, x: Array, P: Array, where: BoolArray) -> tuple[Array, Array]:
         x, P = np.where(where, self.x, x), np.where(where[:, None] | where, 0.0, P)
         return x, P + np.diag(np.where(where, self.variance, 0.0))
 
 
 def entries(joint: Joint, modes: Sequence[Mode]) -> tuple[Entry, ...]:
-    """The modes in the coordinates of a joint system; raises BadInput for a name or value it does not have."""
+    """The modes in the coordinates of a joint system; BadInput for an unknown name or a bad value."""
     return tuple(_entry(joint, mode, i) for i, mode in enumerate(modes, 1))
 
 
@@ -81,8 +80,9 @@ def _entry(joint: Joint, mode: Mode, number: int) -> Entry:
 
 
 def transitions(n: int, stay: float | None, dt: float) -> Array:
-    """Probabilities (n, n) of a change from mode i to mode j over dt [s]; stay: mean time in a mode, s, or None.
+    """Probabilities (n, n) of a change from mode i to mode j over dt [s].
 
+    stay: mean time in a mode, s; None if it never changes.
     A mode is left at a constant rate, to each of the others with the same probability.
     """
     if stay is None or n < 2:
@@ -94,7 +94,7 @@ def transitions(n: int, stay: float | None, dt: float) -> Array:
 
 
 def mixed(weights: Array, x: Array, P: Array) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of a mixture of normal distributions: weights (k,), x (k, n), P (k, n, n)."""
+    """Mean (n,) and covariance (n, n) of normal distributions mixed by weights (k,): x (k, n), P (k, n, n)."""
     mean = weights @ x
     off = x - mean
     spread: Array = np.einsum("k,kij->ij", weights, P) + np.einsum("k,ki,kj->ij", weights, off, off)

@@ -1,15 +1,16 @@
 """Rao-Blackwellised particle filter: parameters as particles, each with a Kalman filter of everything else.
 
 Given the parameters, states and unknown inputs are nearly normal, whatever shape the distribution of the
-parameters has (Doucet, de Freitas, Murphy and Russell, UAI 2000). Each particle's filter takes cubature points
-(Arasaratnam and Haykin 2009), and those of all particles are simulated in one call. When the particles are drawn
-again, they are spread by the kernel of Liu and West (2001), within each mode alone: across modes its shrinkage
-would merge what the data keep apart.
+parameters has (Doucet, de Freitas, Murphy and Russell, UAI 2000). Each particle's filter takes cubature
+points (Arasaratnam and Haykin 2009), and those of all particles are simulated in one call. When the particles
+are drawn again, they are spread by the kernel of Liu and West (2001), within each mode alone: across modes
+its shrinkage would merge what the data keep apart.
 """
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from estimator.filters.estimator import NO_CHANNELS, NONE, Covariance, Diverged, Estimate, System
@@ -26,6 +27,9 @@ DISCOUNT = 0.98  # of Liu and West's kernel; they advise 0.95 to 0.99
 FLOOR = 1e-3  # start deviations: smallest spread of the kernel
 
 
+Numbers: TypeAlias = NDArray[np.integer[Any]]
+
+
 class Cloud(NamedTuple):
     """The particles, and the memory of the filter: log weights, parameters, means, covariances, modes."""
 
@@ -33,15 +37,15 @@ class Cloud(NamedTuple):
     theta: Array  # (N, p)
     x: Array  # (N, q)
     P: Array  # (N, q, q)
-    mode: Array  # (N,) number of the mode from which the parameters were last drawn
+    mode: Numbers  # (N,) number of the mode from which the parameters were last drawn
     drawn: int = 0
 
 
 class Rbpf(Estimator):
     """Particles for x[drawn]; a Kalman filter in each particle for the rest of x. Interface as of Filter.
 
-    drawn: (n,) mask of the unknowns that are particles; modes: where they may start, the start alone if empty;
-    stay: mean time after which the parameters are drawn anew from another mode, s; None: never.
+    drawn: (n,) mask of the unknowns that are particles; modes: where they may start, the start alone if
+    empty; stay: mean time after which the parameters are drawn anew from another mode, s; None: never.
     """
 
     name = "rbpf"
@@ -236,7 +240,7 @@ class Rbpf(Estimator):
         n, w = len(self.names), np.exp(c.weights)
         x, P = np.empty((len(w), n)), np.zeros((len(w), n, n))
         x[:, self._at], x[:, self._rest] = c.theta, c.x
-        P[np.ix_(range(len(w)), self._rest, self._rest)] = c.P
+        P[np.ix_(np.arange(len(w)), self._rest, self._rest)] = c.P
         return mixed(w / w.sum(), x, P)
 
 
@@ -247,7 +251,7 @@ def _spread(points: Array) -> tuple[Array, Array]:
     return mean, np.einsum("nki,nkj->nij", off, off) / points.shape[1]
 
 
-def systematic(weights: Array, rng: np.random.Generator) -> Array:
+def systematic(weights: Array, rng: np.random.Generator) -> Numbers:
     """Numbers (N,) of the particles that are drawn. As filterpy's function, which takes no generator."""
     edges = np.cumsum(weights)
     edges[-1] = 1.0

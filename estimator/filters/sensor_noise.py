@@ -1,7 +1,7 @@
 """Measurement noise that is correlated in time, as a state of the filter (first-order Gauss-Markov process).
 
-Augmentation keeps the white part of the noise, so that no differences of measurements are needed and samples may
-be missing (Bar-Shalom, Li, Kirubarajan 2001, 8.3).
+Augmentation keeps the white part of the noise, so that no differences of measurements are needed and samples
+may be missing (Bar-Shalom, Li, Kirubarajan 2001, 8.3).
 """
 
 from dataclasses import dataclass

@@ -64,8 +64,8 @@ class Joint:
     """A System (see estimator.filters.estimator) that simulates an FMU.
 
     x = states, coordinates of the parameters (`transform`), states of the unknown inputs and of `errors`, the
-    correlated noise of outputs; y = outputs. The other states of the FMU are not estimated; they follow the mean.
-    Close the object after use.
+    correlated noise of outputs; y = outputs. The other states of the FMU are not estimated; they follow the
+    mean. Close the object after use.
     way: an access to use instead of the one that the probe chooses; compiled: False avoids numba.
     """
 

@@ -1,7 +1,8 @@
 """Tuning of the noise of a filter: the standard deviations with the largest likelihood of the innovations.
 
-The innovations of a filter whose noise is right are white and normal, so that their joint density is a likelihood
-of the noise (Schweppe, IEEE Trans. Inf. Theory 11 (1965) 61). Its curvature gives the standard errors.
+The innovations of a filter whose noise is right are white and normal, so that their joint density is a
+likelihood of the noise (Schweppe, IEEE Trans. Inf. Theory 11 (1965) 61). Its curvature gives the standard
+errors.
 """
 
 from collections.abc import Callable
@@ -21,7 +22,7 @@ FAILED = 1e12  # cost where the filter diverges
 
 @dataclass(frozen=True)
 class Tuned:
-    """Standard deviations (k,) with their standard errors (k,), nan where the record does not determine one."""
+    """Standard deviations (k,) and their standard errors (k,), nan where the record does not tell."""
 
     value: Array
     std_error: Array

@@ -177,7 +177,9 @@ def tuned_noise(s: Setup, archive: Archive, share: float) -> tuple[Setup, dict[s
     """
     first, o = s.samples.first(TUNED_FROM), s.options
     states = [n.name for n in s.states] if "process" in o.tune else []
-    given = [o.process_std.get(n.name, share * scale) for n, scale in zip(s.states, s.scale.tolist(), strict=True)]
+    given = [
+        o.process_std.get(n.name, share * scale) for n, scale in zip(s.states, s.scale.tolist(), strict=True)
+    ]
     start = [*(s.noise.tolist() if "measurement" in o.tune else []), *(given if states else [])]
 
     def at(values: Array) -> Setup:

@@ -51,7 +51,9 @@ def check_filter(e: Experiment, o: Options) -> None:
     for key in OWN:
         if key in o.model_fields_set and key not in chosen.takes:
             able = [name for name, kind in filters().items() if key in kind.takes]
-            raise BadInput(f"{where} {key} does not apply to filter = '{o.filter}'; it is for {', '.join(able)}")
+            raise BadInput(
+                f"{where} {key} does not apply to filter = '{o.filter}'; it is for {', '.join(able)}"
+            )
     if o.smooth and not chosen.smooths:
         raise BadInput(f"{where} smooth is not possible with filter = '{o.filter}'; leave it out")
     for key, table in (("correlated", o.correlated), ("delay", o.delay)):
