@@ -62,7 +62,7 @@ class Delayed:
 
 
 def punctual(y: Array, delays: Sequence[int]) -> Array:
-    """Outputs (N, m) at the samples at which they were measured, nan where what was measured has not arrived."""
+    """Outputs (N, m) at the samples at which they were measured; nan if not arrived."""
     found = np.full(y.shape, np.nan)
     for j, delay in enumerate(delays):
         found[: len(y) - delay, j] = y[delay:, j]

@@ -21,7 +21,7 @@ LEAST_MEMBERS = 3
 
 
 class Members(NamedTuple):
-    """The memory of the filter: the ensemble (k, n), the number of steps drawn so far, and that of the base."""
+    """The memory of the filter: the ensemble (k, n), the number of draws so far, that of the base."""
 
     X: Array
     drawn: int
@@ -55,8 +55,8 @@ class Ensemble(Filter, Estimator):
         )
         if members < LEAST_MEMBERS:
             raise BadInput(
-                f"[estimate.options] members = {members} is too few for filter = '{self.name}'; give at least "
-                f"{LEAST_MEMBERS}"
+                f"[estimate.options] members = {members} is too few for filter = '{self.name}'; give at "
+                f"least {LEAST_MEMBERS}"
             )
         self._seed, self._drawn = seed, kept.drawn if kept else 0
         self._X = (

@@ -65,8 +65,8 @@ class Imm(Estimator):
         """See Estimator.of."""
         if len(asked.modes) < 2:
             raise BadInput(
-                f"[estimate.options] filter = '{cls.name}' needs at least two modes; add modes = [{{at.NAME = "
-                "{start = ..., std = ...}}, ...]"
+                f"[estimate.options] filter = '{cls.name}' needs at least two modes; add modes = "
+                "[{at.NAME = {start = ..., std = ...}}, ...]"
             )
         modes = entries(joint, asked.modes)
         kept = start.memory.estimates if isinstance(start.memory, Bank) else [m.begun(start) for m in modes]
@@ -125,19 +125,28 @@ class Imm(Estimator):
 
     def _together(self, prior: Array, alive: Array, log_likelihood: float) -> Estimate:
         """The estimate of the mixture; its innovation is that of the mean of the modes' predictions."""
-            found = [f.now for f, a in zip(self.filters, alive, strict=True) if a] share = np.exp(prior[alive]
-            - logsumexp(prior[alive])) after = np.exp(self.weights[alive] - logsumexp(self.weights[alive])) x,
-            P = mixed(after, *_stacked(found)) x_prior, P_prior = mixed( share, *(np.array([getattr(e, n) for
-            e in found]) for n in ("x_prior", "P_prior")) ) innovation, S, nis = found[0].innovation, NONE,
-            0.0 used = np.logical_or.reduce([e.used for e in found]) if all(e.S.size for e in found): parts =
-            (np.array([e.innovation for e in found]), np.array([e.S for e in found])) there =
-            np.isfinite(innovation) innovation, S = np.full(len(innovation), np.nan),
-            np.full(parts[1][0].shape, np.nan) at = np.ix_(there, there) innovation[there], S[at] =
-            mixed(share, parts[0][:, there], parts[1][:, there][:, :, there]) nis = _square(innovation, S,
-            used) main = found[int(np.argmax(after))] memory = Bank(self.weights, tuple(f.now for f in
-            self.filters)) return Estimate( main.t, x, P, main.u, innovation, S, used, main.gated,
-            log_likelihood, nis, x_prior, P_prior, NONE, sum(w * e.carried for w, e in zip(after, found,
-            strict=True)), memory, )  # fmt: skip
+        found = [f.now for f, a in zip(self.filters, alive, strict=True) if a]
+        share = np.exp(prior[alive] - logsumexp(prior[alive]))
+        after = np.exp(self.weights[alive] - logsumexp(self.weights[alive]))
+        x, P = mixed(after, *_stacked(found))
+        x_prior, P_prior = mixed(
+            share, *(np.array([getattr(e, n) for e in found]) for n in ("x_prior", "P_prior"))
+        )
+        innovation, S, nis = found[0].innovation, NONE, 0.0
+        used = np.logical_or.reduce([e.used for e in found])
+        if all(e.S.size for e in found):
+            parts = (np.array([e.innovation for e in found]), np.array([e.S for e in found]))
+            there = np.isfinite(innovation)
+            innovation, S = np.full(len(innovation), np.nan), np.full(parts[1][0].shape, np.nan)
+            at = np.ix_(there, there)
+            innovation[there], S[at] = mixed(share, parts[0][:, there], parts[1][:, there][:, :, there])
+            nis = _square(innovation, S, used)
+        main = found[int(np.argmax(after))]
+        memory = Bank(self.weights, tuple(f.now for f in self.filters))
+        return Estimate(
+            main.t, x, P, main.u, innovation, S, used, main.gated, log_likelihood, nis, x_prior, P_prior,
+            NONE, sum(w * e.carried for w, e in zip(after, found, strict=True)), memory,
+        )  # fmt: skip
 
 
 def _stacked(estimates: Sequence[Estimate]) -> tuple[Array, Array]:

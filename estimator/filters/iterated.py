@@ -1,5 +1,4 @@
-"""Iterated unscented filter: the outputs are linearised about the corrected estimate until it no longer
-moves.
+"""Iterated unscented filter: the outputs are linearised about the corrected estimate, repeatedly.
 
 Source: García-Fernández, Svensson, Morelande and Särkkä, IEEE Trans. Signal Process. 63 (2015) 5561 (iterated
 posterior linearisation). It differs from the filter of ukf.py only where a measured output is not linear in
@@ -65,7 +64,7 @@ class Iterated(Ukf):
         return x1, P1
 
     def _linear(self, x: Array, P: Array) -> tuple[Array, Array, Array]:
-        """Regression of the outputs on x over the sigma points of x, P: slope (m, n), value at x, scatter (m, m)."""
+        """Regression of the outputs on x, P: slope (m, n), value at x (m,), scatter (m, m)."""
         n, m, at = len(x), len(self.R), self._at
         X, Y, y, S, Psi = (
             np.empty_like(self._X),

@@ -94,7 +94,7 @@ def transitions(n: int, stay: float | None, dt: float) -> Array:
 
 
 def mixed(weights: Array, x: Array, P: Array) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of normal distributions mixed by weights (k,): x (k, n), P (k, n, n)."""
+    """Mean (n,) and covariance (n, n) of normals x (k, n), P (k, n, n) mixed by weights (k,)."""
     mean = weights @ x
     off = x - mean
     spread: Array = np.einsum("k,kij->ij", weights, P) + np.einsum("k,ki,kj->ij", weights, off, off)

@@ -90,8 +90,8 @@ class Rbpf(Estimator):
         particles = USUAL_PARTICLES if asked.members is None else asked.members
         if particles < LEAST_PARTICLES:
             raise BadInput(
-                f"[estimate.options] members = {particles} is too few for filter = '{cls.name}'; give at least "
-                f"{LEAST_PARTICLES}"
+                f"[estimate.options] members = {particles} is too few for filter = '{cls.name}'; give at "
+                f"least {LEAST_PARTICLES}"
             )
         if any(mode.process != 1.0 for mode in asked.modes):
             raise BadInput(

@@ -74,8 +74,8 @@ def in_time(e: Experiment, o: Options, record: Record) -> Record:
         delays.append(round(samples))
         if abs(samples - delays[-1]) > WHOLE or delays[-1] >= len(run.t):
             raise BadInput(
-                f"{e.file}: [estimate.options] delay of '{name}' is {samples:.4g} samples of {step:.4g} s; give "
-                f"a multiple of the time step, shorter than the record"
+                f"{e.file}: [estimate.options] delay of '{name}' is {samples:.4g} samples of {step:.4g} s; "
+                f"give a multiple of the time step, shorter than the record"
             )
     return replace(record, runs=(replace(run, y=punctual(run.y, delays)), *record.runs[1:]))
 

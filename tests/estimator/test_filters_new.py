@@ -1,4 +1,4 @@
-"""Ensemble, particle, iterated, square-root and several-model filters on systems whose exact answer is known."""
+"""Filters of samples, factors, iterations and several models, on systems with a known exact answer."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ class Range:
 
 
 def test_iterating_makes_an_accurate_nonlinear_measurement_count():
-    """The distance is measured with 0.05 where the prior leaves about 1: the estimate must lie on that circle."""
+    """The distance is measured with 0.05 under a prior of 1: the estimate must lie near that circle."""
     rng = np.random.default_rng(1)
     start = Estimate(0.0, np.array([1.5, 1.0]), np.eye(2))
     off = {1: [], 10: []}
