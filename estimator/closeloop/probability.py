@@ -122,17 +122,21 @@ def _of_fits(
     """Probability of each label, and of no discrepancy."""
     base, prior = baseline.hypothesis, baseline.policy.prior
     kinds = max(len(distinct(promises)), 1)
-    each = {1: np.log((1 - prior.pair) / kinds), 2: np.log(prior.pair / max(comb(kinds, 2), 1))}
+    share = {1: np.log(1 - prior.pair), 2: np.log(prior.pair)}
+    each = {1: -np.log(kinds), 2: -np.log(max(comb(kinds, 2), 1))}
     price = np.log(_independent(baseline)) / 2
     best = min(fitted, key=lambda h: h.fit.cost - 2 * baseline.score(h))
     known: dict[str, float] = {}
+    alone: dict[str, float] = {}  # without the share of singles or pairs, which a stranger does not have
     for h in fitted:
-        value = _evidence(baseline, best, h) - _price(h, price) + each[min(len(h.candidates), 2)]
-        known[h.label] = max(value, known.get(h.label, -np.inf))
-    library = float(logsumexp(list(known.values())))
+        n = min(len(h.candidates), 2)
+        value = _evidence(baseline, best, h) - _price(h, price) + each[n]
+        if value > alone.get(h.label, -np.inf):
+            alone[h.label], known[h.label] = value, value + share[n]
+    library, stranger = (float(logsumexp(list(values.values()))) for values in (known, alone))
     odds = _odds_of_outside(baseline, best)
     within = np.log(prior.effect * (1 - prior.outside))
-    outside = np.log(prior.effect * prior.outside) + np.log(odds) + library
+    outside = np.log(prior.effect * prior.outside) + np.log(odds) + stranger
     nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
     whole = logsumexp([within + library, outside, nothing])
     found = {label: float(np.exp(within + value - whole)) for label, value in known.items()}
