@@ -12,6 +12,7 @@ from fmus.effects import parse_effect
 from fmus.export.builders.pythonfmu import build_python
 from fmus.models import model_class
 from scenarios import close_loop
+from scenarios.cli import voice
 from scenarios.closing.result import Result
 from tests.helpers.everything import fitting
 from tests.helpers.foreign import foreign_builder
@@ -24,6 +25,12 @@ settings.load_profile("same-draws")  # one tree, one result; `make test-all` dra
 
 DEMO = SHIPPED / "demo" / "rig-drag"
 Built = Callable[..., Path]
+
+
+@pytest.fixture(autouse=True)
+def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No lines of progress beside what a command says: whether there are any depends on the machine."""
+    monkeypatch.setattr(voice, "PATIENCE", 1e9)
 
 
 @pytest.fixture(scope="session", autouse=True)
