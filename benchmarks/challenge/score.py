@@ -65,7 +65,11 @@ def false_finds(marked: Sequence[Marked]) -> list[Row]:
         return []
     n = len(marked)
     return [
-        Row("false finds: an effect named where there is none", share(count(marked, "wrong"), n), "2 of 100"),
+        Row(
+            "false finds: an effect named where there is none",
+            share(count(marked, "wrong"), n),
+            "at most 2 of 100",
+        ),
         Row("unexplained where there is no effect", share(count(marked, "abstained"), n)),
     ]
 
@@ -85,7 +89,7 @@ def recognised(marked: Sequence[Marked]) -> list[Row]:
         text = share(count(clear, "right"), len(clear))
         alone = sum(judged(t, a) == "right" and a.verdict in CONFIDENT for t, a in clear)
         top = sum(bool(named(t, a.names[:1])[0]) for t, a in clear if a.names)
-        rows.append(Row("single effects right, SNR 1 and more", text, "92 %"))
+        rows.append(Row("single effects right, SNR 1 and more", text, "at least 92 %"))
         rows.append(Row("of these alone in the answer, not in a class", share(alone, len(clear))))
         rows.append(Row("of these first in the answer", share(top, len(clear))))
     if marked:
@@ -105,7 +109,7 @@ def strangers(marked: Sequence[Marked]) -> list[Row]:
     n = len(marked)
     quiet = sum(a.verdict in ("no_discrepancy", "insufficient_excitation") for _, a in marked)
     return [
-        Row("outside the vocabulary: definite wrong name", share(confident(marked), n), "1 of 30"),
+        Row("outside the vocabulary: definite wrong name", share(confident(marked), n), "at most 1 of 30"),
         Row("outside the vocabulary: nearly equivalent effect", share(count(marked, "part"), n)),
         Row("outside the vocabulary: unexplained", share(count(marked, "right"), n)),
         Row("outside the vocabulary: taken for noise", share(quiet, n)),
@@ -131,7 +135,7 @@ def sensors(marked: Sequence[Marked]) -> list[Row]:
         a.verdict == "sensor_fault" and t.items[0].location in {p for _, p in a.names} for t, a in marked
     )
     return [
-        Row("sensor faults recognised, at the right sensor", share(so, n), "18 of 20"),
+        Row("sensor faults recognised, at the right sensor", share(so, n), "at least 18 of 20"),
         Row("sensor faults right in kind and sensor, alone or in a class", share(count(marked, "right"), n)),
     ]
 
@@ -161,7 +165,7 @@ def gaps(marked: Sequence[Marked]) -> list[Row]:
     shares = [closed(a) for t, a in marked if t.group != "none" and a.names and t.largest_snr >= 1]
     found = [s for s in shares if isfinite(s)]
     return (
-        [Row("gap closed where an effect is named, median", f"{np.median(found):.1%}", "95 %")]
+        [Row("gap closed where an effect is named, median", f"{np.median(found):.1%}", "at least 95 %")]
         if found
         else []
     )
