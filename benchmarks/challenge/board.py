@@ -78,8 +78,8 @@ def section(board: Board, different: Sequence[str]) -> str:
     lines = [
         *_wrapped(
             f"Commit {board.commit}, seed {board.seed}, all {board.records} records, {board.date}. The seed "
-            "was drawn after the commit was frozen. Each record had one core, and two records ran at the same "
-            "time (`--jobs 2 --cores 1`). The intervals are exact 95 % confidence intervals of the rate "
+            "was drawn after the commit was frozen. Each record had one core, and two records ran at the "
+            "same time (`--jobs 2 --cores 1`). The intervals are exact 95 % confidence intervals of the rate "
             "(Clopper-Pearson). "
             f'"Before" is the whole set before it (seed {board.before_seed}, commit {board.before_commit}).'
         ),
