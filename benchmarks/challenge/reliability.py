@@ -39,8 +39,11 @@ class Bin:
 
 
 def stated(a: Answer) -> float | None:
-    """The probability that an answer states of itself; None if it states none."""
-    if not a.probability:
+    """The probability that an answer states of itself; None if it states none.
+
+    Where no answer of the library reaches a thousandth, none is listed, and none of these has all of it.
+    """
+    if not a.probability and a.verdict != "unexplained":
         return None
     if a.verdict in NAMING:
         names = {f"{kind}@{at}" for kind, at in a.names}

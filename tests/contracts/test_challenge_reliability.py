@@ -30,6 +30,7 @@ def answer(verdict: str, said: dict[str, float], *names: tuple[str, str]) -> Ans
         (answer("several", {"actuator_lag@T_P + viscous_damping@roller": 0.8}, DRAG, LAG), 0.8),
         (answer("no_discrepancy", {"no_discrepancy": 0.7}), 0.7),
         (answer("unexplained", {"viscous_damping@roller": 0.3}), 0.7),
+        (answer("unexplained", {}), 1.0),
         (answer("sensor_fault", {}), None),
     ],
 )
