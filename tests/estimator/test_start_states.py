@@ -1,12 +1,21 @@
 """The first guess of a measured start state, from the first samples of a record."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimator.closeloop.fitting.calibrate import calibrate
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import smooth_start
+from estimator.closeloop.screening.candidates import fault_candidates
+from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.carriage import problem, record, to_and_fro, viscous
 
 LIMITS = DEFAULT.start
 T = np.arange(LIMITS.samples) * 0.01
@@ -48,3 +57,20 @@ def test_few_samples_are_enough(n):
     value, scatter = smooth_start(T[:n], np.linspace(1.0, 2.0, n), LIMITS)
     assert value == pytest.approx(1.0)
     assert np.isfinite(scatter)
+
+
+@pytest.mark.parametrize("bias", [0.05, -0.3])  # m/s: 5 and 30 times the noise
+def test_the_sensor_of_a_start_state_may_be_wrong(tmp_path, bias):
+    """The state starts where the right equations want it, although its first samples say something else."""
+    truth = record(to_and_fro(), viscous(0.0), 3, speed=0.2)
+    [run] = truth.runs
+    biased = replace(truth, runs=(replace(run, y=run.y + [0.0, bias]),))
+    asked = replace(problem(ModelBuilder("drive", tmp_path), biased), free_states=("q", "q_dot"))
+    asked = replace(asked, declared={"M": 95.0, "F_v": 200.0})
+    _, base, noise = calibrate(asked)
+    [fault] = [c for c in fault_candidates(biased, noise.std) if c.label == "sensor_bias@q_dot"]
+    [found] = Fitter(Baseline(asked, base, noise)).finished([Promise((fault,), 0.0, base.fit.theta)])
+    fit = found.fit
+    assert fit.cost / len(fit.residual) == pytest.approx(1.0, abs=0.15)  # noise alone
+    for name, true in (("sensor_bias_q_dot", bias), ("q_dot", 0.2), ("q", 0.0)):
+        assert abs(found.theta[name] - true) < 4 * fit.std[name]
