@@ -14,7 +14,7 @@ from fmus.host.description import FmuDescription
 from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
 from fmus.host.instance import Array, CallFailed, Instance
-from fmus.host.rows import AT_ONCE, Inputs, Rows, base_of, offers_rows
+from fmus.host.rows import Inputs, Rows, base_of, offers_rows, rows_at_once
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,7 +157,7 @@ class Fmu:
     @property
     def at_once(self) -> int:
         """How many rows `simulate_rows` advances in the time of little more than one."""
-        return AT_ONCE if offers_rows(self._instance) else 1
+        return rows_at_once(self._instance)
 
     def simulate_rows(
         self,

@@ -1,7 +1,7 @@
 """Many rows of values through one step or a record in one call, of FMUs that offer it: railfmi's native ones.
 
 The call is no part of FMI. It gives what instances would give that are reset, set, initialised and stepped
-one after the other, and takes a third of the time, since it advances four rows at once.
+one after the other, and takes a third of the time or less, since it advances four or eight rows at once.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from fmus.host.description import FmuDescription
 from fmus.host.instance import Array, Instance
 
 NAME = "railfmi_rows"
-AT_ONCE = 4  # rows, in the time of little more than one
+FOUR = 4  # rows at once of an FMU that does not say how many
 ALIKE = 1e-12  # of a value, by which a row may differ from an instance alone: vectors round otherwise
 References = NDArray[np.uint32]
 
@@ -58,8 +58,8 @@ class Rows:
     def run(self, rows: Array, t: Array, found: Array, inputs: Inputs | None = None) -> int:
         """Fill `found` (k, N - 1 or N, n_get) from rows (k, n_put) at times t (N,), s; all C-contiguous.
 
-        With N results for each row the first is that before the first step. Returns -1, or a row of four of
-        which one cannot be set or advanced; then instances have to be asked why, and for the other rows.
+        With N results for each row the first is that before the first step. Returns -1, or a row of a group
+        of which one cannot be set or advanced; then instances have to be asked why, and for the other rows.
         """
         asked = self._asked
         asked.n_rows, asked.rows, asked.found = len(rows), _at(rows), _at(found)
@@ -85,6 +85,14 @@ class Rows:
 def offers_rows(instance: Instance) -> bool:
     """Whether the FMU's library has the call."""
     return isinstance(instance, Instance) and hasattr(instance.library, NAME)
+
+
+def rows_at_once(instance: Instance) -> int:
+    """Number of rows that take the time of little more than one; 1 if the FMU's library lacks the call."""
+    if not offers_rows(instance):
+        return 1
+    asked = getattr(instance.library, f"{NAME}_at_once", None)
+    return int(asked()) if asked else FOUR
 
 
 def base_of(description: FmuDescription, start: Mapping[str, float]) -> Array:

@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fmus.export.builders.native.lanes import BINARY, CALLED, ONE_BY_ONE, UNARY, lanes_of
+from fmus.export.builders.native import code as source_code
+from fmus.export.builders.native import lanes
+from fmus.export.builders.native.lanes import BINARY, CALLED, ONE_BY_ONE, UNARY, lanes_of, widest
 from fmus.export.builders.native.working import build_working
 from fmus.host.fmu import Fmu, FmuError
 from fmus.model import Model
@@ -48,9 +50,20 @@ class Operations(Model):
         return found
 
 
-@pytest.fixture(scope="module")
-def operations(tmp_path_factory):
-    with Fmu(build_working(Operations(), tmp_path_factory.mktemp("operations") / "model.fmu")) as fmu:
+WIDTHS = sorted({4, widest()})
+
+
+def in_lanes(model, width, folder):
+    """The working FMU of a model with so many lanes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(source_code, "widest", lambda: width)
+        return build_working(model, folder / f"{width}.fmu")
+
+
+@pytest.fixture(scope="module", params=WIDTHS)
+def operations(request, tmp_path_factory):
+    with Fmu(in_lanes(Operations(), request.param, tmp_path_factory.mktemp("operations"))) as fmu:
+        assert fmu.at_once == request.param
         yield fmu
 
 
@@ -78,6 +91,32 @@ def test_rows_are_simulated_as_instances_are(name):
                 assert off[:, :2].max() <= ALIKE
                 assert off.max() <= ALONG
                 assert k == 1 or np.ptp(found[:, -1], axis=0).max() > 0
+
+
+@pytest.mark.skipif(len(WIDTHS) == 1, reason="this processor has four lanes only")
+@pytest.mark.parametrize("name", MODELS)
+def test_a_row_is_the_same_however_many_are_advanced_at_once(name, tmp_path):
+    model = MODELS[name]()
+    t, inputs, starts = record(model, 7, 11)
+    found = []
+    for width in WIDTHS:
+        with Fmu(in_lanes(model, width, tmp_path)) as fmu:
+            found.append(fmu.simulate_rows(t, inputs, fmu.description.outputs, starts))
+    assert_array_equal(*found)
+
+
+def test_a_machine_without_wide_registers_has_four_lanes(tmp_path, monkeypatch):
+    flags = tmp_path / "cpuinfo"
+    monkeypatch.setattr(lanes, "CPU", flags)
+    for said, width in (
+        ("flags\t\t: fpu avx2 avx512f avx512dq avx512vl\n", 8),
+        ("flags\t\t: fpu avx2 avx512f\n", 4),
+        ("Features\t: fp asimd\n", 4),
+    ):
+        flags.write_text(f"processor\t: 0\n{said}")
+        assert lanes.widest.__wrapped__() == width
+    flags.unlink()
+    assert lanes.widest.__wrapped__() == 4
 
 
 def test_a_row_out_of_its_bounds_is_left_to_an_instance_that_says_why():

@@ -9,7 +9,7 @@ import fmpy
 from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.builders.native.dependencies import stacked
-from fmus.export.builders.native.lanes import lanes_of
+from fmus.export.builders.native.lanes import lanes_of, widest
 from fmus.export.builders.native.table import Table
 from fmus.model import Equations
 from fmus.variables import Expr
@@ -47,6 +47,7 @@ def sources(table: Table, made: Equations, fmi: int, token: str, working: bool =
     if working:
         wrapper["derivatives.c"] = (HERE / "sources" / "no_derivatives.c").read_text(encoding="utf-8")
         wrapper["lanes_object.c"] = (HERE / "sources" / "lanes_object.c").read_text(encoding="utf-8")
+        wrapper["lanes.h"] = f"#define WIDTH {widest()}\n{wrapper['lanes.h']}"
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
     lanes = lanes_of((made.f, made.h, made.step))

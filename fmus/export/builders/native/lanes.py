@@ -1,10 +1,12 @@
-"""CasADi functions as C code that evaluates four sets of numbers at once, in the lanes of vector registers.
+"""CasADi functions as C code that evaluates several sets of numbers at once, in lanes of vector registers.
 
-Each scalar of a function becomes a vector of four doubles, each operation one of vectors: the same operations
-in the same order as in CasADi's own code, so that a lane gives the same values.
+Each scalar of a function becomes a vector of four or eight doubles, each operation one of vectors: the same
+operations in the same order as in CasADi's own code, so that a lane gives the same values.
 """
 
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import casadi as cs
@@ -65,6 +67,21 @@ ONE_BY_ONE = {  # functions of C's library, lane after lane
 }
 
 
+CPU = Path("/proc/cpuinfo")
+EIGHT = {"avx512f", "avx512dq", "avx512vl"}  # what a processor must have for eight lanes
+
+
+@cache
+def widest() -> int:
+    """Number of lanes for this machine: 8 where Linux says that its processors have AVX-512, else 4."""
+    try:
+        lines = CPU.read_text(encoding="utf-8").splitlines()
+        flags = next(line for line in lines if line.startswith("flags"))
+    except (OSError, StopIteration):
+        return 4
+    return 8 if set(flags.split()) >= EIGHT else 4
+
+
 class Lanes(NamedTuple):
     """C code of functions, and of what they call, which is the same for many models and may be nothing."""
 
@@ -119,7 +136,7 @@ class _InLanes(Printer):
     def constant(self, value: float) -> str:
         """A number."""
         text = number(value, "NAN", "HUGE_VAL")
-        return f"(Lanes){{{text}, {text}, {text}, {text}}}"
+        return f"ALL({text})"
 
     def called(self, name: str, given: Sequence[str], wanted: Sequence[str | None]) -> list[str]:
         """Lines that call a function with given scalars and assign those of its results that are wanted."""
@@ -131,12 +148,12 @@ class _InLanes(Printer):
     def switch(self, calls: Sequence[str], n_in: int, n_out: int) -> list[str]:
         """A choice of one of several functions by the first argument: one call if all lanes agree."""
         lines = [
-            f"int chosen[4], one = lanes_same_case(x, {len(calls) - 1}, chosen);",
+            f"int chosen[WIDTH], one = lanes_same_case(x, {len(calls) - 1}, chosen);",
             f"Lanes part[{n_out}];",
         ]
         lines += [f"if (one == {i}) {call}(x + 1, y);" for i, call in enumerate(calls)]
         lines.append(f"if (one < 0) for (int k = 0; k < {len(calls)}; k++) {{")
-        lines.append("if (k != chosen[0] && k != chosen[1] && k != chosen[2] && k != chosen[3]) continue;")
+        lines.append("if (!lanes_chose(chosen, k)) continue;")
         lines += [f"if (k == {i}) {call}(x + 1, part);" for i, call in enumerate(calls)]
         return [*lines, f"lanes_taken(part, y, {n_out}, chosen, k);", "}"]
 
@@ -161,5 +178,5 @@ class _InLanes(Printer):
             return f"{{ Lanes r; {CALLED[code]}({', '.join(f'&{name}' for name in of)}, &r); {to} = r; }}"
         if code in ONE_BY_ONE:
             given = ", ".join(f"({name})[i]" for name in of)
-            return f"{{ Lanes r; for (int i = 0; i < 4; i++) r[i] = {ONE_BY_ONE[code]}({given}); {to} = r; }}"
+            return f"{{ Lanes r; EACH(i) r[i] = {ONE_BY_ONE[code]}({given}); {to} = r; }}"
         raise NotImplementedError(f"operation {code} has no lanes")

@@ -1,8 +1,9 @@
-/* Rows of values through one step or a whole record, four at once; not a part of FMI, for hosts that know it.
+/* Rows of values through one step or a whole record, four or eight at once; not a part of FMI, for hosts that know it.
 
    Every row is advanced as one instance of its own would be: the same internal steps, divided the same way. */
 
 #if defined(__GNUC__) && HAS_LANES
+#include "lanes.h"
 
 /* Whether processor and system have the vectors that the code is for. */
 #if defined(__x86_64__)
@@ -12,7 +13,13 @@ static bool has_vectors(void) {
     unsigned a, b, c, d, low, high;
     if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX)) return false;
     __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
-    return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & bit_AVX2);
+    if ((low & 6) != 6 || !__get_cpuid_count(7, 0, &a, &b, &c, &d)) return false;
+#if WIDTH == 8
+    unsigned needed = bit_AVX512F | bit_AVX512DQ | bit_AVX512VL;
+    return (low & 0xe6) == 0xe6 && (b & needed) == needed;
+#else
+    return b & bit_AVX2;
+#endif
 }
 #else
 static bool has_vectors(void) { return true; }
@@ -44,7 +51,6 @@ enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
 #else
 #define CALLED VECTORS static __attribute__((noinline)) void
 #endif
-#include "lanes.h"
 #ifndef FOR_THIS_MACHINE
 #include "lanes_called.c"
 #endif
@@ -52,22 +58,26 @@ enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
 #include "lanes_rows.c"
 
 #if defined(FMI2_OVERRIDE_FUNCTION_PREFIX) || defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
-#define ROWS railfmi_rows
+#define LANES_NAMED(name) name
 #elif FMI_VERSION == 2
-#define ROWS LANES_PREFIXED(FMI2_FUNCTION_PREFIX, railfmi_rows)
+#define LANES_NAMED(name) LANES_PREFIXED(FMI2_FUNCTION_PREFIX, name)
 #else
-#define ROWS LANES_PREFIXED(FMI3_FUNCTION_PREFIX, railfmi_rows)
+#define LANES_NAMED(name) LANES_PREFIXED(FMI3_FUNCTION_PREFIX, name)
 #endif
 #define LANES_JOINED(prefix, name) prefix##name
 #define LANES_PREFIXED(prefix, name) LANES_JOINED(prefix, name)
 
-/* -1, or the first row that cannot be set or advanced; an instance of its own tells why. */
 #if FMI_VERSION == 2
-FMI2_Export
+#define LANES_EXPORTED FMI2_Export
 #else
-FMI3_Export
+#define LANES_EXPORTED FMI3_Export
 #endif
-long long ROWS(Rows *asked) {
+
+/* Number of rows that take the time of little more than one. */
+LANES_EXPORTED int LANES_NAMED(railfmi_rows_at_once)(void) { return WIDTH; }
+
+/* -1, or the first row that cannot be set or advanced; an instance of its own tells why. */
+LANES_EXPORTED long long LANES_NAMED(railfmi_rows)(Rows *asked) {
     if (!asked->processor) asked->processor = has_vectors() ? WITH_VECTORS : WITHOUT_VECTORS;
     if (asked->processor == WITHOUT_VECTORS) return 0;
     if (asked->n_base != N_SET || asked->n_samples == 0) return 0;
@@ -83,7 +93,7 @@ long long ROWS(Rows *asked) {
         for (size_t k = 0; k < asked->n_put; k++)
             if (!within(asked->put[k], asked->rows[i * asked->n_put + k])) return (long long)i;
     long long failed = -1;
-    for (size_t row = 0; row < asked->n_rows && failed < 0; row += 4) failed = four_rows(asked, row);
+    for (size_t row = 0; row < asked->n_rows && failed < 0; row += WIDTH) failed = group_of_rows(asked, row);
     return failed;
 }
 

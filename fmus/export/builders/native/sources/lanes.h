@@ -1,20 +1,33 @@
-/* Four doubles at once: operations of the equations that C has no sign for. */
+/* Four or eight doubles at once: operations of the equations that C has no sign for.
 
-typedef double Lanes __attribute__((vector_size(32)));
-typedef long long Bits __attribute__((vector_size(32)));
+   WIDTH: how many. Eight are for processors whose registers hold eight (AVX-512), see lanes.c. */
+
+#ifndef WIDTH
+#define WIDTH 4
+#endif
+typedef double Lanes __attribute__((vector_size(8 * WIDTH)));
+typedef long long Bits __attribute__((vector_size(8 * WIDTH)));
+typedef double Four __attribute__((vector_size(32)));
 
 static inline double sign_of(double x) { return x < 0 ? -1.0 : x > 0 ? 1.0 : x; }
 
-#define ALL(number) ((Lanes){number, number, number, number})
-#define ALL_BITS(number) ((Bits){number, number, number, number})
+#if WIDTH == 8
+#define REPEATED(number) {number, number, number, number, number, number, number, number}
+#else
+#define REPEATED(number) {number, number, number, number}
+#endif
+#define ALL(number) ((Lanes)REPEATED(number))
+#define ALL_BITS(number) ((Bits)REPEATED(number))
 #define WHERE(condition, a) ((Lanes)((Bits)(condition) & (Bits)(a)))
 #define TRUTH(condition) WHERE(condition, ALL(1.0))
 #define CHOICE(condition, a, b) ((Lanes)(((Bits)(condition) & (Bits)(a)) | (~(Bits)(condition) & (Bits)(b))))
 #define MAGNITUDE(a) ((Lanes)((Bits)(a) & ALL_BITS(0x7fffffffffffffffLL)))
 #define SIGN_BITS ALL(-0.0)
-#define EACH(i) for (int i = 0; i < 4; i++)
+#define EACH(i) for (int i = 0; i < WIDTH; i++)
 #define ROUNDING 6755399441055744.0 /* 1.5 times 2 to the 52nd: what is added to it loses its fraction */
-#if defined(__x86_64__)
+#if defined(__x86_64__) && WIDTH == 8
+#define VECTORS __attribute__((target("avx512f,avx512dq,avx512vl")))
+#elif defined(__x86_64__)
 #define VECTORS __attribute__((target("avx2")))
 #else
 #define VECTORS
@@ -52,7 +65,9 @@ ONLY lanes_floor(const Lanes *a, Lanes *y) {
 /* Whether all lanes of a condition hold. */
 VECTORS static inline __attribute__((always_inline)) bool lanes_everywhere(const Bits *condition) {
     const Bits c = *condition;
-    return (c[0] & c[1] & c[2] & c[3]) != 0;
+    long long all = -1;
+    EACH(i) all &= c[i];
+    return all != 0;
 }
 
 /* e to the x: 2 to a whole number times the Taylor series of what is left, up to 0.35. */
@@ -159,7 +174,7 @@ ONLY lanes_pow(const Lanes *a, const Lanes *b, Lanes *y) {
 
 /* n elements of a table one after the other, from a place on that differs from lane to lane. */
 ONLY lanes_rows(const double *table, long long size, const Lanes *number, int n, Lanes *y) {
-    const double *row[4];
+    const double *row[WIDTH];
     Lanes at = *number;
     bool inside = true;
     EACH(i) inside = inside && at[i] >= 0 && at[i] + n <= (double)size;
@@ -170,21 +185,23 @@ ONLY lanes_rows(const double *table, long long size, const Lanes *number, int n,
     EACH(i) row[i] = table + (long long)at[i];
     int k = 0;
 #if defined(__clang__) || __GNUC__ >= 12
-    for (; k + 4 <= n; k += 4) { /* four by four, turned from rows to lanes */
-        Lanes a, b, c, d;
-        memcpy(&a, row[0] + k, sizeof a);
-        memcpy(&b, row[1] + k, sizeof b);
-        memcpy(&c, row[2] + k, sizeof c);
-        memcpy(&d, row[3] + k, sizeof d);
-        Lanes ab = __builtin_shufflevector(a, b, 0, 4, 2, 6), cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
-        Lanes ab1 = __builtin_shufflevector(a, b, 1, 5, 3, 7), cd1 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-        y[k] = __builtin_shufflevector(ab, cd, 0, 1, 4, 5);
-        y[k + 1] = __builtin_shufflevector(ab1, cd1, 0, 1, 4, 5);
-        y[k + 2] = __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
-        y[k + 3] = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
-    }
+    for (; k + 4 <= n; k += 4) /* four by four, turned from rows to lanes */
+        for (int i = 0; i < WIDTH; i += 4) {
+            Four a, b, c, d, turned[4];
+            memcpy(&a, row[i] + k, sizeof a);
+            memcpy(&b, row[i + 1] + k, sizeof b);
+            memcpy(&c, row[i + 2] + k, sizeof c);
+            memcpy(&d, row[i + 3] + k, sizeof d);
+            Four ab = __builtin_shufflevector(a, b, 0, 4, 2, 6), cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+            Four ab1 = __builtin_shufflevector(a, b, 1, 5, 3, 7), cd1 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+            turned[0] = __builtin_shufflevector(ab, cd, 0, 1, 4, 5);
+            turned[1] = __builtin_shufflevector(ab1, cd1, 0, 1, 4, 5);
+            turned[2] = __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+            turned[3] = __builtin_shufflevector(ab1, cd1, 2, 3, 6, 7);
+            for (int j = 0; j < 4; j++) memcpy((double *)&y[k + j] + i, &turned[j], sizeof turned[j]);
+        }
 #endif
-    for (; k < n; k++) y[k] = (Lanes){row[0][k], row[1][k], row[2][k], row[3][k]};
+    for (; k < n; k++) EACH(i) y[k][i] = row[i][k];
 }
 
 /* The case of each lane, as C's switch takes it, and the one of all lanes, or -1 where they differ. */
@@ -196,6 +213,13 @@ VECTORS static inline __attribute__((unused)) int lanes_same_case(const Lanes *n
         same = same && chosen[i] == chosen[0];
     }
     return same ? chosen[0] : -1;
+}
+
+/* Whether a lane has chosen a case. */
+static inline __attribute__((unused)) bool lanes_chose(const int *chosen, int k) {
+    bool found = false;
+    EACH(i) found = found || chosen[i] == k;
+    return found;
 }
 
 /* Results of one case for the lanes that chose it. */

@@ -1,4 +1,4 @@
-/* What the equations call, for four rows at once, as a unit of its own: it is the same for many models. */
+/* What the equations call, for several rows at once, as a unit of its own: it is the same for many models. */
 
 #include <math.h>
 #include <stdbool.h>

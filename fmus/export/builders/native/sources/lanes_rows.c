@@ -1,32 +1,36 @@
-/* Four rows through the samples. */
+/* As many rows as there are lanes through the samples. */
 
 typedef struct {
     Lanes values[N_SET], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
-} Four;
+} Group;
 
 /* The arguments of the equations one after the other: states, inputs and parameters are so already. */
-VECTORS static bool advance_four(Four *m, double duration, int active) {
+VECTORS static bool advance_group(Group *m, double duration, int active) {
     Lanes given[N_SET + 1], next[N_STATES + 1];
-    double done[4] = {0}, h_now[4];
-    bool moving[4];
+    double done[WIDTH] = {0}, h_now[WIDTH];
+    bool moving[WIDTH];
     double whole = duration / number_of_parts(duration * (1 - TIME_TOLERANCE), LONGEST_STEP);
     EACH(i) {
         h_now[i] = whole;
         moving[i] = i < active;
     }
-    while (moving[0] || moving[1] || moving[2] || moving[3]) {
+    for (bool any = active > 0; any;) {
+        any = false;
         Lanes h = ALL(whole);
         EACH(i) if (moving[i]) h[i] = h_now[i] = least(least(h_now[i], LONGEST_STEP), duration - done[i]);
         memcpy(given, m->values, sizeof m->values);
         given[N_SET] = h;
         lanes_step(given, next);
+        Lanes sum = next[N_STATES];
+        for (int k = 0; k < N_STATES; k++) sum = sum + next[k] * 0.0; /* not a number where a state is not finite */
+        Bits good = (Bits)(sum <= 1.0), going = ALL_BITS(0);
+        EACH(i) going[i] = moving[i] ? -1 : 0;
+        Bits taken = good & going;
+        for (int k = 0; k < N_STATES; k++) m->values[k] = CHOICE(taken, next[k], m->values[k]);
         EACH(i) {
             if (!moving[i]) continue;
             double error = next[N_STATES][i];
-            bool finite = error <= 1.0;
-            for (int k = 0; k < N_STATES; k++) finite = finite && isfinite(next[k][i]);
-            if (finite) {
-                for (int k = 0; k < N_STATES; k++) m->values[k][i] = next[k][i];
+            if (good[i]) {
                 done[i] += h_now[i];
                 moving[i] = duration - done[i] > TIME_TOLERANCE * duration;
                 if (moving[i] && error > 0) h_now[i] *= least(GROWTH, SAFETY * pow(error, -1.0 / ORDER));
@@ -35,12 +39,13 @@ VECTORS static bool advance_four(Four *m, double duration, int active) {
                 h_now[i] *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;
                 if (h_now[i] < SHORTEST * duration) return false;
             }
+            any = any || moving[i];
         }
     }
     return true;
 }
 
-VECTORS static void read_four(Four *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
+VECTORS static void read_group(Group *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
     bool outputs = false, slopes = false;
     for (size_t k = 0; k < asked->n_get; k++) {
         outputs = outputs || (asked->get[k] >= N_SET && asked->get[k] < FIRST_LOCAL);
@@ -58,7 +63,7 @@ VECTORS static void read_four(Four *m, const Rows *asked, size_t row, size_t sam
     }
 }
 
-VECTORS static bool set_inputs(Four *m, const Rows *asked, const double *samples, size_t k) {
+VECTORS static bool set_inputs(Group *m, const Rows *asked, const double *samples, size_t k) {
     for (size_t j = 0; j < asked->n_inputs; j++) {
         double x = samples[k * asked->n_inputs + j];
         if (!within(asked->inputs[j], x)) return false;
@@ -67,10 +72,10 @@ VECTORS static bool set_inputs(Four *m, const Rows *asked, const double *samples
     return true;
 }
 
-/* -1, or the first of the four rows from this one on, if one of them cannot be advanced. */
-VECTORS static long long four_rows(const Rows *asked, size_t row) {
-    Four m;
-    int active = asked->n_rows - row < 4 ? (int)(asked->n_rows - row) : 4;
+/* -1, or the first of the rows from this one on, if one of them cannot be advanced. */
+VECTORS static long long group_of_rows(const Rows *asked, size_t row) {
+    Group m;
+    int active = asked->n_rows - row < WIDTH ? (int)(asked->n_rows - row) : WIDTH;
     size_t first = asked->first ? 1 : 0, n_found = asked->n_samples - 1 + first;
     for (int k = 0; k < N_SET; k++) m.values[k] = ALL(asked->base[k]);
     for (size_t k = 0; k < asked->n_put; k++)
@@ -78,12 +83,12 @@ VECTORS static long long four_rows(const Rows *asked, size_t row) {
             size_t from = row + (size_t)(i < active ? i : 0); /* lanes without a row do as the first one */
             m.values[asked->put[k]][i] = asked->rows[from * asked->n_put + k];
         }
-    if (first) read_four(&m, asked, row, 0, n_found, active);
+    if (first) read_group(&m, asked, row, 0, n_found, active);
     for (size_t k = 0; k + 1 < asked->n_samples; k++) {
         if (!set_inputs(&m, asked, asked->during, k)) return (long long)row;
-        if (!advance_four(&m, asked->t[k + 1] - asked->t[k], active)) return (long long)row;
+        if (!advance_group(&m, asked->t[k + 1] - asked->t[k], active)) return (long long)row;
         if (asked->after && !set_inputs(&m, asked, asked->after, k)) return (long long)row;
-        read_four(&m, asked, row, k + first, n_found, active);
+        read_group(&m, asked, row, k + first, n_found, active);
     }
     return -1;
 }
