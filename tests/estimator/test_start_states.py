@@ -64,7 +64,7 @@ def test_the_sensor_of_a_start_state_may_be_wrong(tmp_path, bias):
     """The state starts where the right equations want it, although its first samples say something else."""
     truth = record(to_and_fro(), viscous(0.0), 3, speed=0.2)
     [run] = truth.runs
-    biased = replace(truth, runs=(replace(run, y=run.y + [0.0, bias]),))
+    biased = replace(truth, runs=(replace(run, y=run.y + np.array([0.0, bias])),))
     asked = replace(problem(ModelBuilder("drive", tmp_path), biased), free_states=("q", "q_dot"))
     asked = replace(asked, declared={"M": 95.0, "F_v": 200.0})
     _, base, noise = calibrate(asked)

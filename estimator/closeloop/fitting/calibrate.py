@@ -70,8 +70,8 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
 def _start_unknowns(problem: Problem) -> list[Unknown]:
     """The free start states whose error would be visible in the residual, as unknowns without bounds.
 
-    A first guess by a sensor is where the fit begins. It is no limit: the residual holds the same samples, and
-    the sensor may be the one that is wrong.
+    A first guess by a sensor is where the fit begins. It is no limit: the residual holds the same samples,
+    and the sensor may be the one that is wrong.
     """
     guess = problem.start_states(problem.record.runs[0])
     if not guess:

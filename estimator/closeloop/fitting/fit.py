@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -56,6 +56,12 @@ def several_weighted(
     if found is None:
         return [_alone(problem, theta, weighting) for theta in thetas]
     return [_limited(problem, found.pop(0), weighting) for _ in thetas]
+
+
+def in_turn(problem: Problem, thetas: Sequence[Mapping[str, float]], weighting: Weighting) -> Iterator[Array]:
+    """As `several_weighted` for any number of unknowns, as many at once as the FMU takes."""
+    for first in range(0, len(thetas), problem.at_once):
+        yield from several_weighted(problem, thetas[first : first + problem.at_once], weighting)
 
 
 def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.fitting.fit import fit, weighted
+from estimator.closeloop.fitting.fit import fit, in_turn
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.refined import lower, refined
@@ -152,12 +152,12 @@ def _when(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> t
     others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
     here = built(problem, h.candidates)
 
-    def squares(t: float) -> float:
-        r = weighted(here, {**h.theta, name: t}, weighting)
-        return float(np.sum((r - others @ (others.T @ r)) ** 2))
-
     tried = np.array([t for t in (*onsets_near(now, length), *onsets_beside(now, length)) if t != now])
-    rises = (np.array([squares(t) for t in tried]) - squares(now)) / _usual(h, i)
+    asked = [{**h.theta, name: t} for t in (now, *tried.tolist())]
+    squares = np.array(
+        [float(np.sum((r - others @ (others.T @ r)) ** 2)) for r in in_turn(here, asked, weighting)]
+    )
+    rises = (squares[1:] - squares[0]) / _usual(h, i)
     if rises.min() < -DEEPER:
         return 0.0, {name: float(tried[np.argmin(rises)])}
     return max(_reach(np.abs(tried - now)[side], rises[side]) for side in (tried > now, tried < now)), {}

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimator.closeloop.fitting.fit import several_weighted
+from estimator.closeloop.fitting.fit import in_turn
 from estimator.closeloop.hypotheses.fitted import sandwich, stacked
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem, Unknown
@@ -26,23 +26,25 @@ def within_error(built: Problem, h: Hypothesis, weighting: Weighting) -> Hypothe
     built: the problem with the effects of the hypothesis. An onset time keeps its slope, because a model
     realises an onset only at its own time steps.
     """
-    slopes = [
-        column if u.is_onset else _slope(built, h, u, column, weighting)
-        for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True)
-    ]
+    moved = [(u, column) for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True) if not u.is_onset]
+    ends = [_ends(u, h.theta[u.name], column) for u, column in moved]
+    asked = [{**h.theta, u.name: x} for (u, _), pair in zip(moved, ends, strict=True) for x in pair]
+    there = in_turn(built, asked, weighting)
+    found = {
+        u.name: set_aside((next(there) - below) / (high - low))
+        for (u, _), (low, high), below in zip(moved, ends, there, strict=False)
+    }
+    slopes = [found.get(u.name, column) for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True)]
     scale = np.array([u.scale for u in h.fit.unknowns])
     width = np.array([u.high - u.low for u in h.fit.unknowns])
     covariance = sandwich(h.fit.residual, stacked(slopes), scale, width)
     return replace(h, fit=replace(h.fit, slopes=tuple(slopes), covariance=covariance))
 
 
-def _slope(built: Problem, h: Hypothesis, u: Unknown, column: Array, weighting: Weighting) -> Array:
-    """Derivative (m,) of the weighted residual with respect to u, over one standard error to both sides.
+def _ends(u: Unknown, now: float, column: Array) -> tuple[float, float]:
+    """The values of u one standard error below and above `now`, or its bounds.
 
     column: a derivative (m,) that gives the size of that error; it is at most a scale of the unknown.
     """
-    now = h.theta[u.name]
     error = 1 / max(float(np.linalg.norm(column)), 1 / u.scale)
-    low, high = max(now - error, u.low), min(now + error, u.high)
-    below, above = several_weighted(built, [{**h.theta, u.name: x} for x in (low, high)], weighting)
-    return set_aside((above - below) / (high - low))
+    return max(now - error, u.low), min(now + error, u.high)

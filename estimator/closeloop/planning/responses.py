@@ -107,7 +107,7 @@ def responses(
     [y] = problem.simulate(theta)
     size = _sizes(problem, y)
     weighting = Weighting.white(size)
-    slopes = tuple(_slope(problem, theta, u, y, size) for u in unknowns)
+    slopes = _slopes(problem, theta, unknowns, y, size)
     values = np.array([theta.get(u.name, u.start) for u in unknowns])
     base = Fit(tuple(unknowns), values, np.eye(len(unknowns)), np.zeros(y.size), slopes)
     screening = Screening(problem, base, weighting)
@@ -161,13 +161,29 @@ def _sizes(problem: Problem, y: Array) -> Array:
     return np.asarray(np.where(rms > 0, rms, nominal))
 
 
-def _slope(problem: Problem, theta: Mapping[str, float], u: Unknown, y: Array, size: Array) -> Array:
-    """Derivative (N n_y,) of the weighted residual with respect to an unknown, per scale."""
-    h = STEP * u.scale
-    now = theta.get(u.name, problem.start(theta).get(u.name, u.start))
-    [aside] = problem.simulate({**theta, u.name: now + h if now + h <= u.high else now - h})
-    sign = 1.0 if now + h <= u.high else -1.0
-    return np.asarray((-sign * (aside - y) / size / STEP).ravel())
+def _slopes(
+    problem: Problem, theta: Mapping[str, float], unknowns: Sequence[Unknown], y: Array, size: Array
+) -> tuple[Array, ...]:
+    """Derivatives (N n_y,) of the weighted residual with respect to each unknown, per scale."""
+    start = problem.start(theta)
+    values = [theta.get(u.name, start.get(u.name, u.start)) for u in unknowns]
+    steps = [
+        STEP * u.scale if now + STEP * u.scale <= u.high else -STEP * u.scale
+        for u, now in zip(unknowns, values, strict=True)
+    ]
+    moved = zip(unknowns, values, steps, strict=True)
+    shown = problem.simulate_several([_all(theta, unknowns, values) | {u.name: x + h} for u, x, h in moved])
+    return tuple(
+        np.asarray((-np.sign(h) * (aside - y) / size / STEP).ravel())
+        for h, [aside] in zip(steps, shown, strict=True)
+    )
+
+
+def _all(
+    theta: Mapping[str, float], unknowns: Sequence[Unknown], values: Sequence[float]
+) -> dict[str, float]:
+    """Values of theta and of all unknowns, as simulations at once need the same names."""
+    return {**dict(zip((u.name for u in unknowns), values, strict=True)), **theta}
 
 
 def _moved(c: Candidate) -> list[Candidate]:

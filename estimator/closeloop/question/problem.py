@@ -114,18 +114,24 @@ class Problem:
         """Simulate each run of the record: the outputs, then the variables `more`, (N, n_y + n_more) each."""
         return [self._run(run, theta, more) for run in self.record.runs]
 
+    def simulate_several(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
+        """As `simulate` for each of several unknowns with the same names, some of them simulated at once."""
+        for first in range(0, len(thetas), self.at_once):
+            some = thetas[first : first + self.at_once]
+            by_run = [self._rows(run, some) for run in self.record.runs]
+            for i, theta in enumerate(some):
+                found = [rows[i] for rows in by_run if rows is not None]
+                yield found if len(found) == len(by_run) else self.simulate(theta)
+
     def residuals(self, theta: Mapping[str, float]) -> list[Array]:
         """Measured minus simulated outputs of each run, (N, n_y)."""
         return [set_aside(self._residual(run, theta)) for run in self.record.runs]
 
     def several_residuals(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
         """As `residuals` for each of several unknowns with the same names, some of them simulated at once."""
-        for first in range(0, len(thetas), self.at_once):
-            some = thetas[first : first + self.at_once]
-            by_run = [self._rows(run, some) for run in self.record.runs]
-            for i, theta in enumerate(some):
-                found = [set_aside(rows[i]) for rows in by_run if rows is not None]
-                yield found if len(found) == len(by_run) else self.residuals(theta)
+        for simulated in self.simulate_several(thetas):
+            runs = zip(self.record.runs, simulated, strict=True)
+            yield [set_aside(_missed(run, y)) for run, y in runs]
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the part to identify, (m, n_y)."""
@@ -138,8 +144,8 @@ class Problem:
             rows = self._rows(run, thetas)
             if rows is None:
                 return None
-            for parts, residual in zip(found, rows, strict=True):
-                parts.append(residual[run.fit])
+            for parts, y in zip(found, rows, strict=True):
+                parts.append(_missed(run, y)[run.fit])
         return [np.concatenate(parts) for parts in found]
 
     @cached_property
@@ -184,12 +190,11 @@ class Problem:
         return _missed(run, self._run(run, theta, ()))
 
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
-        """Measured minus simulated outputs of a run for each of several unknowns; None if not all at once."""
+        """Simulated outputs of a run for each of several unknowns; None if not all at once."""
         rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas], self.finer)
         if rows is None:
             return None
-        outputs = self.record.outputs
-        return [_missed(run, faulty(y, run.t, outputs, theta)) for y, theta in zip(rows, thetas, strict=True)]
+        return [faulty(y, run.t, self.record.outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
 
     def _start(self, run: Run, theta: Mapping[str, float]) -> dict[str, float]:
         """Start values of the FMU for a run; free states of a run that is not fitted are guessed from it."""
