@@ -1,4 +1,4 @@
-"""`railfmi check`: grade an FMU."""
+"""`railfmi check`: try an FMU out, and say what it is fit for."""
 
 from pathlib import Path
 from typing import Annotated
