@@ -1,6 +1,6 @@
 """The report of close-loop: one self-contained page, with each figure also as a file."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -123,7 +123,7 @@ def _rejection(case: Case) -> Values:
         "chance": chance_words(case.found, case.diagnostics) if case.diagnostics else "",
         "black_box": case.diagnostics.black_box if case.diagnostics else None,
         "power": power_rows(case),
-        "tried": [(at, ", ".join(map(effect_words, kinds))) for at, kinds in tried(case.problem).items()],
+        "tried": [(", ".join(at), ", ".join(map(effect_words, k))) for k, at in _alike(tried(case.problem))],
         "faults": ", ".join(map(effect_words, FAULTS)),
         "known_noise": not any(c["noise"].endswith("(estimated)") for c in sections.channels(case)),
     }
@@ -148,6 +148,14 @@ def _use(case: Case, folder: Path) -> Values:
         "took": _took(case.result.wall_seconds),
         "version": version("railfmi"),
     }
+
+
+def _alike(tried: Mapping[str, Sequence[str]]) -> list[tuple[tuple[str, ...], list[str]]]:
+    """Kinds of effects with the locations at which just these were tried."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for at, kinds in tried.items():
+        found.setdefault(tuple(kinds), []).append(at)
+    return list(found.items())
 
 
 def _times(t: Array) -> str:

@@ -18,7 +18,7 @@ from estimator.sensor_faults import FAULTS
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from scenarios.closing.closing import Posed, experiment_of
-from scenarios.drawing.sheet import BEFORE, INK, Plot, envelope, legend, name_axes, sheet, sheets
+from scenarios.drawing.sheet import BEFORE, CLOUD, Plot, envelope, legend, name_axes, sheet, sheets
 from scenarios.drawing.typography import unit
 from scenarios.experiment.conversions import conversion_lines
 from scenarios.output import writable, written_at_once
@@ -72,7 +72,7 @@ class Trial(Shown):
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """The first output, measured and simulated, over the whole record."""
         drawn, run = axes_or_new(ax), self.problem.record.runs[0]
-        drawn.plot(*envelope(run.t, run.y[:, 0]), color=INK, label="measured")
+        drawn.plot(*envelope(run.t, run.y[:, 0]), color=CLOUD, linewidth=2.4, label="measured")
         drawn.plot(*envelope(run.t, self.simulated[:, 0]), color=BEFORE, label="simulated")
         drawn.set(xlabel="time in s", ylabel=self.problem.record.outputs[0])
         drawn.legend()
@@ -169,7 +169,7 @@ def _drawn(problem: Problem, simulated: Array) -> Iterator[Plot]:
         figure, axes = sheet(0.6 + 1.6 * len(some), [[name] for _, name in some], sharex=True)
         for j, name in some:
             ax = axes[name]
-            ax.plot(*envelope(run.t[head], run.y[head, j]), color=INK, linewidth=0.9, label="measured")
+            ax.plot(*envelope(run.t[head], run.y[head, j]), color=CLOUD, linewidth=2.4, label="measured")
             drawn = envelope(run.t[head], simulated[head, j])
             ax.plot(*drawn, color=BEFORE, linewidth=1.1, label="simulated with the declared values")
             name_axes(ax, "", unit(units.get(name)) or "1", name)

@@ -109,17 +109,17 @@ def draw_residual(ax: Axes, record: Record, shown: Series, j: int, noise: float)
 def _leave_out_single_samples(ax: Axes, values: Array) -> None:
     """Cut an axis where a few samples (n,) would squeeze all others together, and say how far they reach."""
     values = values[np.isfinite(values)]
-    low, high = np.quantile(values, [FEW, 1 - FEW])
-    for end, beyond, cut in (
-        (float(values.min()), low - values.min(), {"bottom": low - MARGIN * (high - low)}),
-        (float(values.max()), values.max() - high, {"top": high + MARGIN * (high - low)}),
-    ):
-        if beyond > FAR * (high - low):
-            ax.set_ylim(**cut)
-            place = {"y": 0.03, "va": "bottom"} if "bottom" in cut else {"y": 0.97, "va": "top"}
+    least, low, high, most = (float(v) for v in np.quantile(values, [0.0, FEW, 1 - FEW, 1.0]))
+    below, above = low - least > FAR * (high - low), most - high > FAR * (high - low)
+    if not (below or above):
+        return
+    margin = MARGIN * (high - low)
+    ax.set_ylim((low if below else least) - margin, (high if above else most) + margin)
+    for cut, end, y, edge in ((below, least, 0.03, "bottom"), (above, most, 0.97, "top")):
+        if cut:
             ax.text(
-                0.99, s=f"single samples reach {end:.2g}", ha="right", transform=ax.transAxes,
-                fontsize=7, color=NOISE, **place,
+                0.99, y, f"single samples reach {end:.2g}", ha="right", va=edge, transform=ax.transAxes,
+                fontsize=7, color=NOISE,
             )  # fmt: skip
 
 
