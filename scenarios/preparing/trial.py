@@ -22,6 +22,7 @@ from scenarios.drawing.sheet import BEFORE, CLOUD, Plot, envelope, legend, name_
 from scenarios.drawing.typography import unit
 from scenarios.experiment.conversions import conversion_lines
 from scenarios.output import writable, written_at_once
+from scenarios.preparing.ports import port_remarks
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ PANELS = 6
 class Trial(Shown):
     """A trial of an experiment.
 
-    seconds: of one simulation of the record; candidates: effects and sensor faults that would be screened.
+    seconds: of one simulation of the record; candidates: effects and sensor faults that would be screened;
+    remarks: on ports whose force does not raise their velocity.
     """
 
     problem: Problem
@@ -48,10 +50,11 @@ class Trial(Shown):
     candidates: int
     jobs: int
     pictures: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """The mapping, the fit of the first simulation, and the expected cost."""
-        return [*conversion_lines(self.problem.record), *self._outputs(), *self._cost()]
+        return [*conversion_lines(self.problem.record), *self._outputs(), *self.remarks, *self._cost()]
 
     def to_frame(self) -> pd.DataFrame:
         """For each output the error of the simulation, and the factor by which the measured values differ.
@@ -126,7 +129,9 @@ def dry_run(
             PLANTS.close()
         candidates = len(problem.builder.offers) + len(FAULTS) * len(problem.record.outputs)
         pictures = () if folder is None else _pictures(problem, simulated, folder)
-    return Trial(problem, simulated, seconds, candidates, jobs or cpu_count(), pictures)
+    run, inputs = problem.record.runs[0], problem.record.inputs
+    remarks = tuple(port_remarks(declared, run, inputs, isolation))
+    return Trial(problem, simulated, seconds, candidates, jobs or cpu_count(), pictures, remarks)
 
 
 def _first_states(problem: Problem) -> dict[str, float]:
