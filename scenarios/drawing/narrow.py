@@ -1,6 +1,7 @@
 """A figure for a narrow screen: the same axes above one another, with text of the same size."""
 
 from textwrap import fill
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -43,8 +44,9 @@ def _stack(figure: Figure, legend: Legend) -> None:
     texts = [text.get_text() for text in legend.get_texts()]
     columns = 1 if any(len(text) > ENTRY for text in texts) else 2
     size = legend.get_texts()[0].get_fontsize() if texts else None
+    handles: Any = legend.legend_handles  # all are there once the legend was drawn
     made = figure.legend(
-        legend.legend_handles, texts, loc="outside upper left", ncols=columns, frameon=False, fontsize=size
+        handles, texts, loc="outside upper left", ncols=columns, frameon=False, fontsize=size
     )
     for line, old in zip(made.get_lines(), legend.get_lines(), strict=False):
         line.set_linewidth(old.get_linewidth())

@@ -56,7 +56,7 @@ class Summary(Shown):
 
         table = self.to_frame()
         counts = pd.crosstab(table["command"], table["standing"]).reindex(columns=[*COLOURS], fill_value=0)
-        drawn: Axes = counts.plot.barh(ax=axes_or_new(ax), stacked=True, color=COLOURS)
+        drawn: Axes = counts.plot.barh(ax=axes_or_new(ax), stacked=True, color=[*COLOURS.values()])
         drawn.set(xlabel="results", ylabel="")
         return drawn
 

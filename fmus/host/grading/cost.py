@@ -24,7 +24,7 @@ def step_cost(bench: Bench) -> float:
 
     Raises FmuError where the FMU refuses its own start values.
     """
-    t = bench.dt * np.arange(STEPS + 1)
+    t = bench.dt * np.arange(STEPS + 1, dtype=np.float64)
     rows = [bench.inputs(k) for k in range(STEPS + 1)]
     inputs = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     start = {name: x for name, x in bench.start.items() if name not in inputs}
