@@ -1,24 +1,34 @@
-"""`railfmi check`: grade an FMU."""
+"""`railfmi check`: try an FMU out, and say what it is fit for."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from scenarios.cli.console import app
-from scenarios.cli.voice import echo_coloured, found, progress
+from scenarios.cli.voice import echo, echo_coloured, found, progress
 
 
 @app.command()
 def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
-    """Check if railfmi can use an FMU: validation, restart, repeatability, instances, state, tunables."""
+    """Try an FMU out, and say whether it is fit for simulation, estimation and close-loop.
+
+    Tried are its model description, restarts, repeated runs, several instances at once, saved states, tunable
+    parameters, and how it refuses wrong values. What is only beside the letter of the standard does not count
+    as a failure.
+    """
     from fmus.host.grading.check import grade
+    from fmus.host.grading.fitness import LETTER
 
     with progress("trying the FMU"):
         result = grade(fmu)
     found(result)
-    signs = {True: "[green]passed[/]", False: "[red]FAILED[/]", None: "[dim]not offered[/]"}
+    signs = {True: ("passed", "green"), False: ("FAILED", "red"), None: ("not offered", "dim")}
     for entry in result.checks:
-        echo_coloured(f"{signs[entry.passed]:<24} {entry.title}: {entry.sentence}")
+        beside = entry.title == LETTER and entry.passed is False
+        word, colour = ("not by the standard", "yellow") if beside else signs[entry.passed]
+        echo_coloured(f"[{colour}]{word:<19}[/]  {escape(f'{entry.title}: {entry.sentence}')}")
+    echo(result.conclusion)
     if not result.ok:
         raise typer.Exit(1)

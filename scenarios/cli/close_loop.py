@@ -46,7 +46,10 @@ def close_loop(
     run_limit: RunLimit = limits.RUN,
     memory_limit: MemoryLimit = limits.MEMORY,
 ) -> None:
-    """Find the residual between an FMU and a record, trace it to an effect, add the effect, report.
+    """Find what an FMU lacks beside a measured record, build it into the FMU, and write a report.
+
+    What is left between record and simulation is traced to an effect of the library, with its place and size.
+    If the record does not decide, the report says so, and what would.
 
     Several experiments get a folder each and a common table. If they use the same FMU, each effect found is
     tested on the other records and fitted to all of them. Ctrl-C keeps the experiments that are finished.

@@ -16,7 +16,8 @@ from rich.text import Text
 
 COUNT = re.compile(r"(\d+) of (\d+)")
 PATIENCE = 2.0  # s, from which on progress is told
-INTERVAL = 10.0  # s, between two lines of progress where there is no terminal
+INTERVAL = 10.0  # s, between two lines of progress where there is no terminal, at first;
+SHARE = 0.1  # later as a share of the time that has passed, since a log of hours is not read line by line
 TICK = 0.5  # s, between two drawings of the progress
 
 said = Console(stderr=True, highlight=False)
@@ -99,6 +100,11 @@ class Progress:
             self._first = _count(text)[0]
         self._text = text
 
+    @property
+    def elapsed(self) -> float:
+        """Time since the beginning, s."""
+        return self._clock() - self._begin
+
     def __str__(self) -> str:
         now = self._clock()
         done, all_ = _count(self._text)
@@ -151,7 +157,8 @@ def _tell(shown: Progress, over: threading.Event) -> None:
     last, step = time.monotonic() + PATIENCE - INTERVAL, ""
     while not over.wait(TICK):
         now, text = time.monotonic(), shown._text
-        due = now - last >= INTERVAL or (VOICE.verbose and COUNT.sub("", text) != COUNT.sub("", step))
+        interval = max(INTERVAL, SHARE * shown.elapsed)
+        due = now - last >= interval or (VOICE.verbose and COUNT.sub("", text) != COUNT.sub("", step))
         if due:
             said.print(f"... {shown}", markup=False, soft_wrap=True)
             last, step = now, text

@@ -1,6 +1,6 @@
 """The report of close-loop: one self-contained page, with each figure also as a file."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.search.free_form import curve_of
+from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.host.archive import describe
 from scenarios.closing.figures.channels import record_plots, residual_plots, spectrum_plots
@@ -18,11 +19,11 @@ from scenarios.closing.figures.headline import headline_plot
 from scenarios.closing.figures.simulated import simulation_chart, simulation_plots
 from scenarios.closing.page import error_table, sections
 from scenarios.closing.page.case import Case
+from scenarios.closing.page.checks import decided, figures
 from scenarios.closing.page.glossary import effect_words, glossary, hypothesis_words
 from scenarios.closing.page.power_table import power_rows
 from scenarios.closing.page.rejected import (
     chance_words,
-    decided,
     detection_words,
     probable_rows,
     rejected,
@@ -33,11 +34,12 @@ from scenarios.closing.result import Result, best_wrong
 from scenarios.drawing.chart.chart import scripts, styles
 from scenarios.drawing.pages import rendered
 from scenarios.drawing.sheet import Plot
-from scenarios.drawing.typography import number, unit
+from scenarios.drawing.typography import unit
 from scenarios.output import written
 
 HERE = Path(__file__).parent
 ROWS = 15  # of the table of rejected hypotheses
+LONG = 120.0  # s, from which on the time of a run is told in minutes
 Values = dict[str, Any]
 
 
@@ -114,14 +116,14 @@ def _rejection(case: Case) -> Values:
         "more_rejected": max(0, len(rows) - ROWS),
         "best": hypothesis_words(case.found.chosen or case.found.base),
         "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
-        "statistics": {name: number(v) for name, v in case.found.detection.figures.items()},
+        "statistics": list(figures(case.found.detection.figures)),
         "probable": list(probable_rows(case.result.probability)),
         "decision": [decided(c) for c in case.found.judgement.checks],
         "detection": detection_words(case.problem, case.found),
         "chance": chance_words(case.found, case.diagnostics) if case.diagnostics else "",
         "black_box": case.diagnostics.black_box if case.diagnostics else None,
         "power": power_rows(case),
-        "tried": [(at, ", ".join(map(effect_words, kinds))) for at, kinds in tried(case.problem).items()],
+        "tried": [(", ".join(at), ", ".join(map(effect_words, k))) for k, at in _alike(tried(case.problem))],
         "faults": ", ".join(map(effect_words, FAULTS)),
         "known_noise": not any(c["noise"].endswith("(estimated)") for c in sections.channels(case)),
     }
@@ -142,6 +144,25 @@ def _use(case: Case, folder: Path) -> Values:
         "effect_values": {u.name: f"{theta[u.name]:.6g}" for c in effects for u in c.unknowns},
         "switches": [u.name for c in effects for u in c.amplitudes],
         "settings": {n: float(f"{v:.9g}") for n, v in others.items()},
-        "stop_time": f"{case.problem.record.runs[0].t[-1]:g}",
+        "times": _times(case.problem.record.runs[0].t),
+        "took": _took(case.result.wall_seconds),
         "version": version("railfmi"),
     }
+
+
+def _alike(tried: Mapping[str, Sequence[str]]) -> list[tuple[tuple[str, ...], list[str]]]:
+    """Kinds of effects with the locations at which just these were tried."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for at, kinds in tried.items():
+        found.setdefault(tuple(kinds), []).append(at)
+    return list(found.items())
+
+
+def _times(t: Array) -> str:
+    """Begin and end of a record as arguments of a simulation; t: (N,) s."""
+    start = f"start_time={t[0]:.9g}, " if t[0] else ""
+    return f"{start}stop_time={t[-1]:.9g}"
+
+
+def _took(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < LONG else f"{seconds / 60:.0f} min"

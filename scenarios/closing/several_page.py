@@ -77,7 +77,7 @@ def _transfer(c: Carried, found: Results) -> Iterator[Values]:
     """One row per output, or one row without numbers if the effect could not be tested on the target."""
     free = [n.removeprefix(f"{_prefix(c.effect)}_") for n in c.free]
     shared: Values = {k: getattr(c, k) for k in ("source", "target", "status", "reason")}
-    shared |= {"effect": label_words(c.effect), "lines": max(1, len(c.error)), "free": ", ".join(free)}
+    shared |= {"effect": label_words(c.effect), "free": ", ".join(free)}
     apart = NOTHING if c.distance is None else number(c.distance, 2)
     if not c.error:
         yield {**shared, "first": True, "figures": None, "apart": apart}

@@ -6,6 +6,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.several.chart import chart
@@ -16,6 +19,10 @@ from estimator.closeloop.several.transfer import Status, Traced, Transfer
 from scenarios.closing.page.glossary import glossary
 from scenarios.closing.result import Effect, Figure, Result
 from scenarios.output import written
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Table = dict[str, str | float]
 COLUMNS = (
@@ -74,8 +81,8 @@ class Joint:
     reason: str
 
 
-@dataclass(frozen=True)
-class Results:
+@dataclass(frozen=True, repr=False)
+class Results(Shown):
     """The results of close_loops.
 
     together: for each experiment, a sentence on what the other records of the same FMU say about its finding.
@@ -94,6 +101,25 @@ class Results:
     def table(self) -> list[Table]:
         """One row per experiment, for the output with the largest error over noise; keys are COLUMNS."""
         return [self._row(r) for r in self.results]
+
+    def lines(self) -> list[str]:
+        """See Shown.lines."""
+        from scenarios.closing.lines import table_of  # which imports this module
+
+        return [*table_of(self)]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table as it is written to table.csv, a row for each experiment."""
+        return pd.DataFrame(self.table, columns=[*COLUMNS]).set_index("experiment")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Errors before and after over the noise, of the worst output of each experiment."""
+        table = self.to_frame()
+        ratios = table[["before", "after"]].astype(float).div(table["noise"].astype(float), axis=0)
+        drawn: Axes = ratios.plot.bar(ax=axes_or_new(ax), logy=True, rot=0)
+        drawn.axhline(1.0, color="0.5", linewidth=0.8)
+        drawn.set(xlabel="", ylabel="error over noise of the worst output")
+        return drawn
 
     def write(self, folder: Path) -> None:
         """Write results.json and table.csv; an interrupted write leaves no part of a file."""

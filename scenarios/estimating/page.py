@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from estimator.access.recipe import Way
 from estimator.record import Array
 from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import (
@@ -21,6 +22,7 @@ from scenarios.estimating.page_figures import band_plots, correlation_plots, inn
 from scenarios.estimating.result import EstimateResult, main_values
 
 HERE = Path(__file__).parent
+WAYS = {way.name.lower(): way.words for way in Way}
 Row = dict[str, Any]
 Truth = Mapping[str, tuple[Array, Array]]
 
@@ -39,6 +41,7 @@ def write_page(folder: Path, found: Findings, result: EstimateResult, truth: Tru
         noise=list(noise(found, result)),
         nis=_number(result.nis["mean"]),
         checks=list(checked(result)),
+        refused=[(WAYS.get(way, way), why) for way, why in result.refused.items()],
         bands=[plot.embedded(folder) for plot in band_plots(found, truth)],
         innovations=[plot.embedded(folder) for plot in innovation_plots(found)],
         correlations=[plot.embedded(folder) for plot in correlation_plots(found)],

@@ -93,9 +93,9 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
         yield Plot(
             f"innovations{ending}",
             figure,
-            "Left: innovations divided by their expected standard deviation. Right: autocorrelation of the "
-            "innovations. If model and noise are right, 95 % of the innovations lie between the dashed lines "
-            "and all correlations lie within the grey band.",
+            "Innovations divided by their expected standard deviation, each with its autocorrelation. If "
+            "model and noise are right, 95 % of the innovations lie between the dashed lines and all "
+            "correlations lie within the grey band.",
         )
 
 

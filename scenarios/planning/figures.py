@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from scenarios.drawing.sheet import AFTER, BEFORE, LAW, NOISE, Plot, name_axes, sheet
 from scenarios.planning.result import PlanResult
@@ -17,12 +18,28 @@ MARGINS = (1e-3, 30.0)  # range of the axis of margins
 
 def size_plot(result: PlanResult) -> Plot | None:
     """The smallest visible size of each effect, as share of the output that shows most of it."""
-    lines = [v for v in result.visible if v["share"] is not None]
-    if not lines:
+    count = len(_lines(result))
+    if not count:
         return None
-    lines = sorted(lines, key=lambda v: v["share"])[-SHOWN:]
-    figure, axes = sheet(1.0 + ROW * len(lines), [["a"]])
-    ax = axes["a"]
+    figure, axes = sheet(1.0 + ROW * count, [["a"]])
+    draw_sizes(axes["a"], result)
+    return Plot(
+        "sizes",
+        figure,
+        "Smallest visible size of the effects, as the residual that they leave in the output that shows most "
+        f"of it. Those {SHOWN} are shown that need the largest share of their output.",
+    )
+
+
+def _lines(result: PlanResult) -> list[dict[str, Any]]:
+    """The effects that are drawn, those that need the largest share of an output last."""
+    lines = [v for v in result.visible if v["share"] is not None]
+    return sorted(lines, key=lambda v: v["share"])[-SHOWN:]
+
+
+def draw_sizes(ax: Axes, result: PlanResult) -> Axes:
+    """Draw into axes from which size on each effect is detected, and from which on it also matters."""
+    lines = _lines(result)
     at = np.arange(len(lines))
     both = np.array([v["share"] for v in lines])
     ratio = np.array([v["detected"] / v["smallest"] if v["detected"] else np.nan for v in lines])
@@ -34,16 +51,11 @@ def size_plot(result: PlanResult) -> Plot | None:
     ax.set_ylim(-0.7, len(lines) - 0.3)
     name_axes(ax, "residual that is left after calibration, % of the rms of its output")
     ax.legend(frameon=False, fontsize=8, loc="lower right")
-    return Plot(
-        "sizes",
-        figure,
-        "Smallest visible size of the effects, as the residual that they leave in the output that shows most "
-        f"of it. Those {SHOWN} are shown that need the largest share of their output.",
-    )
+    return ax
 
 
 def split_plot(result: PlanResult) -> Plot | None:
-    """How far the best sensor and the best change of an input split each class."""
+    """How far the best sensor and the best change of an input tell each group apart."""
     classes = result.classes
     if not classes:
         return None
@@ -65,14 +77,15 @@ def split_plot(result: PlanResult) -> Plot | None:
     ax.set_xlim(MARGINS[0] / 1.5, MARGINS[1] * 1.5)
     ax.set_yticks(range(len(rows)), [_words(c) for c in rows], fontsize=7)
     ax.set_ylim(-0.7, len(rows) - 0.3)
-    name_axes(ax, "margin of the closest pair; told apart from 1 on")
+    name_axes(ax, "margin of the closest pair")
     handles, labels = ax.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)
     return Plot(
         "classes",
         figure,
-        "Margin of the closest pair of each class: as planned, and with the one sensor or change of an input "
-        f"that helps most. Margins outside of {MARGINS[0]:g} to {MARGINS[1]:g} are drawn at the edge.",
+        "Margin of the closest pair of each group, which is told apart from 1 on (dashed): as planned, and "
+        "with the one sensor or change of an input that helps most. Margins outside of "
+        f"{MARGINS[0]:g} to {MARGINS[1]:g} are drawn at the edge.",
     )
 
 

@@ -50,8 +50,8 @@ def _class(c: Row, units: dict[str, str | None]) -> Row:
         "effects": c["effects"],
         "margin": number(c["margin"], 2),
         "score": number(c["score"], 2),
-        "size": NOTHING if c["size"] is None else number(c["size"], 2),
-        "seconds": NOTHING if c["seconds"] is None else f"{short(c['seconds'], 3)} s",
+        "size": "" if c["size"] is None else number(c["size"], 2),
+        "seconds": "" if c["seconds"] is None else f"{short(c['seconds'], 3)} s",
         "splitters": list(_splitters(c, units)),
     }
 

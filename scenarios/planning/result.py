@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
 
 from estimator.closeloop.planning.classes import EffectClass, Splitter
 from estimator.closeloop.planning.plan import Plan, Sight
@@ -15,12 +17,16 @@ from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
 from scenarios.experiment.experiment import Experiment
 from scenarios.output import written
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TIMES_DIGITS = 3  # significant digits of what is advised, which is computed to first order
 
 
-@dataclass(frozen=True)
-class PlanResult:
+@dataclass(frozen=True, repr=False)
+class PlanResult(Shown):
     """The plan of an experiment; each field is a key of plan.json.
 
     seconds: length of the planned record; noise: of each measured output, and whether it is declared; ratio,
@@ -44,6 +50,24 @@ class PlanResult:
     hidden: list[str]
     refused: dict[str, str]
     wall_seconds: float
+
+    def lines(self) -> list[str]:
+        """See Shown.lines."""
+        return [*table_of(self)]
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each parameter of each effect: from which size it is seen, and effects like it."""
+        like = {e: c["effects"] for c in self.classes for e in c["effects"]}
+        table = pd.DataFrame(self.visible)
+        labels = [f"{v['kind']}@{v['location']}" for v in self.visible]
+        table["not_told_from"] = [", ".join(e for e in like.get(x, []) if e != x) for x in labels]
+        return table.drop(columns="shape", errors="ignore")
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The smallest visible size of each effect, as the share of an output that it changes."""
+        from scenarios.planning.figures import draw_sizes  # which imports this module
+
+        return draw_sizes(axes_or_new(ax), self)
 
     def write(self, path: Path) -> None:
         """Write the plan as JSON; an interrupted write leaves no partial file."""

@@ -171,14 +171,25 @@ def _parameters(made: Draft) -> Iterator[str]:
     if not some:
         return
     yield ""
-    few = len(some) <= CALIBRATED
+    few = len(uncertain := [v for v in some if not _is_factor(v)]) <= CALIBRATED
     yield "[calibrate]  # parameters that are uncertain, with bounds; remove those that you know exactly"
     if not few:
         yield f"# the FMU has {len(some)} parameters: take away the '#' of those that are uncertain"
     for v in some:
         low, high = _bounds(v)
-        said = f"the FMU's value is {v.start:.6g}{f' {v.unit}' if v.unit else ''}, +-{AROUND:.0%}"
-        yield f"{'' if few else '# '}{_key(v.name)} = [{low!r}, {high!r}]  # {said}"
+        of = f" {v.unit}" if v.unit and v.unit != "1" else ""
+        said = f"the FMU's value is {v.start:.6g}{of}, +-{AROUND:.0%}"
+        if _is_factor(v):
+            said = (
+                "exactly 1 and without a unit, so probably no measured value; take away the '#' if it is one"
+            )
+        out = "" if few and v in uncertain else "# "
+        yield f"{out}{_key(v.name)} = [{low!r}, {high!r}]  # {said}"
+
+
+def _is_factor(v: FmuVariable) -> bool:
+    """Whether a parameter is a factor 1 or -1, which with a mass or an inertia beside it cannot be told."""
+    return v.unit == "1" and abs(v.start or 0.0) == 1.0
 
 
 def _bounds(v: FmuVariable) -> tuple[float, float]:

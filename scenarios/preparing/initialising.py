@@ -4,6 +4,9 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from fmus.errors import BadInput
 from fmus.host.archive import describe
@@ -13,14 +16,18 @@ from scenarios.experiment.record import load_record
 from scenarios.output import unwritten, writable
 from scenarios.preparing.draft import Draft, doubtful, draft, sure, toml_of, with_column
 from scenarios.preparing.survey import survey
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 NONE = "-"  # the answer that leaves a variable without a column
 # question, answers, default -> answer
 Ask = Callable[[str, Sequence[str], str], str]
 
 
-@dataclass(frozen=True)
-class Initialised:
+@dataclass(frozen=True, repr=False)
+class Initialised(Shown):
     """What was drafted, and the file that holds it."""
 
     file: Path
@@ -45,6 +52,25 @@ class Initialised:
         if d.unused:
             lines.append(f"columns that are not used: {', '.join(d.unused)}")
         return lines
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each variable of the FMU that has a column; likeness is between 0 and 1."""
+        rows = {
+            s.variable.name: {
+                "causality": s.variable.causality, "column": s.channel.name, "unit": s.unit,
+                "model_unit": s.variable.unit or s.model_unit, "likeness": s.likeness,
+            }
+            for s in self.draft.signals
+        }  # fmt: skip
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("variable")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """How much each column looks like the variable that it was taken for."""
+        drawn = axes_or_new(ax)
+        signals = self.draft.signals
+        drawn.barh([f"{s.variable.name}: {s.channel.name}" for s in signals], [s.likeness for s in signals])
+        drawn.set(xlim=(0, 1), xlabel="how sure the match is")
+        return drawn
 
 
 def init(

@@ -5,8 +5,10 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from joblib import cpu_count
 
 from estimator.closeloop.question.problem import Problem
@@ -16,10 +18,15 @@ from estimator.sensor_faults import FAULTS
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from scenarios.closing.closing import Posed, experiment_of
-from scenarios.drawing.sheet import BEFORE, INK, Plot, envelope, legend, name_axes, sheet, sheets
+from scenarios.drawing.sheet import BEFORE, CLOUD, Plot, envelope, legend, name_axes, sheet, sheets
 from scenarios.drawing.typography import unit
 from scenarios.experiment.conversions import conversion_lines
 from scenarios.output import writable, written_at_once
+from scenarios.preparing.ports import port_remarks
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SHOWN = 0.25  # of the record is drawn, from its beginning
 # of simulations in a whole run, a third and three times of the 89 that the motor of the tutorial took, since
@@ -29,11 +36,12 @@ APART = 2.0  # factor between measured and simulated values beyond which a wrong
 PANELS = 6
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trial(Shown):
     """A trial of an experiment.
 
-    seconds: of one simulation of the record; candidates: effects and sensor faults that would be screened.
+    seconds: of one simulation of the record; candidates: effects and sensor faults that would be screened;
+    remarks: on ports whose force does not raise their velocity.
     """
 
     problem: Problem
@@ -42,24 +50,45 @@ class Trial:
     candidates: int
     jobs: int
     pictures: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """The mapping, the fit of the first simulation, and the expected cost."""
-        return [*conversion_lines(self.problem.record), *self._outputs(), *self._cost()]
+        return [*conversion_lines(self.problem.record), *self._outputs(), *self.remarks, *self._cost()]
+
+    def to_frame(self) -> pd.DataFrame:
+        """For each output the error of the simulation, and the factor by which the measured values differ.
+
+        error: rms, in the FMU's unit; share: of the standard deviation of the measured values; factor: nan if
+        the two have not the same course.
+        """
+        record, y = self.problem.record, self.problem.record.runs[0].y
+        error = np.sqrt(np.mean((y - self.simulated) ** 2, axis=0))
+        factors = [factor_of(*pair) for pair in zip(y.T, self.simulated.T, strict=True)]
+        columns = {
+            "error": error,
+            "share": error / (y.std(axis=0) + 1e-300),
+            "factor": [np.nan if factor is None else factor for factor in factors],
+        }
+        return pd.DataFrame(columns, index=pd.Index(record.outputs, name="output"))
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """The first output, measured and simulated, over the whole record."""
+        drawn, run = axes_or_new(ax), self.problem.record.runs[0]
+        drawn.plot(*envelope(run.t, run.y[:, 0]), color=CLOUD, linewidth=2.4, label="measured")
+        drawn.plot(*envelope(run.t, self.simulated[:, 0]), color=BEFORE, label="simulated")
+        drawn.set(xlabel="time in s", ylabel=self.problem.record.outputs[0])
+        drawn.legend()
+        return drawn
 
     def _outputs(self) -> Iterator[str]:
-        record = self.problem.record
-        run = record.runs[0]
-        for note in record.notes:
+        for note in self.problem.record.notes:
             if note.kind != "unit":
                 yield f"note: {note.sentence}"
-        for j, name in enumerate(record.outputs):
-            measured, simulated = run.y[:, j], self.simulated[:, j]
-            rms = float(np.sqrt(np.mean((measured - simulated) ** 2)))
-            share = rms / (float(np.std(measured)) + 1e-300)
-            yield f"{name}: error of the simulation with declared values {rms:.3g}, {share:.0%} of the signal"
-            factor = factor_of(measured, simulated)
-            if factor is not None and not 1 / APART < factor < APART:
+        for name, error, share, factor in self.to_frame().itertuples(name=None):
+            said = f"{error:.3g}, {share:.0%} of the signal"
+            yield f"{name}: error of the simulation with declared values {said}"
+            if np.isfinite(factor) and not 1 / APART < factor < APART:
                 yield (
                     f"  measured values are {factor:.3g} times the simulated ones: look at unit, model_unit "
                     "and the column of this output"
@@ -100,7 +129,9 @@ def dry_run(
             PLANTS.close()
         candidates = len(problem.builder.offers) + len(FAULTS) * len(problem.record.outputs)
         pictures = () if folder is None else _pictures(problem, simulated, folder)
-    return Trial(problem, simulated, seconds, candidates, jobs or cpu_count(), pictures)
+    run, inputs = problem.record.runs[0], problem.record.inputs
+    remarks = tuple(port_remarks(declared, run, inputs, isolation))
+    return Trial(problem, simulated, seconds, candidates, jobs or cpu_count(), pictures, remarks)
 
 
 def _first_states(problem: Problem) -> dict[str, float]:
@@ -143,7 +174,7 @@ def _drawn(problem: Problem, simulated: Array) -> Iterator[Plot]:
         figure, axes = sheet(0.6 + 1.6 * len(some), [[name] for _, name in some], sharex=True)
         for j, name in some:
             ax = axes[name]
-            ax.plot(*envelope(run.t[head], run.y[head, j]), color=INK, linewidth=0.9, label="measured")
+            ax.plot(*envelope(run.t[head], run.y[head, j]), color=CLOUD, linewidth=2.4, label="measured")
             drawn = envelope(run.t[head], simulated[head, j])
             ax.plot(*drawn, color=BEFORE, linewidth=1.1, label="simulated with the declared values")
             name_axes(ax, "", unit(units.get(name)) or "1", name)

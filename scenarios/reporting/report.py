@@ -12,16 +12,19 @@ from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import number
 from scenarios.output import writable, written_at_once
 from scenarios.reporting.entries import Entry, entries
+from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 HERE = Path(__file__).parent
+COLOURS = {"good": "#123f6b", "doubtful": "#8a5010", "bad": "#a3122a"}  # those of the page
 PAGE, TABLE = "summary.html", "summary.csv"
 
 
-@dataclass(frozen=True)
-class Summary:
+@dataclass(frozen=True, repr=False)
+class Summary(Shown):
     """All results of a folder, in the order of their paths."""
 
     folder: Path
@@ -34,7 +37,7 @@ class Summary:
         said = ", ".join(f"{n} of {command}" for command, n in sorted(counts.items()))
         doubtful = sum(e.standing != "good" for e in self.entries)
         results = "1 result" if len(self.entries) == 1 else f"{len(self.entries)} results"
-        return f"{results}: {said}; {doubtful or 'none'} to look at"
+        return f"{results}: {said}; {doubtful or 'none'} to look at more closely"
 
     def lines(self) -> list[str]:
         """What the command prints: the headline, then each result that needs a look."""
@@ -47,8 +50,15 @@ class Summary:
 
         return pd.DataFrame([asdict(e) for e in self.entries], columns=list(Entry.__dataclass_fields__))
 
-    def __repr__(self) -> str:
-        return "\n".join(self.lines())
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """How many results of each command are good, doubtful and bad."""
+        import pandas as pd
+
+        table = self.to_frame()
+        counts = pd.crosstab(table["command"], table["standing"]).reindex(columns=[*COLOURS], fill_value=0)
+        drawn: Axes = counts.plot.barh(ax=axes_or_new(ax), stacked=True, color=[*COLOURS.values()])
+        drawn.set(xlabel="results", ylabel="")
+        return drawn
 
     def write(self, out: Path) -> None:
         """Write summary.html and summary.csv into a folder; the page has links relative to it."""

@@ -51,6 +51,17 @@ def test_files_that_are_named_exist(page: Path) -> None:
         assert "NAME" in known or (ROOT / known).exists(), f"{ids(page)} names {known}"
 
 
+def test_the_boxes_of_the_architecture_are_folders_or_modules() -> None:
+    """A box that was renamed or removed in the code is noticed in the picture."""
+    drawn = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
+    heads = re.findall(r'font-size="15" fill="#222" font-weight="bold"[^>]*>([a-z_, ]+)<', drawn)
+    floors = [ROOT / name for name in ("scenarios", "estimator", "fmus")]
+    names = [name for head in heads for name in head.split(", ")]
+    assert len(names) >= 20
+    for name in names:
+        assert any((top / name).is_dir() or (top / f"{name}.py").is_file() for top in floors), name
+
+
 def test_the_scoreboard_gives_the_exact_interval_of_each_count() -> None:
     text = (ROOT / "docs" / "challenge.md").read_text(encoding="utf-8")
     rows = re.findall(r"\| (\d+) of (\d+) \| ([\d.]+) % \| ([\d.]+) to ([\d.]+) % \|", text)

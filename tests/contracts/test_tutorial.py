@@ -53,6 +53,9 @@ def test_the_tutorial_comes_to_a_trial(begun):
         assert row in said
         assert row in PAGE.read_text(encoding="utf-8")
     assert "0.10472 * column" in said
+    assert "fit for simulation: yes" in said
+    assert "estimation: no (it shows no state" in said
+    assert "close-loop: yes" in said
     assert (folder / "out" / "inspect" / "record.png").stat().st_size > 10_000
     assert (folder / "out" / "close-loop" / "dry_run.png").stat().st_size > 10_000
 

@@ -16,6 +16,7 @@ from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 from fmus.host.grading import check
 from fmus.host.grading.check import Check, Grade, grade
+from fmus.host.grading.fitness import LETTER, fitness
 from fmus.host.grading.trials import TRIALS
 from tests.helpers.everything import EVERY_MODEL
 from tests.helpers.foreign import AT_START, GOOD, HIDDEN
@@ -82,6 +83,7 @@ def test_a_grade_fails_by_one_check():
     good, open_, bad = (Check("a", passed, "It is so.") for passed in (True, None, False))
     assert Grade("x", (good, open_)).ok
     assert not Grade("x", (good, bad)).ok
+    assert Grade("x", (good, Check(LETTER, False, "It is so."))).ok
 
 
 def test_hidden_state(foreign):
@@ -229,9 +231,49 @@ def test_a_step_that_is_always_refused(foreign):
     ]
 
 
-def test_model_description_that_breaks_the_standard(built, tmp_path):
+def test_model_description_that_breaks_the_letter_of_the_standard(built, tmp_path):
+    """It is told, but what works is no failure."""
     path = with_description(built("drive"), tmp_path / "x.fmu", rb'unit="kg"', b'unit="stone"')
-    assert_only(path, "valid", r'not valid: The unit "stone" of variable "M" .* is not defined\.$')
+    found = grade(path)
+    [broken] = [c for c in found.checks if c.passed is False]
+    assert broken.title == LETTER
+    assert re.search(r'not valid: The unit "stone" of variable "M" .* is not defined\.$', broken.sentence)
+    assert found.ok
+    assert answers(found) == ["yes", "yes", "yes"]
+
+
+def answers(found):
+    assert [f.use for f in found.fit] == ["simulation", "estimation", "close-loop"]
+    return [f.answer for f in found.fit]
+
+
+@pytest.mark.parametrize(
+    ("body", "more", "expected", "words"),
+    [
+        (GOOD, {}, ["yes", "yes", "yes"], "for 10 000 samples"),
+        (HIDDEN, {}, ["yes", "no", "no"], "hidden state: .*; export all of its states as outputs"),
+        (GOOD, {"initial": "calculated"}, ["yes", "no", "yes"], 'as outputs with initial="exact"'),
+        (GOOD + "\nself.x += SHARED.made * 1e-3", {}, ["yes", "no", "no"], "not repeat: .*; mend its reset"),
+        ("return False", {}, ["no", "no", "no"], "refused a call: fmi2DoStep.*; give it start values"),
+        ("os._exit(3)", {}, ["no", "no", "no"], "brings down the process"),
+        ("sum(range(40_000))\n" + GOOD, {}, ["yes", "yes", "slow"], "of one core for 10 000 samples"),
+    ],
+    ids=["good", "hidden state", "no state", "does not repeat", "refuses", "crashes", "slow"],
+)
+def test_the_conclusion_says_what_an_fmu_is_fit_for(foreign, body, more, expected, words):
+    found = grade(foreign(body, **more))
+    assert answers(found) == expected
+    assert re.search(words, found.conclusion)
+    assert found.conclusion.startswith("fit for simulation: ")
+    assert "\n" not in found.conclusion
+
+
+def test_the_time_of_a_step_grows_with_its_work(foreign):
+    d = describe(foreign())
+    good = dict.fromkeys(TRIALS, (True, "It is so."))
+    sentences = [fitness(good, d, step)[0].sentence for step in (1e-5, 1e-3, 1.0, None)]
+    assert sentences[:3] == [f"about {t} of one core for 10 000 samples" for t in ("0.1 s", "10 s", "2.8 h")]
+    assert "could not be measured" in sentences[3]
 
 
 def test_one_instance_in_a_process(built, tmp_path):
@@ -267,7 +309,7 @@ def test_a_version_that_is_not_read_here(tmp_path):
 
 
 def test_an_error_of_the_check_itself_is_not_blamed_on_the_fmu(built, monkeypatch):
-    def broken(arguments, patience):
+    def broken(module, arguments, patience):
         Path(arguments[1]).write_text(json.dumps({"traceback": "KeyError: 'x'"}))
         return ""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-SAVED = re.compile(r"[Ss]ave this as `([\w.]+)`")
+SAVED = re.compile(r"[Ss]ave this as\s`([\w./]+)`")
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ def steps_of(page: Path, heading: str = "") -> Iterator[Step]:
     if heading:
         text = re.split(r"^## ", text.partition(f"## {heading}\n")[2], maxsplit=1, flags=re.M)[0]
     name = ""
+    text = re.sub(r"([Ss]ave this as)\n", r"\1 ", text)  # a line may end there
     for block in re.finditer(r"```(\w*)\n(.*?)```|^    (\S[^\n]*)$|([^\n]+)\n", text, re.S | re.M):
         language, code, command, words = block.groups()
         if words and (found := SAVED.search(words)):

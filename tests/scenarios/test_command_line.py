@@ -194,7 +194,7 @@ HEAVY = ("casadi", "numpy", "scipy", "pandas", "matplotlib", "fmpy", "fmus.model
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [(["--help"], ["build", "close-loop", "Grade an FMU."]), (["--version"], ["railfmi "]), ([], ["Usage"])],
+    [(["--help"], ["build", "close-loop", "Try an FMU out"]), (["--version"], ["railfmi "]), ([], ["Usage"])],
     ids=["help", "version", "nothing"],
 )
 def test_help_loads_nothing_that_simulates(arguments, words):

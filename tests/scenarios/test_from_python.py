@@ -1,8 +1,10 @@
 """From Python: an experiment as a table or an object, a record as a DataFrame, results that show."""
 
 import dataclasses
+import inspect
 import json
 import tomllib
+from typing import get_type_hints
 
 import matplotlib
 import numpy as np
@@ -13,10 +15,13 @@ from numpy.testing import assert_array_equal
 
 import railfmi
 from fmus.errors import BadInput
+from fmus.host.fmu import Fmu
 from scenarios.closing.result import Effect, Result
-from scenarios.experiment.experiment import load_experiment
+from scenarios.closing.several_results import Results
+from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.given import given
 from scenarios.experiment.record import load_record
+from scenarios.shown import Shown
 from tests.helpers.experiment_files import GOOD, RIG, assert_one_clear_line, table, write
 from tests.helpers.paths import SHIPPED
 
@@ -118,3 +123,51 @@ def test_a_result_shows_itself(tmp_path):
     assert result.plot(drawn) is drawn
     result.write(tmp_path / "result.json")
     assert json.loads((tmp_path / "result.json").read_text())["error"]["i"]["noise"] == 0.01
+
+
+def returned() -> dict[str, type]:
+    """What each public function returns, where that is a result of its own."""
+    found = {}
+    for name in railfmi.__all__:
+        of = getattr(railfmi, name)
+        kind = get_type_hints(of).get("return") if inspect.isfunction(of) else None
+        if isinstance(kind, type) and kind.__module__.startswith("scenarios.") and kind is not Experiment:
+            found[name] = kind
+    return found
+
+
+def test_every_result_shows_itself():
+    found = returned()
+    assert {"close_loop", "close_loops", "estimate", "plan", "report", "init", "dry_run"} <= set(found)
+    for name, kind in found.items():
+        assert issubclass(kind, Shown), name
+        assert kind.__repr__ is Shown.__repr__, name  # a dataclass would bring its own
+
+
+def assert_shown(result: Shown) -> None:
+    """What a notebook asks of a result."""
+    assert repr(result) == "\n".join(result.lines())
+    assert "<table" in result._repr_html_()
+    assert len(result.to_frame())
+    assert isinstance(result.plot(), Axes)
+
+
+@pytest.mark.usefixtures("_no_screen")
+def test_results_of_the_way_in_and_of_several_show_themselves(built, tmp_path):
+    t = np.arange(300) * 0.01
+    F = 100 * np.sin(3 * t)
+    with Fmu(built("drive")) as drive:
+        measured = drive.simulate_frame(t, {"F": F}, ["q", "q_dot"])
+    measured.assign(F=F).to_csv(tmp_path / "data.csv")
+    begun = railfmi.init(built("drive"), tmp_path / "data.csv", out=tmp_path)
+    assert_shown(begun)
+    assert list(begun.to_frame()["column"]) == ["F", "q", "q_dot"]
+    tried = railfmi.dry_run(begun.file)
+    assert_shown(tried)
+    assert tried.to_frame().loc["q_dot", "factor"] == pytest.approx(1.0, rel=1e-2)
+    first = a_result()
+    both = Results([first, dataclasses.replace(first, experiment="again")])
+    assert_shown(both)
+    assert both.to_frame().loc["again", "before"] == 5.0
+    first.write(tmp_path / "result.json")
+    assert_shown(railfmi.report(tmp_path))

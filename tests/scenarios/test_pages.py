@@ -9,7 +9,7 @@ import pytest
 from scenarios.drawing.chart.chart import Line, Panel, chart, scripts, styles, thinned
 from scenarios.drawing.narrow import WIDTH, make_narrow
 from scenarios.drawing.pages import rendered
-from scenarios.drawing.sheet import Plot, dress, name_axes, png, sheet
+from scenarios.drawing.sheet import Plot, dress, legend, name_axes, png, sheet
 
 TABLE = """<header></header>
 <!-- contents -->
@@ -63,6 +63,20 @@ def test_scripts_and_styles_ask_for_nothing_else():
     text = scripts() + styles()
     assert "uPlot" in text
     assert not re.search(r"@import|url\(|fetch\(|XMLHttpRequest|import\(", text)
+
+
+def test_the_legend_of_a_narrow_figure_stays_inside_it(tmp_path):
+    figure, axes = sheet(2.7, [["a"]])
+    for name in ("tolerance", "equivalent", "linear", "harmonic of first order"):
+        axes["a"].plot([0, 1], [0, 1], label=name)
+    legend(figure, axes["a"])
+    Plot("one", figure, "words").write(tmp_path)
+    make_narrow(figure)
+    png(figure)
+    [made] = figure.legends
+    assert len(made.get_texts()) == 4
+    assert made.get_window_extent().x1 <= figure.bbox.x1
+    assert made.get_window_extent().y0 >= axes["a"].get_window_extent().y1 - 1
 
 
 def test_the_panels_of_a_narrow_figure_stand_below_one_another(tmp_path):

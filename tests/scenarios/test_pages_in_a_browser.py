@@ -1,4 +1,4 @@
-"""The report in headless Chromium: it fits a desk and a telephone, its charts live, and nothing fails."""
+"""All pages in headless Chromium: they fit a desk and a telephone, charts live, and nothing fails."""
 
 import json
 import re
@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.cli.app import run_safely
 from scenarios.closing.result import Result
+from tests.helpers.paths import SHIPPED
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = (
@@ -28,6 +30,8 @@ onload = () => setTimeout(() => {{
   const drawn = (c) => c.getBoundingClientRect().width > 0;
   const charts = [...page.querySelectorAll(".chart canvas")].filter(drawn);
   document.querySelector("pre").textContent = JSON.stringify({{
+    cut: [...page.querySelectorAll(".wide, pre")].filter((e) => e.scrollWidth > e.clientWidth + 1)
+      .map((e) => e.textContent.slice(0, 60)),
     inner: whole.clientWidth, scroll: whole.scrollWidth, wide: wide.map((e) => e.tagName),
     charts: charts.length, silent: [...page.images].filter((i) => !i.alt).length,
     links: page.querySelectorAll("nav a").length, folded: page.querySelectorAll("details").length,
@@ -53,16 +57,55 @@ def looked_at(page: Path, width: int, folder: Path) -> tuple[dict, list[str]]:
     return json.loads(text), [line for line in done.stderr.splitlines() if "CONSOLE" in line]
 
 
+@pytest.fixture(scope="module")
+def pages(demo: tuple[Result, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a page of every command that writes one, with the closed loop of the session."""
+    out = tmp_path_factory.mktemp("pages")
+    (out / "close-loop").symlink_to(demo[1])
+    shipped = SHIPPED / "demo"
+    for name, *more in (
+        ("estimate", str(shipped / "rig-friction")),
+        ("plan", str(shipped / "rig-drag")),
+        ("conicity", "--wheel", "S1002", "--rail", "60E1"),
+        ("conicity-norm", "--pair", "A", "--draws", "1"),
+    ):
+        assert run_safely([name, *more, "--out", str(out / name)]) == 0
+    both = [str(shipped / name) for name in ("rig-drag", "rig-friction")]
+    assert run_safely(["close-loop", *both, "--jobs", "1", "--out", str(out / "several")]) == 0
+    assert run_safely(["report", str(out)]) == 0
+    return out
+
+
+def every_page() -> list[str]:
+    """The pages by their place in the folder."""
+    return [
+        "close-loop/report.html", "estimate/estimate.html", "plan/plan.html", "conicity/conicity.html",
+        "conicity-norm/norm.html", "several/index.html", "summary.html",
+    ]  # fmt: skip
+
+
+def test_all_pages_are_there(pages: Path) -> None:
+    assert all((pages / page).is_file() for page in every_page())
+    names = {page.rpartition("/")[2] for page in every_page()}
+    assert {file.name for file in pages.rglob("*.html")} <= names  # no page is left out
+
+
 @pytest.mark.parametrize("width", [1280, 390])
-def test_the_report_fits_and_is_alive(width: int, demo: tuple[Result, Path], tmp_path: Path) -> None:
-    page = demo[1] / "report.html"
-    found, errors = looked_at(page, width, tmp_path)
+@pytest.mark.parametrize("page", every_page())
+def test_a_page_fits_and_nothing_fails(page: str, width: int, pages: Path, tmp_path: Path) -> None:
+    found, errors = looked_at(pages / page, width, tmp_path)
     assert errors == []
     assert found["inner"] == width
     assert found["scroll"] <= width
     assert found["wide"] == []
-    assert found["charts"] == 2  # one for each output of the rig
+    assert found["cut"] == []
     assert found["silent"] == 0
+    assert (pages / page).stat().st_size < LARGEST
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_report_is_alive(width: int, demo: tuple[Result, Path], tmp_path: Path) -> None:
+    found, _ = looked_at(demo[1] / "report.html", width, tmp_path)
+    assert found["charts"] == 2  # one for each output of the rig
     assert found["links"] >= 8
     assert found["folded"] >= 1
-    assert page.stat().st_size < LARGEST

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
@@ -81,6 +82,20 @@ def one_way(tmp_path_factory: pytest.TempPathFactory) -> tuple[PlanResult, Path,
     assert done.exit_code == 0, done.output
     told = json.loads((folder / "out" / "plan.json").read_text())
     return PlanResult(**told), folder / "out", done.output
+
+
+def test_a_plan_shows_itself(one_way: tuple[PlanResult, Path, str]) -> None:
+    result, _, said = one_way
+    assert "\n".join(result.lines()) in said
+    assert "<table" in result._repr_html_()
+    table = result.to_frame()
+    assert len(table) == len(result.visible)
+    friction = table[(table["kind"] == "coulomb_friction") & (table["location"] == "carriage")].iloc[0]
+    assert "constant_force@carriage" in friction["not_told_from"]  # the record moves in one direction
+    matplotlib.use("Agg")
+    drawn = result.plot()
+    assert drawn.get_xlabel().startswith("residual that is left")
+    matplotlib.pyplot.close("all")
 
 
 def test_a_plan_needs_no_outputs_and_is_written_with_its_page(one_way: tuple[PlanResult, Path, str]) -> None:

@@ -1,5 +1,7 @@
 """The way in: a record surveyed, columns matched to variables, an experiment drafted, a trial run."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -16,9 +18,10 @@ from scenarios.preparing.draft import draft, toml_of, with_column
 from scenarios.preparing.initialising import init
 from scenarios.preparing.inspecting import bandwidth, inspect
 from scenarios.preparing.matching import SURE, likeness, matches
+from scenarios.preparing.ports import port_remarks
 from scenarios.preparing.survey import Channel, survey
 from scenarios.preparing.trial import dry_run, duration, factor_of
-from tests.helpers.foreign import foreign_builder
+from tests.helpers.foreign import GOOD, foreign_builder
 from tests.helpers.paths import SHIPPED
 
 DEMO = SHIPPED / "demo" / "rig-drag"
@@ -173,6 +176,32 @@ def test_many_parameters_are_left_to_the_user(tmp_path):
     assert "# p3 = [0.8, 1.2]" in text
     (tmp_path / "experiment.toml").write_text(text)
     assert load_experiment(tmp_path / "experiment.toml").calibrate == {}
+
+
+def test_a_factor_of_one_is_not_calibrated(tmp_path):
+    more = fmu(*MOTOR.variables.values(), variable("gain.k", "parameter", unit="1", start=-1.0))
+    text = toml_of(drafted(tmp_path, more), tmp_path)
+    assert '# "gain.k" = [-1.2, -0.8]  # exactly 1 and without a unit' in text
+    (tmp_path / "experiment.toml").write_text(text)
+    assert set(load_experiment(tmp_path / "experiment.toml").calibrate) == {"R", "k"}
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (GOOD, None),
+        (GOOD.replace("self.u", "-self.u"), "a positive u lowers x, so that friction and damping"),
+        (GOOD.replace("self.u", "1.0"), "u does not move x; name the output that it moves"),
+    ],
+    ids=["conjugate", "opposed", "apart"],
+)
+def test_a_port_whose_force_does_not_raise_its_velocity_is_told(foreign, body, words):
+    port = SimpleNamespace(name="mass", force="u", velocity="x")
+    e = SimpleNamespace(fmu_path=foreign(body), ports=[port], parameters={}, initial={})
+    run = SimpleNamespace(t=T, u=np.empty((T.size, 0)))
+    said = list(port_remarks(e, run, (), None))
+    assert len(said) == (words is not None)
+    assert all(s.startswith(f"port 'mass': {words}") for s in said)
 
 
 def test_another_column_may_be_chosen(tmp_path):

@@ -14,9 +14,12 @@ from typing import Any
 
 from fmus.errors import BadInput
 from fmus.host.archive import describe
+from fmus.host.grading.fitness import LETTER, Fit, fitness, simulates
 from fmus.host.grading.trials import TRIALS
 
 PATIENCE = 120.0  # s, for all trials together
+LEAST = 2.0  # s, for the time of a step where the trials took all
+RUN, COST = "fmus.host.grading.trials", "fmus.host.grading.cost"
 
 
 @dataclass(frozen=True)
@@ -37,11 +40,17 @@ class Grade:
 
     name: str
     checks: tuple[Check, ...]
+    fit: tuple[Fit, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """Whether nothing failed."""
-        return all(check.passed is not False for check in self.checks)
+        """Whether nothing failed that hinders the use of the FMU."""
+        return all(check.passed is not False for check in self.checks if check.title != LETTER)
+
+    @property
+    def conclusion(self) -> str:
+        """What the FMU is fit for, in one sentence."""
+        return f"fit for {'; '.join(map(str, self.fit))}"
 
 
 def grade(path: str | Path, patience: float = PATIENCE) -> Grade:
@@ -49,14 +58,27 @@ def grade(path: str | Path, patience: float = PATIENCE) -> Grade:
 
     It runs in a process of its own, so that an FMU that crashes or hangs fails its trial and nothing else.
     """
-    name = describe(path).name
+    described = describe(path)
     until = time.monotonic() + patience
     checks: list[Check] = []
     while len(checks) < len(TRIALS) and (left := until - time.monotonic()) > 0:
         checks += _tried(Path(path), len(checks), left)
     late = f"It was not tried, since the trials before took the {patience:g} s that all may take."
     checks += [Check(title, False, late) for title in list(TRIALS)[len(checks) :]]
-    return Grade(name, tuple(checks))
+    outcomes = {check.title: (check.passed, check.sentence) for check in checks}
+    step = _cost(Path(path), max(until - time.monotonic(), LEAST)) if simulates(outcomes) else None
+    return Grade(described.name, tuple(checks), fitness(outcomes, described, step))
+
+
+def _cost(path: Path, patience: float) -> float | None:
+    """Processor time of a step, s; None where it cannot be measured."""
+    with tempfile.TemporaryDirectory(prefix="railfmi_check_") as folder:
+        results = Path(folder) / "cost.json"
+        _process(COST, [str(path), str(results)], patience)
+        try:
+            return float(json.loads(results.read_bytes()))
+        except (OSError, ValueError, TypeError):
+            return None
 
 
 def _tried(path: Path, first: int, patience: float) -> list[Check]:
@@ -64,7 +86,7 @@ def _tried(path: Path, first: int, patience: float) -> list[Check]:
     with tempfile.TemporaryDirectory(prefix="railfmi_check_") as folder:
         results = Path(folder) / "results.jsonl"
         results.touch()
-        end = _process([str(path), str(results), str(first)], patience)
+        end = _process(RUN, [str(path), str(results), str(first)], patience)
         lines = list(_lines(results.read_bytes()))
     for line in lines:
         if "unusable" in line:
@@ -90,9 +112,9 @@ def _lines(data: bytes) -> Iterator[dict[str, Any]]:
         yield line
 
 
-def _process(arguments: list[str], patience: float) -> str:
-    """Run the trials; a sentence where they did not come to their end."""
-    command = [sys.executable, "-P", "-m", "fmus.host.grading.trials", *arguments]
+def _process(module: str, arguments: list[str], patience: float) -> str:
+    """Run a module with an FMU; a sentence where it did not come to its end."""
+    command = [sys.executable, "-P", "-m", module, *arguments]
     paths = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     quiet = subprocess.DEVNULL  # FMUs may print
     try:

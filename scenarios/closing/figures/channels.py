@@ -29,6 +29,7 @@ times,
 )  # fmt: skip
 from scenarios.drawing.typography import label, unit
 
+FEW, FAR, MARGIN = 2e-3, 1.0, 0.15  # share of the samples; reach and margin as shares of that of the others
 SEGMENTS = 8  # segments of the test part over which the spectrum is averaged
 Series = list[tuple[str, Hypothesis, str]]
 
@@ -102,6 +103,24 @@ def draw_residual(ax: Axes, record: Record, shown: Series, j: int, noise: float)
             ax.plot(*envelope(t, r[:, j]), color=colour, linewidth=0.7, label=text)
     for level in (-2 * noise, 2 * noise):
         ax.axhline(level, color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
+    _leave_out_single_samples(ax, np.concatenate([r[:, j] for _, h, _ in shown for r in h.residuals]))
+
+
+def _leave_out_single_samples(ax: Axes, values: Array) -> None:
+    """Cut an axis where a few samples (n,) would squeeze all others together, and say how far they reach."""
+    values = values[np.isfinite(values)]
+    least, low, high, most = (float(v) for v in np.quantile(values, [0.0, FEW, 1 - FEW, 1.0]))
+    below, above = low - least > FAR * (high - low), most - high > FAR * (high - low)
+    if not (below or above):
+        return
+    margin = MARGIN * (high - low)
+    ax.set_ylim((low if below else least) - margin, (high if above else most) + margin)
+    for cut, end, y, edge in ((below, least, 0.03, "bottom"), (above, most, 0.97, "top")):
+        if cut:
+            ax.text(
+                0.99, y, f"single samples reach {end:.2g}", ha="right", va=edge, transform=ax.transAxes,
+                fontsize=7, color=NOISE,
+            )  # fmt: skip
 
 
 def spectrum_plots(

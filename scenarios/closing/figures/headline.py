@@ -31,5 +31,5 @@ def headline_plot(problem: Problem, found: Outcome, words: Glossary, free: Hypot
         port = laws[0].missing.port.name
         draw_law(axes["law"], laws[0], words)
         axes["law"].set_title(f"missing at {port}", loc="left", fontsize=9, fontweight="bold")
-        caption += f" Right: the missing force at the port “{port}” (dots) and the law found (line)."
+        caption += f" Second panel: the missing force at the port “{port}” (dots) and the law found (line)."
     return Plot("headline", figure, caption)

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from markupsafe import Markup
 
@@ -55,12 +55,16 @@ class Glossary:
 
 
 def glossary(problem: Problem, hypotheses: Iterable[Hypothesis]) -> Glossary:
-    """Variables of a problem's FMU without effects and with those of each hypothesis."""
+    """Variables of a problem's FMU without effects and with those of each hypothesis.
+
+    Where the FMU states no unit, a variable has the one that the experiment declares.
+    """
     variables = dict(describe(problem.builder(problem.effects)).variables)
     for h in hypotheses:
         here = built(problem, h.candidates)
         variables |= describe(here.builder(here.effects)).variables
-    return Glossary(variables)
+    stated = {c.variable: c.model_unit for c in problem.record.conversions if c.model_unit}
+    return Glossary({n: v if v.unit else replace(v, unit=stated.get(n)) for n, v in variables.items()})
 
 
 def parameter_name(c: Candidate, parameter: str) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
-from estimator.closeloop.evidence import Check
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
@@ -104,17 +103,6 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
 def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
     squares: Array = (h.rms(problem, "choose") / found.baseline.noise.scale) ** 2
     return squares
-
-
-def decided(c: Check) -> dict[str, str]:
-    """A check of the decision, ready to print."""
-    value = number(c.value, 3) if np.isfinite(c.value) else "without limit"
-    return {
-        "check": c.name,
-        "value": value,
-        "limit": number(c.limit, 3),
-        "passed": "yes" if c.passed else "no",
-    }
 
 
 def detection_words(problem: Problem, found: Outcome) -> str:

@@ -1,11 +1,12 @@
 """The tables of the report's sections: numbers and names, ready to print."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -24,12 +25,14 @@ from scenarios.closing.result import effects_of
 from scenarios.drawing.typography import (
     NOTHING,
     capital,
+    label,
     short,
     symbol,
     unit,
     with_error,
 )
 
+WORD = re.compile(r"(\b[^\W\d]\w*)")
 AT_BOUND = 1e-3  # an estimate this near to a bound is at it, as a share of the distance of the bounds
 Row = dict[str, Any]
 
@@ -40,7 +43,7 @@ class LawText:
 
     title: str
     formula: Markup
-    remark: str
+    remark: Markup
     motion: str
     causes: str
     shows: str
@@ -62,7 +65,13 @@ def channels(case: Case) -> Iterator[Row]:
 def _channel(case: Case, name: str, part: str, low: float, high: float, noise: str) -> Row:
     reach = f"{short(low)} to {short(high)}" if high > low else f"{short(low)}, constant"
     row = {"name": name, "part": part, "range": reach, "noise": noise}
-    return row | {"meaning": case.words.meaning(name), "unit": unit(case.words.unit(name)) or "1"}
+    return row | {"meaning": case.words.meaning(name), "unit": _unit(case, name)}
+
+
+def _unit(case: Case, name: str) -> str:
+    """The unit of a variable; 1 for a pure number."""
+    of = case.words.unit(name)
+    return (unit(of) or "1") if of else "not stated"
 
 
 def runs(case: Case) -> list[Row]:
@@ -137,23 +146,37 @@ def _law(case: Case, h: Hypothesis, c: Candidate) -> LawText:
     equation, remark = law(c.kind)
     causes, shows = map(capital, traits(c.kind))
     motion = next((_motion(case, p) for p in case.problem.ports if p.name == c.location), "")
+    parameters = list(_parameters(case, h, c))
     return LawText(
         f"{capital(effect_words(c.kind))} {place_words(c)}",
         equation,
-        remark,
+        remark_words(remark),
         motion,
         causes,
         shows,
-        list(_parameters(case, h, c)),
+        parameters,
     )
 
 
+def remark_words(text: str) -> Markup:
+    """A remark on a formula as a sentence, in which the formula's symbols look as they do there."""
+    words = [symbol(word) if _is_symbol(word) else escape(word) for word in WORD.split(text)]
+    first = next((word for word in WORD.split(text) if word), "")
+    if words and not _is_symbol(first):
+        words[words.index(escape(first))] = escape(capital(first))
+    return Markup("").join(words)
+
+
+def _is_symbol(word: str) -> bool:
+    return WORD.fullmatch(word) is not None and ("_" in word or (len(word) == 1 and word not in "aA"))
+
+
 def _motion(case: Case, port: PortNames) -> str:
-    of = {n: unit(case.words.unit(n)) or "1" for n in (port.force, *port.motion)}
-    displacement = f", q is {port.displacement} in {of[port.displacement]}" if port.displacement else ""
+    of = {n: label("", case.words.unit(n)) for n in (port.force, *port.motion)}
+    displacement = f", q is {port.displacement}{of[port.displacement]}" if port.displacement else ""
     return (
-        f"F acts at the port “{port.name}” in {of[port.force]}, positive in the direction of motion; "
-        f"v is {port.velocity} in {of[port.velocity]}{displacement}."
+        f"F acts at the port “{port.name}”{of[port.force]}, positive in the direction of motion; "
+        f"v is {port.velocity}{of[port.velocity]}{displacement}."
     )
 
 
@@ -179,7 +202,7 @@ def calibrated(case: Case) -> Iterator[Row]:
         yield {
             "name": name,
             "meaning": case.words.meaning(name),
-            "unit": unit(case.words.unit(name)) or "1",
+            "unit": _unit(case, name),
             "declared": short(case.problem.declared[name]),
             "bounds": f"{short(low)} to {short(high)}",
             "before": with_error(base.theta[name], base.std[name]) if with_effect else NOTHING,

@@ -66,7 +66,8 @@ class NormReport:
     def headline(self) -> str:
         """The verdict in one sentence."""
         judged = [row for row in self.exact if row.inside is not None]
-        first = f"Step 1: {sum(row.passed for row in judged)} of {len(judged)} pairs with a table inside"
+        passed = sum(row.passed for row in judged)
+        first = f"Step 1: {passed} of {len(judged)} pairs with a table are inside its tolerance"
         if not self.measured:
             return first
         return f"{first}; step 2: {sum(row.passed for row in self.measured)} of {len(self.measured)} inside"

@@ -5,7 +5,9 @@
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   function options(panel, data, key, moved) {
-    const axis = { stroke: () => colour("--soft"), grid: { stroke: () => colour("--line"), width: 1 }, ticks: { show: false } };
+    // plain numbers: a comma for thousands would be read as a decimal sign
+    const plain = (_, splits) => splits.map((v) => (v == null ? "" : String(+v.toPrecision(10))));
+    const axis = { values: plain, stroke: () => colour("--soft"), grid: { stroke: () => colour("--line"), width: 1 }, ticks: { show: false } };
     const shade = (u) => {
       u.ctx.fillStyle = colour("--pale");
       for (const [from, to] of data.shaded) {
