@@ -19,7 +19,7 @@ TOLD = ("confirmed", "agrees", "differs", "surpassed")  # transfers printed here
 def lines_of(result: Result) -> Iterator[str]:
     """The verdict, effects and errors of one experiment."""
     yield f"{result.verdict}: {result.reason}"
-    if result.probability:
+    if result.weighed:
         yield f"  {probable(result.probability)}"
     for found in result.effects:
         values = ", ".join(f"{n} = {v:.4g} ± {e:.2g}" for n, (v, e) in found.parameters.items())

@@ -117,7 +117,7 @@ def _rejection(case: Case) -> Values:
         "best": hypothesis_words(case.found.chosen or case.found.base),
         "outputs": {o: unit(case.words.unit(o)) for o in case.problem.record.outputs},
         "statistics": list(figures(case.found.detection.figures)),
-        "probable": list(probable_rows(case.result.probability)),
+        "probable": list(probable_rows(case.result.probability)) if case.result.weighed else [],
         "decision": [decided(c) for c in case.found.judgement.checks],
         "detection": detection_words(case.problem, case.found),
         "chance": chance_words(case.found, case.diagnostics) if case.diagnostics else "",

@@ -90,6 +90,11 @@ class Result(Shown):
     start_values: dict[str, dict[str, Any]] = field(default_factory=dict)
     probability: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def weighed(self) -> bool:
+        """Whether answers were compared; where none has a thousandth of the probability, none is listed."""
+        return bool(self.probability) or self.verdict == "unexplained"
+
     def lines(self) -> list[str]:
         """See Shown.lines."""
         from scenarios.closing.lines import lines_of  # which imports this module

@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.closing.lines import probable
+from scenarios.closing.lines import lines_of, probable
 from scenarios.closing.page.rejected import probable_rows
+from scenarios.closing.result import Result
 from scenarios.drawing.typography import chance
 
 
@@ -43,4 +44,17 @@ def test_the_page_says_what_the_line_says_in_words():
         ("no discrepancy", "10 %"),
         ("none of these", "10 %"),
     ]
-    assert list(probable_rows({})) == []
+    assert list(probable_rows({})) == [("none of these", "above 99.9 %")]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said", "line"),
+    [
+        ("unexplained", {}, "  probability: none of these above 99.9 %"),
+        ("no_discrepancy", {"no_discrepancy": 0.9}, "  probability: no discrepancy 90 %, none of these 10 %"),
+        ("sensor_fault", {}, None),  # a dead sensor: nothing was compared
+    ],
+)
+def test_that_nothing_of_the_library_is_probable_is_said_too(verdict, said, line):
+    result = Result("a", verdict, [], "", [], [], {}, {}, 1.0, "", "", {}, {}, probability=said)
+    assert [x for x in lines_of(result) if "probability" in x] == ([] if line is None else [line])

@@ -41,13 +41,12 @@ def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
 
 
 def probable_rows(said: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Each answer in words with its probability, and what is left; nothing if none is said."""
+    """Each answer in words with its probability, and what is left."""
     for label, p in said.items():
         parts = (part.partition("@") for part in label.split(" + "))
         words = (f"{effect_words(kind)} at {at}" if at else kind.replace("_", " ") for kind, _, at in parts)
         yield " and ".join(words), chance(p)
-    if said:
-        yield "none of these", chance(none_of_these(said))
+    yield "none of these", chance(none_of_these(said))
 
 
 def _row(problem: Problem, found: Outcome, h: Hypothesis) -> Rejected:
