@@ -52,7 +52,8 @@ def write_fleet(
 
     records: of each vehicle at each place; drifting, broken: shares of vehicles and of records.
     fmu: an FMU with drag at the roller built in, whose parameter is estimated; the drifting vehicles then
-    have a drag that grows by `growth`, N.m.s/rad per km. Without it, their friction mu0 changes by `wear`, 1/km.
+    have a drag that grows by `growth`, N.m.s/rad per km. Without it, their friction mu0 changes by
+    `wear`, 1/km.
     """
     rng = np.random.default_rng(seed)
     names = [f"rig-{k:03}" for k in range(1, vehicles + 1)]

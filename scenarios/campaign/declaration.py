@@ -52,11 +52,11 @@ class Range(Table):
 class Declaration(Table):
     """The keys of a campaign file; the path of the scenario is relative to its folder.
 
-    sample: how points are placed. "grid": all combinations; "latin-hypercube": `n` points, one in each n-th of
-    every range; "sobol": `n` base points, a power of two, and n (k + 2) simulations for Sobol's indices of k
-    varied keys. vary: by the key of the scenario, as TOML writes it; set: keys with one value at all points;
-    measure: by name, a formula over the signals whose value is a number; variant: of the scenario, if it has
-    some.
+    sample: how points are placed. "grid": all combinations; "latin-hypercube": `n` points, one in each n-th
+    of every range; "sobol": `n` base points, a power of two, and n (k + 2) simulations for Sobol's indices of
+    k varied keys. vary: by the key of the scenario, as TOML writes it; set: keys with one value at all
+    points; measure: by name, a formula over the signals whose value is a number; variant: of the
+    scenario, if it has some.
     """
 
     id: FileName

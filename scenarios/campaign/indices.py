@@ -1,16 +1,14 @@
 """Sobol's indices of a campaign: which share of a result's variance each varied key causes."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import DegenerateDataWarning, sobol_indices
 
 CONFIDENCE = 0.95
 RESAMPLES = 999
-FEWEST = 4  # complete base points, from which indices are computed
+FEWEST = 4  # complete base points, from which on indices are computed
 Array = NDArray[np.float64]
 
 
@@ -36,27 +34,32 @@ class Index:
 def indices_of(measure: str, keys: Sequence[str], values: Array, seed: int) -> list[Index]:
     """Indices from the values (n (k + 2),) at the points of `sampling`; none if too few or all alike.
 
-    By the estimators of A. Saltelli et al. (Computer Physics Communications 181 (2010), 259-270) in SciPy,
-    with
-    bootstrap intervals over the base points, bias-corrected and accelerated. A base point that has no value
-    in one of its simulations is left out as a whole.
+    Intervals by resampling the base points (G. E. B. Archer, A. Saltelli and I. M. Sobol, J. Statist. Comput.
+    Simul. 58 (1997), 99-120), as quantiles. A base point that has no value in one of its simulations is left
+    out as a whole, so that their number need not be a power of two, which scipy.stats.sobol_indices demands.
     """
-    k = len(keys)
-    table = values.reshape(k + 2, -1)
-    used = np.isfinite(table).all(axis=0)
-    a, b, *mixed = table[:, used]
-    if used.sum() < FEWEST or not np.ptp(np.concatenate([a, b])) > 0:
+    table = values.reshape(len(keys) + 2, -1)
+    table = table[:, np.isfinite(table).all(axis=0)]
+    n = table.shape[1]
+    if n < FEWEST or not np.ptp(table[:2]) > 0:
         return []
-    func = {"f_A": a[None], "f_B": b[None], "f_AB": np.array(mixed)[:, None]}
-    found = sobol_indices(func=func, n=int(used.sum()), rng=np.random.default_rng(seed))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateDataWarning)  # a key that changes nothing at all
-        spread = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
-    first, total = spread.first_order.confidence_interval, spread.total_order.confidence_interval
-    value = [np.asarray(x, dtype=np.float64).reshape(k) for x in (found.first_order, found.total_order)]
-    columns = [value[0], first.low, first.high, value[1], total.low, total.high]
-    flat = [np.asarray(c, dtype=np.float64).reshape(k) for c in columns]
-    flat = [np.where(np.isfinite(c), c, value[i // 3]) for i, c in enumerate(flat)]  # all resamples alike
-    return [
-        Index(measure, key, *(float(c[i]) for c in flat), used=int(used.sum())) for i, key in enumerate(keys)
-    ]
+    found, rng = estimates(table), np.random.default_rng(seed)
+    drawn = np.array([estimates(table[:, rng.integers(0, n, n)]) for _ in range(RESAMPLES)])
+    low, high = np.nanquantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2], axis=0)
+    first, total = np.array([found, low, high]).transpose(1, 2, 0).tolist()
+    return [Index(measure, key, *first[i], *total[i], n) for i, key in enumerate(keys)]
+
+
+def estimates(table: Array) -> Array:
+    """First and total indices (2, k) from the values (k + 2, n) at A, B, and A with one key of B each.
+
+    Estimators of A. Saltelli et al. (Computer Physics Communications 181 (2010), 259-270), table 2, b and f,
+    about the mean. nan where all values of a resample are alike.
+    """
+    centred = table - table[:2].mean()
+    a, b, mixed = centred[0], centred[1], centred[2:]
+    variance = float(np.var(centred[:2]))
+    if variance == 0:
+        return np.full((2, len(mixed)), np.nan)
+    both: Array = np.array([np.mean(b * (mixed - a), axis=1), 0.5 * np.mean((a - mixed) ** 2, axis=1)])
+    return both / variance

@@ -79,7 +79,7 @@ def _table(file: Path, variant: str | None, campaign: Path) -> dict[str, Any]:
             f"{campaign}: key 'variant': there is no variant '{variant}'; {did_you_mean(variant, names)}"
         )
     table = read_toml(file, "a scenario")
-    changes = next((v for v in table.get("variants", []) if v.get("name") == variant), {})
+    changes: dict[str, Any] = next((v for v in table.get("variants", []) if v.get("name") == variant), {})
     changes = {k: v for k, v in changes.items() if k != "name"}
     return merged({k: v for k, v in table.items() if k not in NOT_RUN}, changes)
 

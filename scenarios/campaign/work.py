@@ -65,10 +65,9 @@ def _measured(given: Mapping[str, Any], place: Place) -> dict[str, float | None]
 
 def _shipped(d: Declaration, fmus: Mapping[str, str], place: Place) -> Declaration:
     """The scenario with the FMUs that were shipped in place of those beside its file."""
-    members = {
-        name: member.model_copy(update={"fmu": str(place.fmu(fmus[member.fmu]))})
-        if member.fmu in fmus
-        else member
-        for name, member in d.fmus.items()
-    }
+    members = {}
+    for name, member in d.fmus.items():
+        checksum = fmus.get(member.fmu or "")
+        other = {"fmu": str(place.fmu(checksum))} if checksum else {}
+        members[name] = member.model_copy(update=other)
     return d.model_copy(update={"fmus": members})

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from scenarios.fleet.scatter import CONFIDENCE, Array, excess
+from scenarios.fleet.scatter import CONFIDENCE, EFFICIENCY, Array, excess
 
 FEWEST = 4  # records of a vehicle, from which on a line has freedom left to be tested
 # 95 % point of the likelihood ratio about the true change point, -2 ln(1 - sqrt(0.95)):
@@ -137,7 +137,7 @@ def courses(series: Sequence[Points]) -> list[Course]:
         freedom,
         float(min(p.std.min() for p in series)),
     )
-    return [_course(p, scatter, float(freedom.sum())) for p in series]
+    return [_course(p, scatter, EFFICIENCY * float(freedom.sum())) for p in series]
 
 
 def _course(p: Points, scatter: float, freedom: float) -> Course:

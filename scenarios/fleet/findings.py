@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from scenarios.fleet.declaration import CALIBRATED
 from scenarios.fleet.drift import Course, Points, courses
 from scenarios.fleet.rows import Row
-from scenarios.fleet.scatter import Array, Mean, excess, mean_over
+from scenarios.fleet.scatter import EFFICIENCY, Array, Mean, excess, mean_over
 from scenarios.tasks.store import FAILED
 
 QUANTITY = ("command", "setup", "model", "class", "place", "kind", "location", "parameter")
@@ -127,7 +127,7 @@ def _of_class(quantity: Quantity, vehicles: Mapping[str, Sequence[Row]]) -> Iter
     values = {v: np.array([[r["size"], r["std"]] for r in rows]).T for v, rows in vehicles.items()}
     repeated = [x for x in values.values() if x.shape[1] > 1]
     scatter = excess(
-        lambda tau: np.array([_about_mean(*x, tau) for x in repeated]),
+        lambda tau: np.array([_about_mean(x[0], x[1], tau) for x in repeated]),
         np.array([x.shape[1] - 1.0 for x in repeated]),
         float(min(x[1].min() for x in values.values())),
     )
@@ -135,13 +135,14 @@ def _of_class(quantity: Quantity, vehicles: Mapping[str, Sequence[Row]]) -> Iter
     means = {v: float(np.sum(weights[v] * x[0]) / weights[v].sum()) for v, x in values.items()}
     errors = {v: float(w.sum() ** -0.5) for v, w in weights.items()}
     of_class = mean_over([*means.values()], [*errors.values()])
+    freedom = EFFICIENCY * (of_class.groups - 1)
     for v, rows in vehicles.items():
         distance = (means[v] - of_class.centre) / float(np.hypot(errors[v], of_class.spread))
         tested = of_class.groups >= LEAST_VEHICLES
         yield {
             "quantity": quantity, "vehicle": v, "value": means[v], "std": errors[v], "records": len(rows),
             "unit": rows[0]["unit"], "of_class": of_class, "distance": distance,
-            "p_value": float(2 * student.sf(abs(distance), of_class.groups - 1)) if tested else None,
+            "p_value": float(2 * student.sf(abs(distance), freedom)) if tested else None,
         }  # fmt: skip
 
 

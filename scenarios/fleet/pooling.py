@@ -119,19 +119,23 @@ def _standing(
     by_vehicle: dict[str, list[_Seen]] = defaultdict(list)
     for s in seen:
         by_vehicle[s.vehicle].append(s)
-    lists: dict[str, list[str]] = {"shown": [], "possible": [], "absent": [], "blind": []}
+    shown: list[str] = []
+    possible: list[str] = []
+    absent: list[str] = []
+    blind: list[str] = []
     for vehicle, records in by_vehicle.items():
         if any(s.has(effect, sure=True) for s in records):
-            lists["shown"].append(vehicle)
+            shown.append(vehicle)
         elif any(s.has(effect, sure=False) for s in records):
-            lists["possible"].append(vehicle)
+            possible.append(vehicle)
         elif any(s.would_show(effect, parameter, size.value) for s in records):
-            lists["absent"].append(vehicle)
+            absent.append(vehicle)
         else:
-            lists["blind"].append(vehicle)
-    shown, decided = len(lists["shown"]), len(lists["shown"]) + len(lists["absent"])
-    interval = binomtest(shown, decided).proportion_ci(CONFIDENCE, "exact")
+            blind.append(vehicle)
+    n, decided = len(shown), len(shown) + len(absent)
+    interval = binomtest(n, decided).proportion_ci(CONFIDENCE, "exact")
+    setup, model, vehicle_class = key
     return Pooled(
-        *key, *effect, parameter, unit, size, **lists, share=shown / decided,
-        share_low=float(interval.low), share_high=float(interval.high),
+        setup, model, vehicle_class, effect[0], effect[1], parameter, unit, size, shown, possible, absent,
+        blind, n / decided, float(interval.low), float(interval.high),
     )  # fmt: skip

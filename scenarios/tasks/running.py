@@ -87,7 +87,7 @@ class Crew:
     files: Mapping[str, Path] = field(default_factory=dict)
 
 
-class Shipment(WorkerPlugin):
+class Shipment(WorkerPlugin):  # type: ignore[misc]  # the library is not followed
     """Files that each worker gets once, also a worker that starts later."""
 
     name = SHIPMENT
