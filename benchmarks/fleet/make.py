@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.truth.rig import experiment_toml, write_record
 from tests.truth.rig_effects import Effects, Torque
-from tests.truth.rig_inputs import constant_frequency
+from tests.truth.rig_inputs import LARGEST_TORQUE, Array, constant_frequency, trapezium
 from tests.truth.rig_motion import DECLARED
 
 DRAG = "viscous_damping_roller_c"  # parameter of the FMU with drag at the roller built in, N.m.s/rad
@@ -75,6 +75,14 @@ def write_fleet(
     return FleetTruth(odd, lost, folder / "fleet.toml")
 
 
+def stops(t: Array, rng: np.random.Generator, limit: float = LARGEST_TORQUE) -> Array:
+    """Torque [N.m] of brake applications up to the limit, one every five seconds, which show the friction."""
+    T_P = np.zeros_like(t)
+    for start in np.arange(t[0] + 0.5, t[-1], 5.0):
+        T_P += limit * rng.uniform(0.9, 1.0) * trapezium(t, start + rng.uniform(0, 0.5), 0.4, 2.5)
+    return T_P
+
+
 def _record(
     folder: Path,
     name: str,
@@ -87,7 +95,7 @@ def _record(
     """One record of the rig with this friction and drag at the roller."""
     made = write_record(
         folder / "made", name, rng, duration=duration, dt=dt, parameters_true={"mu0": mu0},
-        effects=Effects(roller=Torque(viscous=drag)), frequency=constant_frequency, digits=6,
+        effects=Effects(roller=Torque(viscous=drag)), torque=stops, frequency=constant_frequency, digits=6,
     )  # fmt: skip
     target = folder / "records" / f"{name}.csv"
     target.parent.mkdir(exist_ok=True)

@@ -175,7 +175,8 @@ class _Planned:
         self, command: Command, model: FleetModel, options: str, r: FleetRecord, data: str | OSError
     ) -> Job:
         if isinstance(data, OSError):
-            reason = f"{r.data}: cannot be read ({data.strerror or data})"
+            name = str(r.data).replace(f"{self.fleet.parent}/", "")
+            reason = f"{name}: cannot be read ({data.strerror or data})"
             return Job(command, model, self.name, options, r, reason=reason)
         table = {k: v for k, v in merged(self.table, r).items() if k not in ("model", "fmu")}
         given = {"table": table, "file": str(self.file), "data_sha256": data}

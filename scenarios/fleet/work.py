@@ -46,7 +46,7 @@ def answered(given: Mapping[str, Any], place: Place) -> Answer:
         raise
     except Exception as error:  # whatever one record does, it is one row
         said = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
-        return failed(place.without(said))
+        return failed(place.without(said).replace(f"{Path(given.get('file', '')).parent}/", ""))
     finally:
         PLANTS.close()
 
