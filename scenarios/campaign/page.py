@@ -10,7 +10,7 @@ from scenarios.campaign.campaign import Assembled, Row
 from scenarios.campaign.indices import Index
 from scenarios.campaign.result import Measured
 from scenarios.drawing.pages import rendered
-from scenarios.drawing.sheet import AFTER, BEFORE, CLOUD, Plot, name_axes, sheet, sheets
+from scenarios.drawing.sheet import AFTER, BEFORE, CLOUD, Plot, legend, name_axes, sheet, sheets
 from scenarios.drawing.typography import NOTHING, number
 from scenarios.output import written
 
@@ -70,17 +70,25 @@ def index_plots(indices: Sequence[Index]) -> Iterator[Plot]:
             value, low, high = (np.array([getattr(i, name + e) for i in some]) for e in ("", "_low", "_high"))
             ax.barh(at + shift, value, height=0.3, color=colour, label=word)
             ax.hlines(at + shift, low, high, color="black", linewidth=0.9)
-        ax.set_yticks(at, [i.key for i in some], fontsize=7)
+        ax.set_yticks(at, short_names([i.key for i in some]), fontsize=8)
         ax.invert_yaxis()
-        ax.legend(frameon=False, fontsize=8)
+        legend(figure, ax)
         name_axes(ax, f"share of the variance of {measure}")
         yield Plot(f"indices_{n + 1}", figure, f"Sobol's indices of {measure}; lines: 95 % intervals.")
+
+
+def short_names(keys: Sequence[str]) -> list[str]:
+    """The last part of each key, or whole keys where these are not unique."""
+    last = [key.rpartition(".")[2] for key in keys]
+    return last if len({*last}) == len(last) else list(keys)
 
 
 def scatter_plots(found: Assembled) -> Iterator[Plot]:
     """Measures over varied keys, the strongest pairs first; the points of all simulations."""
     strength = {(i.measure, i.key): i.total for i in found.result.indices}
-    pairs = [(m, k) for m in found.plan.declared.measure for k in found.plan.declared.vary]
+    varied = list(found.plan.declared.vary)
+    names = dict(zip(varied, short_names(varied), strict=True))
+    pairs = [(m, k) for m in found.plan.declared.measure for k in varied]
     pairs.sort(key=lambda pair: -strength.get(pair, 0.0))
     pairs = pairs[:SCATTERED]
     rows = [pairs[i : i + BESIDE] for i in range(0, len(pairs), BESIDE)]
@@ -89,11 +97,11 @@ def scatter_plots(found: Assembled) -> Iterator[Plot]:
         figure, axes = sheet(0.3 + 2.0 * len(some), layout)
         for i, row in enumerate(some):
             for j, (measure, key) in enumerate(row):
-                _scatter(axes[f"{i}.{j}"], found.rows, measure, key)
+                _scatter(axes[f"{i}.{j}"], found.rows, measure, key, names[key])
         yield Plot(f"scatter{ending}", figure, "Measures over varied keys, a point for each simulation.")
 
 
-def _scatter(ax: Any, rows: Sequence[Row], measure: str, key: str) -> None:
+def _scatter(ax: Any, rows: Sequence[Row], measure: str, key: str, name: str) -> None:
     known = [row for row in rows if row[measure] is not None]
     x = [row[key] for row in known]
     if any(isinstance(v, str) for v in x):
@@ -101,4 +109,4 @@ def _scatter(ax: Any, rows: Sequence[Row], measure: str, key: str) -> None:
         x = [names.index(str(v)) for v in x]
         ax.set_xticks(range(len(names)), names, fontsize=6)
     ax.plot(x, [row[measure] for row in known], ".", color=AFTER if len(known) < 500 else CLOUD, markersize=3)
-    name_axes(ax, key, measure)
+    name_axes(ax, name, measure)

@@ -33,11 +33,11 @@ from scenarios.fleet.tables import drift_row, level_row
 # what a verdict means for who looks at the fleet, the most serious last
 STANDINGS = {
     "not looked at": (SHADE, ()),
+    "no answer": (INK, ("failed",)),
     "nothing found": (CLOUD, ("consistent", "no_discrepancy")),
     "not decided": (NOISE, ("ambiguous", "insufficient_excitation", "inconsistent")),
     "effect found": (BEFORE, ("traced", "several", "sensor_fault")),
     "unexplained": (LAW, ("unexplained", "diverged")),
-    "no answer": (INK, ("failed",)),
 }
 LABELLED = 60  # vehicles that are named on the map
 ROW = 0.16  # inches of a named vehicle

@@ -42,7 +42,6 @@ def _drift(d: Row, mileage_unit: str) -> Row:
         "vehicle": d["vehicle"],
         "place": d["place"],
         "quantity": quantity_words(d),
-        "records": d["records"],
         "course": f"{with_error(d['change_size'], d['change_std'])} {unit(d['unit'])}"
         if changes
         else f"{with_error(d['slope'], d['slope_std'])} {per}",

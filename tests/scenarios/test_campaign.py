@@ -77,7 +77,7 @@ def test_the_indices_of_a_known_function_lie_in_their_intervals():
 
 @pytest.mark.slow
 def test_the_intervals_hold_as_often_as_the_page_says():
-    """From 64 base points on; 3 standard deviations of 240 trials below 95 %, of which three are of one sample."""
+    """Tolerance: 40 samples of six intervals, which are not independent, and 95 %."""
     pi, held = {"low": -math.pi, "high": math.pi}, []
     for seed in range(40):
         d = declared("sobol", 64, x1=pi, x2=pi, x3=pi).model_copy(update={"seed": seed})

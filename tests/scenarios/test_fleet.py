@@ -259,8 +259,10 @@ def test_the_tables_name_each_value_and_what_it_follows_from(found, tmp_path):
     assert {"check", "estimate", "close-loop"} == {*table["command"]}
     rows = table[table["command"] == "estimate"]
     assert (
-        rows[["model_sha256", "record_sha256", "setup_sha256", "program_sha256", "task"]].map(len) == 64
-    ).all(None)
+        (rows[["model_sha256", "record_sha256", "setup_sha256", "program_sha256", "task"]].map(len) == 64)
+        .to_numpy()
+        .all()
+    )
     assert not any("seconds" in name for name in table.columns)
     drifts = pq.read_table(tmp_path / "one" / "drifts.parquet").to_pandas()
     assert drifts.loc[drifts["drifts"], "vehicle"].tolist() == ["v0"]
