@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
@@ -12,6 +13,8 @@ from fmus.host.apart.isolation import ISOLATED
 from scenarios.fleet.declaration import Declaration
 from scenarios.fleet.records import merged, read_records
 from tests.helpers.paths import ROOT
+from tests.truth.rig import write_record
+from tests.truth.rig_effects import Effects, Torque
 
 pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
 
@@ -291,6 +294,38 @@ def test_a_task_without_an_answer_is_left_with_the_reason(answered_fleet):
     assert found.result.tasks["left"] == 1
     assert not found.result.complete
     assert [f["reason"] for f in found.result.failed] == ["memory ran out"]
+
+
+@pytest.mark.slow
+def test_what_a_worker_does_with_a_record_that_shows_an_effect(tmp_path):
+    """Drag at the roller is traced, in rows with unit, error and probability; the model is checked."""
+    made = write_record(
+        tmp_path, "drag", np.random.default_rng(1), duration=20.0, dt=0.02, parameters_true={"mu0": 0.37},
+        effects=Effects(roller=Torque(quadratic=0.3)),
+    )  # fmt: skip
+    table = f"{HEAD}\ndrag,v,,,,{made.parent / 'data.csv'}\n"
+    file = written(tmp_path, FLEET.replace('"estimate", ', "").replace("triage = true\n", ""), table)
+    (tmp_path / "setup.toml").write_text(made.read_text())
+    plan, store = plan_of(file, ISOLATED), Store(tmp_path / "store")
+    place = Place(tmp_path / "builds", tmp_path / "shipped")
+    place.builds.mkdir()
+    for job in plan.jobs:
+        assert job.task is not None
+        store.finish(job.task.key, answered(job.task.given, place))
+    found = assembled(plan, store, {}, 1.0)
+    write_tables(tmp_path / "out", found)
+    rows = [r for r in found.rows if r["command"] == "close-loop"]
+    [drag] = [r for r in rows if r["kind"] == "quadratic_damping"]
+    assert (drag["verdict"], drag["location"], drag["parameter"]) == ("traced", "roller", "c")
+    assert drag["low_95"] < 0.3 < drag["high_95"]
+    assert drag["size"] == pytest.approx(0.3, abs=0.01)
+    assert drag["probability"] > 0.5
+    assert drag["unit"] == "N.m.s2/rad2"
+    [mu0] = [r for r in rows if r["kind"] == "calibrated"]
+    assert mu0["size"] == pytest.approx(0.37, abs=0.01)
+    [effect] = found.effects
+    assert (effect.parameter, effect.shown, effect.share) == ("c", ["v"], 1.0)
+    assert {r["verdict"] for r in found.rows if r["command"] == "check"} <= {"passed", "not offered"}
 
 
 @pytest.mark.slow
