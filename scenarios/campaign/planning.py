@@ -19,7 +19,7 @@ from scenarios.tasks.hashes import hash_of, hash_of_file, hash_of_program
 from scenarios.tasks.running import Task
 
 NOT_RUN = ("variants", "figure")  # keys of a scenario that a point leaves out
-Path_ = tuple[str, ...]
+Way = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def _table(file: Path, variant: str | None, campaign: Path) -> dict[str, Any]:
     return merged({k: v for k, v in table.items() if k not in NOT_RUN}, changes)
 
 
-def _path(key: str) -> Path_:
+def _path(key: str) -> Way:
     """The parts of a key of TOML, such as fmus.vehicle.parameters.k2 or inputs."vehicle.u_fl"."""
     try:
         value: Any = tomllib.loads(f"{key} = 0")
@@ -97,7 +97,7 @@ def _path(key: str) -> Path_:
     return tuple(parts)
 
 
-def changed(table: Mapping[str, Any], point: Point, paths: Mapping[str, Path_]) -> dict[str, Any]:
+def changed(table: Mapping[str, Any], point: Point, paths: Mapping[str, Way]) -> dict[str, Any]:
     """A scenario with the values of a point; BadInput where a key leads through what is no table or list."""
     made = json.loads(json.dumps(table))
     for key, value in point.items():

@@ -1,7 +1,7 @@
 """From a fleet file to its tasks: which command on which record, with which model and which setup."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from scenarios.experiment.declaration import Declaration as Experiment
 from scenarios.experiment.experiment import check_names, placed
 from scenarios.experiment.validation import of_file, read_file, read_table, read_toml
 from scenarios.fleet.declaration import Command, Declaration, Setup
-from scenarios.fleet.records import FleetRecord, merged, read_records
+from scenarios.fleet.records import FleetRecord, read_records, with_record
 from scenarios.tasks.hashes import hash_of, hash_of_file, hash_of_program
 from scenarios.tasks.running import Task
 
@@ -109,10 +109,11 @@ class _Planned:
     name: str
     setup: Setup
     isolation: Isolation | None
-    limits: Mapping[str, float] | None = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "limits", asdict(self.isolation) if self.isolation else None)
+    @property
+    def limits(self) -> dict[str, float] | None:
+        """The isolation as a table."""
+        return asdict(self.isolation) if self.isolation else None
 
     @cached_property
     def file(self) -> Path:
@@ -178,7 +179,7 @@ class _Planned:
             name = str(r.data).replace(f"{self.fleet.parent}/", "")
             reason = f"{name}: cannot be read ({data.strerror or data})"
             return Job(command, model, self.name, options, r, reason=reason)
-        table = {k: v for k, v in merged(self.table, r).items() if k not in ("model", "fmu")}
+        table = {k: v for k, v in with_record(self.table, r).items() if k not in ("model", "fmu")}
         given = {"table": table, "file": str(self.file), "data_sha256": data}
         return self._job(command, model, options, given, r, hash_of([data, r.declared]))
 

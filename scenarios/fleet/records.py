@@ -1,6 +1,6 @@
 """The table of a fleet's records: which vehicle, where, at which mileage, and what is declared anew."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -108,7 +108,7 @@ def _number(text: str, where: str) -> float:
     return value
 
 
-def merged(table: Mapping[str, Any], record: FleetRecord) -> dict[str, Any]:
+def with_record(table: Mapping[str, Any], record: FleetRecord) -> dict[str, Any]:
     """The experiment of a setup with a record's own values and data."""
     made = dict(table)
     for head, values in record.declared.items():
@@ -117,8 +117,3 @@ def merged(table: Mapping[str, Any], record: FleetRecord) -> dict[str, Any]:
     options = {k: v for k, v in data.items() if k != "file"} if isinstance(data, Mapping) else {}
     made |= {"id": record.id, "data": {**options, "file": str(record.data)} if options else str(record.data)}
     return made
-
-
-def vehicles_of(records: list[FleetRecord]) -> Iterator[str]:
-    """The vehicles in the order of the table, each once."""
-    return iter(dict.fromkeys(r.vehicle for r in records))

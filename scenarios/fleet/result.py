@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 NAMED = 20  # vehicles and records that are named on the command line; the tables have all
 RESULTS, DRIFTS, LEVELS, EFFECTS = "results", "drifts.parquet", "levels.parquet", "effects.parquet"
-TABLES = (RESULTS, DRIFTS, LEVELS, EFFECTS)
 
 
 @dataclass(frozen=True, repr=False)

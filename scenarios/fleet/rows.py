@@ -1,6 +1,6 @@
 """The table of a fleet: a row for each thing found, in an order that depends on the fleet file alone."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -24,7 +24,6 @@ SCHEMA = pa.schema(
 )  # fmt: skip
 FOUND = ("verdict", "kind", "location", "parameter", "size", "std", "low_95", "high_95", "unit",
          "probability", "error_over_noise", "reason", "policy")  # fmt: skip
-Read = Callable[[str], Answer | None]
 
 
 def rows_of(plan: Plan, answers: Mapping[str, Answer], reasons: Mapping[str, str]) -> list[Row]:

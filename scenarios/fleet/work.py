@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -136,7 +135,7 @@ def _close_loop(given: Mapping[str, Any], place: Place) -> Answer:
             {k: line[k] for k in ("kind", "location", "parameter", "smallest", "largest")}
             for line in result.power
         ],
-        "decision": [asdict(c) for c in found.judgement.checks],
+        "decision": result.decision,
     }
 
 

@@ -13,13 +13,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from joblib import cpu_count
+
 from fmus.errors import BadInput
+from fmus.files import write_at_once
 from scenarios.tasks.hashes import hash_of, hash_of_program
 from scenarios.tasks.store import BUILDS, Answer, Store
 
 try:
     import dask
     from distributed import Client, LocalCluster, as_completed, get_worker
+    from distributed.comm import CommClosedError
     from distributed.diagnostics.plugin import WorkerPlugin
 except ImportError as missing:
     raise BadInput(
@@ -29,7 +33,7 @@ except ImportError as missing:
 CONNECTING = 30  # s, to reach a scheduler
 FIRST_WORKER = 120  # s, until a scheduler has at least one worker
 CLOSING = 2  # s, for workers to end
-SHIPMENT = "railfmi-shipment"
+SHIPPED = "shipped"  # folder in that of a worker
 SETTINGS = {
     "distributed.worker.daemon": False,  # the FMUs of a worker run in processes of their own
     "distributed.worker.memory.target": False,  # a task keeps nothing in the worker that could be spilled
@@ -90,19 +94,16 @@ class Crew:
 class Shipment(WorkerPlugin):  # type: ignore[misc]  # the library is not followed
     """Files that each worker gets once, also a worker that starts later."""
 
-    name = SHIPMENT
-
     def __init__(self, files: Mapping[str, tuple[str, bytes]]) -> None:
         self.files = files
-        self.folder = Path()
+        self.name = f"railfmi-{hash_of(sorted(files))}"  # others may use the same workers
 
     def setup(self, worker: Any) -> None:
         """Write the files into the worker's own folder."""
-        self.folder = Path(worker.local_directory) / "shipped"
         for checksum, (name, data) in self.files.items():
-            target = self.folder / checksum / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(data)
+            target = Path(worker.local_directory) / SHIPPED / checksum / name
+            if not target.exists():
+                write_at_once(target, data)
 
 
 def run(tasks: Sequence[Task], work: Work, store: Store, crew: Crew, tell: Tell, what: str) -> dict[str, str]:
@@ -116,7 +117,7 @@ def run(tasks: Sequence[Task], work: Work, store: Store, crew: Crew, tell: Tell,
         return {}
     done, failed = len(tasks) - len(left), dict[str, str]()
     tell(f"starting the workers; {done} of {len(tasks)} {what} are finished already")
-    with _client(crew) as client:
+    with _lost_is_told(crew), _client(crew) as client:
         files = {k: (file.name, file.read_bytes()) for k, file in crew.files.items()}
         client.register_plugin(Shipment(files))
         names = {f"railfmi-{hash_of([str(store.folder), t.key])}": t.key for t in left}
@@ -127,19 +128,28 @@ def run(tasks: Sequence[Task], work: Work, store: Store, crew: Crew, tell: Tell,
         waiting = as_completed(futures)
         futures.clear()  # an answer is let go once it is here
         for future in waiting:
-            _take(future, names[future.key], store, failed, crew)
+            _take(future, names[future.key], store, failed)
             done += 1
             tell(f"{what}, {done} of {len(tasks)}")
     return failed
 
 
-def _take(future: Any, key: str, store: Store, failed: dict[str, str], crew: Crew) -> None:
-    """Keep an answer that a worker without the folder of the store brought, or the reason for none."""
-    if future.status in ("cancelled", "lost"):
+@contextmanager
+def _lost_is_told(crew: Crew) -> Iterator[None]:
+    """One line where the scheduler was lost."""
+    try:
+        yield
+    except CommClosedError as error:
         raise BadInput(
             f"--scheduler {crew.scheduler or 'of this machine'}: was lost; what was finished is kept: start "
             "it again, then the same command"
-        )
+        ) from error
+
+
+def _take(future: Any, key: str, store: Store, failed: dict[str, str]) -> None:
+    """Keep an answer that a worker without the folder of the store brought, or the reason for none."""
+    if future.status in ("cancelled", "lost"):
+        raise CommClosedError(future.status)
     if future.status == "error":
         error = future.exception()
         killed = type(error).__name__ == "KilledWorker"
@@ -173,7 +183,7 @@ def _place(store: Store) -> Place:
     """Builds are shared by the workers of a host, since a compiler makes them for its processor."""
     builds = store.folder.parent / BUILDS / hash_of([os.uname()[:2], hash_of_program()])[:16]
     builds.mkdir(parents=True, exist_ok=True)
-    return Place(builds, get_worker().plugins[SHIPMENT].folder)
+    return Place(builds, Path(get_worker().local_directory) / SHIPPED)
 
 
 @contextmanager
@@ -186,7 +196,7 @@ def _client(crew: Crew) -> Iterator[Any]:
             return
         with tempfile.TemporaryDirectory(prefix="railfmi_workers_") as folder:
             cluster = LocalCluster(
-                n_workers=crew.workers or os.cpu_count() or 1, threads_per_worker=1, host="127.0.0.1",
+                n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
                 dashboard_address=None, local_directory=folder, silence_logs="CRITICAL",
             )  # fmt: skip
             try:

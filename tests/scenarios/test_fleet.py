@@ -11,7 +11,7 @@ import pytest
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import ISOLATED
 from scenarios.fleet.declaration import Declaration
-from scenarios.fleet.records import merged, read_records
+from scenarios.fleet.records import read_records, with_record
 from tests.helpers.paths import ROOT
 from tests.truth.rig import write_record
 from tests.truth.rig_effects import Effects, Torque
@@ -90,10 +90,10 @@ def test_a_record_declares_values_of_its_own_and_keeps_the_zeros_of_a_name(tmp_p
     one, other = read_records(declared(ignore=("note",)), file)
     assert (one.id, one.vehicle, one.data, one.mileage) == ("007", "01", tmp_path / "x.csv", None)
     base = {"parameters": {"N": 8000.0, "a": 1.0}, "data": {"file": "z.csv", "sep": ";"}}
-    made = merged(base, one)
+    made = with_record(base, one)
     assert made["parameters"] == {"N": 7900.0, "a": 1.0}
     assert made["data"] == {"file": str(tmp_path / "x.csv"), "sep": ";"}
-    assert merged(base, other)["parameters"] == base["parameters"]
+    assert with_record(base, other)["parameters"] == base["parameters"]
     assert base["parameters"]["N"] == 8000.0
 
 
