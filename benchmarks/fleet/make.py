@@ -20,7 +20,8 @@ states = ["omega_w", "omega_r"]
 [estimate.parameters]
 mu0 = {std = 0.05, bounds = [0.1, 0.8]}
 """
-WITH_DRAG = f"{DRAG} = {{start = 0.0, std = 1.0}}\n"
+BEARING = 0.3  # N.m.s/rad, drag of a sound bearing
+WITH_DRAG = f"{DRAG} = {{start = {BEARING}, std = {BEARING}}}\n"
 COLUMNS = ("record", "vehicle", "class", "place", "mileage", "data")
 
 
@@ -51,8 +52,8 @@ def write_fleet(
     """Write fleet.toml, its table and setup, and records/*.csv; returns what is true.
 
     records: of each vehicle at each place; drifting, broken: shares of vehicles and of records.
-    fmu: an FMU with drag at the roller built in, whose parameter is estimated; the drifting vehicles then
-    have a drag that grows by `growth`, N.m.s/rad per km. Without it, their friction mu0 changes by
+    fmu: an FMU with drag at the roller built in, whose parameter is estimated; all vehicles then have a drag,
+    which grows in the drifting ones by `growth`, N.m.s/rad per km. Without it, their friction mu0 changes by
     `wear`, 1/km.
     """
     rng = np.random.default_rng(seed)
@@ -64,7 +65,7 @@ def write_fleet(
         for place in places:
             for k in range(records):
                 mileage = 1000.0 * k + float(rng.uniform(0, 500))
-                drag = growth * mileage if fmu and name in odd else 0.0
+                drag = BEARING + (growth * mileage if name in odd else 0.0) if fmu else 0.0
                 worn = mu0 + (wear * mileage if not fmu and name in odd else 0.0)
                 record = f"{name}-{place}-{k + 1:02}"
                 _record(folder, record, rng, worn, drag, duration, 1 / rate)

@@ -1,6 +1,10 @@
 """Fleets: the table of records, the tasks, rows and pooling, clear errors, and a whole run."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +21,8 @@ from tests.truth.rig import write_record
 from tests.truth.rig_effects import Effects, Torque
 
 pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
+
+import psutil
 
 from scenarios.fleet.fleet import Assembled, assembled, fleet, rejected, write_tables
 from scenarios.fleet.page import write_page
@@ -340,3 +346,20 @@ def test_the_shipped_fleet_from_its_file_to_its_page(tmp_path):
     assert [d["vehicle"] for d in first.drifts] == ["rig-004"]
     assert [f["record"] for f in first.failed] == ["rig-001-bench-a-02"]
     assert json.loads((tmp_path / "one" / "result.json").read_text())["fleet"] == "rigs"
+
+
+@pytest.mark.slow
+def test_an_interrupt_says_how_to_go_on_and_leaves_no_process(tmp_path):
+    out = tmp_path / "out"
+    run = [sys.executable, "-m", "railfmi", "fleet", str(SHIPPED / "fleet.toml"), "--out", str(out)]
+    started = subprocess.Popen([*run, "--workers", "1"], cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    family: list[psutil.Process] = []
+    while started.poll() is None and len([*out.glob(".tasks/*/*.json")]) < 2:
+        family = psutil.Process(started.pid).children(recursive=True)
+        time.sleep(0.1)
+    started.send_signal(signal.SIGINT)
+    _, said = started.communicate(timeout=60)
+    assert started.returncode == 130
+    assert said.strip().endswith("interrupted; finished tasks are kept; the same command goes on from here")
+    assert not any(p.is_running() and p.status() != psutil.STATUS_ZOMBIE for p in family)
+    assert not (out / "result.json").exists()
