@@ -23,7 +23,7 @@ from scenarios.drawing.sheet import (
     sheet,
     sheets,
 )
-from scenarios.drawing.typography import label
+from scenarios.drawing.typography import label, unit
 from scenarios.fleet.drift import Points
 from scenarios.fleet.findings import Drift, Level, Quantity
 from scenarios.fleet.fleet import Assembled
@@ -156,7 +156,7 @@ def _course(ax: Any, d: Drift, others: Sequence[Points], mileage_unit: str) -> N
             ends, middle[1] + d.course.line.slope * (ends - middle[0]), color=LAW, linewidth=1.4, zorder=2
         )
     where = f" at {d.quantity[4]}" if d.quantity[4] else ""
-    name_axes(ax, f"mileage in {mileage_unit}", label(_words(d), d.unit), f"{d.vehicle}{where}")
+    name_axes(ax, f"mileage in {mileage_unit}", unit(d.unit), f"{d.vehicle}{where}: {_words(d)}")
 
 
 def _words(x: Drift | Level) -> str:

@@ -36,29 +36,30 @@ def write_page(folder: Path, found: Assembled) -> None:
 
 
 def _drift(d: Row, mileage_unit: str) -> Row:
-    per = f"{unit(d['unit']) or '1'}/{mileage_unit}"
-    changes = d["form"] == "change"
+    if d["form"] == "change":
+        at = f"{short(d['change_low_95'], 6)} to {short(d['change_high_95'], 6)} {mileage_unit}"
+        size, ends, of = (d["change_size"], d["change_std"]), "change_size", unit(d["unit"])
+    else:
+        at = "steadily"
+        size, ends = (d["slope"], d["slope_std"]), "slope"
+        of = f"{unit(d['unit']) or '1'}/{mileage_unit}"
     return {
-        "vehicle": d["vehicle"],
-        "place": d["place"],
-        "quantity": quantity_words(d),
-        "course": f"{with_error(d['change_size'], d['change_std'])} {unit(d['unit'])}"
-        if changes
-        else f"{with_error(d['slope'], d['slope_std'])} {per}",
-        "interval": f"{number(d['change_size_low_95'])} to {number(d['change_size_high_95'])}"
-        if changes
-        else f"{number(d['slope_low_95'])} to {number(d['slope_high_95'])}",
-        "where": f"{short(d['change_low_95'], 6)} to {short(d['change_high_95'], 6)} {mileage_unit}"
-        if changes
-        else "steadily",
+        "vehicle": _placed(d),
+        "quantity": f"{quantity_words(d)}, {at}",
+        "course": f"{with_error(*size)} {of}",
+        "interval": f"{number(d[f'{ends}_low_95'], 2)} to {number(d[f'{ends}_high_95'], 2)}",
         "q": f"{d['q_value']:.1g}",
     }
 
 
+def _placed(row: Row) -> str:
+    """A vehicle with the place of its records."""
+    return f"{row['vehicle']} at {row['place']}" if row["place"] else str(row["vehicle"])
+
+
 def _level(x: Row) -> Row:
     return {
-        "vehicle": x["vehicle"],
-        "place": x["place"],
+        "vehicle": _placed(x),
         "quantity": quantity_words(x),
         "value": quantity(with_error(x["value"], x["std"]), x["unit"]),
         "class": f"{number(x['class_median'], 4)}, spread {number(x['class_spread'], 2)}",
