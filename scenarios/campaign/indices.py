@@ -46,8 +46,14 @@ def indices_of(measure: str, keys: Sequence[str], values: Array, seed: int) -> l
     found, rng = estimates(table), np.random.default_rng(seed)
     drawn = np.array([estimates(table[:, rng.integers(0, n, n)]) for _ in range(RESAMPLES)])
     low, high = np.nanquantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2], axis=0)
-    first, total = np.array([found, low, high]).transpose(1, 2, 0).tolist()
-    return [Index(measure, key, *first[i], *total[i], n) for i, key in enumerate(keys)]
+    one, all_ = np.array([found, low, high]).transpose(1, 2, 0)  # (k, 3) each: value and interval
+    return [
+        Index(
+            measure, key, first=float(one[i, 0]), first_low=float(one[i, 1]), first_high=float(one[i, 2]),
+            total=float(all_[i, 0]), total_low=float(all_[i, 1]), total_high=float(all_[i, 2]), used=n,
+        )
+        for i, key in enumerate(keys)
+    ]  # fmt: skip
 
 
 def estimates(table: Array) -> Array:
