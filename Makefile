@@ -46,7 +46,7 @@ challenge: .venv/ready-dev  ## a fresh blind set of records closed and scored; S
 	@touch $@
 
 .venv/ready-dev: .venv/ready
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock -e '.[dev,fleet]'
 	@touch $@
 
 .venv/ready-docs: .venv/ready

@@ -10,10 +10,12 @@ if TYPE_CHECKING:
     from fmus.contact import contact_table, creep_forces, equivalent_conicity, hertz, kalker
     from fmus.errors import BadInput
     from fmus.host.fmu import Fmu, FmuError
+    from scenarios.campaign.campaign import campaign
     from scenarios.closing.closing import close_loop
     from scenarios.closing.several import close_loops
     from scenarios.estimating.estimating import estimate
     from scenarios.experiment.experiment import load_experiment
+    from scenarios.fleet.fleet import fleet
     from scenarios.planning.planning import plan
     from scenarios.preparing.initialising import init
     from scenarios.preparing.inspecting import inspect
@@ -26,6 +28,7 @@ _HOMES = {
     "BadInput": "fmus.errors",
     "Fmu": "fmus.host.fmu",
     "FmuError": "fmus.host.fmu",
+    "campaign": "scenarios.campaign.campaign",
     "close_loop": "scenarios.closing.closing",
     "close_loops": "scenarios.closing.several",
     "contact_table": "fmus.contact",
@@ -33,6 +36,7 @@ _HOMES = {
     "dry_run": "scenarios.preparing.trial",
     "equivalent_conicity": "fmus.contact",
     "estimate": "scenarios.estimating.estimating",
+    "fleet": "scenarios.fleet.fleet",
     "hertz": "fmus.contact",
     "init": "scenarios.preparing.initialising",
     "inspect": "scenarios.preparing.inspecting",
@@ -43,9 +47,9 @@ _HOMES = {
 }
 
 __all__ = [
-    "BadInput", "Fmu", "FmuError", "__version__", "close_loop", "close_loops", "contact_table",
-    "creep_forces", "dry_run", "equivalent_conicity", "estimate", "hertz", "init", "inspect", "kalker",
-    "load_experiment", "plan", "report",
+    "BadInput", "Fmu", "FmuError", "__version__", "campaign", "close_loop", "close_loops",
+    "contact_table", "creep_forces", "dry_run", "equivalent_conicity", "estimate", "fleet", "hertz",
+    "init", "inspect", "kalker", "load_experiment", "plan", "report",
 ]  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from estimator.record import Array
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import build_quick
 from fmus.export.provenance import isolation_of
+from fmus.files import passing_folder
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.apart.room import closing_rooms
 from fmus.host.archive import Archive
@@ -44,6 +45,8 @@ from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
 from scenarios.output import writable, written_at_once
 
+BUILDING = ".building_"  # begin of the name of a folder in which a build is made
+
 
 def estimate(
     experiment: Given,
@@ -55,6 +58,7 @@ def estimate(
     isolation: Isolation | None = ISOLATED,
     show: Show = lambda _: None,
     data: pd.DataFrame | None = None,
+    builds: Path | None = None,
 ) -> EstimateResult:
     """Run `railfmi estimate` and return the result that is written as result.json.
 
@@ -66,6 +70,7 @@ def estimate(
     isolation: limits of the process in which a foreign FMU runs; None runs it in this process.
     show: gets the table of conversions as lines, before anything is estimated.
     data: the record, in place of the data file; units by column in data.attrs["units"].
+    builds: folder in which the build of a model is found, or kept for further experiments; None keeps none.
     Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit. If the
     filter diverges, the result contains the estimates up to that time, and `diverged` and `reason` are set.
     """
@@ -79,7 +84,7 @@ def estimate(
         chosen = options or e.estimate.options
         folder = None if out is None else writable(Path(out))
         tell("opening the FMU and the record")
-        fmu = fmu_of(e, Path(work))
+        fmu = fmu_of(e, builds or Path(work))
         if e.model is None:
             check_honest(fmu, isolation or ISOLATED)
         with Archive(fmu, isolation_of(fmu, isolation) if e.model is None else None) as archive:
@@ -99,9 +104,14 @@ def estimate(
 
 
 def fmu_of(e: Experiment, work: Path) -> Path:
-    """The FMU of an experiment: the foreign FMU that it names, or a build of its model."""
+    """The FMU of an experiment: the foreign FMU that it names, or a build of its model in `work`."""
     if e.model is not None:
-        return build_quick(model_class(e.model)(), work)
+        model = model_class(e.model)()
+        made = work / f"{model.name}.fmu"
+        if not made.exists():
+            with passing_folder(work, BUILDING) as part:  # others may build the same at once
+                build_quick(model, part).replace(made)
+        return made
     if e.fmu_path is None:
         raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
     return e.fmu_path

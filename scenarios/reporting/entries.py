@@ -18,7 +18,17 @@ from scenarios.closing.page.glossary import values_words
 from scenarios.estimating.result import main_values
 from scenarios.output import FILES, WRITING
 
-PAGES = ("report.html", "estimate.html", "conicity.html", "plan.html", "norm.html", "index.html", "table.md")
+PAGES = (
+    "report.html",
+    "estimate.html",
+    "conicity.html",
+    "plan.html",
+    "norm.html",
+    "fleet.html",
+    "campaign.html",
+    "index.html",
+    "table.md",
+)
 Standing = Literal["good", "doubtful", "bad"]
 Table = Mapping[str, Any]
 
@@ -175,6 +185,20 @@ def _several(t: Table) -> Said:
     return Said("several experiments", f"{len(t['results'])} experiments compared", "good")
 
 
+def _fleet(t: Table) -> Said:
+    drifting = len({d["vehicle"] for d in t["drifts"]})
+    odd = len({d["vehicle"] for d in t["deviates"]})
+    said = f"{t['records']} records of {t['vehicles']} vehicles: {drifting} drift or change, {odd} deviate, "
+    failed = len(t["failed"])
+    return Said(t["fleet"], f"{said}{failed} records without an answer", "doubtful" if failed else "good")
+
+
+def _campaign(t: Table) -> Said:
+    failed = len(t["failed"])
+    said = f"{t['points']} points over {len(t['varied'])} keys, {failed or 'none'} without an answer"
+    return Said(t["campaign"], said, "doubtful" if failed else "good")
+
+
 KINDS = (
     Kind("close-loop", frozenset({"verdict", "effects", "error"}), _close_loop),
     Kind("close-loop", frozenset({"results", "together"}), _several),
@@ -185,4 +209,6 @@ KINDS = (
     Kind("conicity", frozenset({"wheel_found", "conicity"}), _conicity),
     Kind("plan", frozenset({"visible", "classes"}), _plan),
     Kind("conicity-norm", frozenset({"step1", "reader"}), _norm),
+    Kind("fleet", frozenset({"fleet", "drifts", "deviates"}), _fleet),
+    Kind("campaign", frozenset({"campaign", "varied", "measured"}), _campaign),
 )

@@ -49,7 +49,7 @@ def _variants(table: Mapping[str, Any], declared: Declaration) -> dict[str, Decl
         name = _name(changes, f"variants[{i}]", found, declared)
         rest = {key: value for key, value in changes.items() if key != "name"}
         try:
-            found[name] = read_table(Declaration, _merged(base, rest))
+            found[name] = read_table(Declaration, merged(base, rest))
         except BadInput as error:
             raise BadInput(f"variant '{name}': {error}") from error
     return found
@@ -69,13 +69,13 @@ def _name(changes: Mapping[str, Any], key: str, found: Mapping[str, Any], declar
     return name
 
 
-def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Merge tables key by key; values that are not tables are replaced."""
     made = dict(base)
     for key, value in changes.items():
         old = made.get(key)
         both = isinstance(old, Mapping) and isinstance(value, Mapping)
-        made[key] = _merged(old, value) if both else value  # type: ignore[arg-type]  # both are mappings
+        made[key] = merged(old, value) if both else value  # type: ignore[arg-type]  # both are mappings
     return made
 
 

@@ -1,0 +1,1 @@
+"""The command `campaign`: a scenario simulated at many points, and what its results depend on."""

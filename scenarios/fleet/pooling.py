@@ -1,0 +1,141 @@
+"""Effects that one vehicle shows, tested on others of its class by what their records would have shown."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scipy.stats import binomtest
+
+from scenarios.fleet.declaration import CALIBRATED
+from scenarios.fleet.findings import SURE
+from scenarios.fleet.planning import Plan
+from scenarios.fleet.scatter import CONFIDENCE, Mean, mean_over
+from scenarios.tasks.store import FAILED, Answer
+
+GROUP = ("setup", "model", "class")
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """An effect in a class of vehicles.
+
+    parameter, size: that which says how large it is, with its mean over the records that show it.
+    shown: vehicles with an answer that has it; possible: it is one of several in an ambiguous answer;
+    absent: vehicles without it, of which a record would have shown it at the mean size; blind: vehicles
+    without it whose records would not have shown it; share: of shown among shown and absent, with its exact
+    95 % interval.
+    """
+
+    setup: str
+    model: str
+    vehicle_class: str
+    kind: str
+    location: str
+    parameter: str
+    unit: str
+    size: Mean
+    shown: list[str]
+    possible: list[str]
+    absent: list[str]
+    blind: list[str]
+    share: float
+    share_low: float
+    share_high: float
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """An answered record of close-loop."""
+
+    vehicle: str
+    answer: Answer
+
+    def has(self, effect: tuple[str, str], sure: bool) -> bool:
+        """Whether its answer has the effect, alone or as one of a class that it does not tell apart."""
+        rows = self.answer["rows"]
+        return (self.answer["verdict"] in SURE) == sure and any(_effect(r) == effect for r in rows)
+
+    def would_show(self, effect: tuple[str, str], parameter: str, size: float) -> bool:
+        """Whether it would have shown the effect at this size, in each of the shapes that were tried."""
+        lines = [v for v in self.answer["visible"] if (v["kind"], v["location"]) == effect]
+        limits = [v["largest"] for v in lines if v["parameter"] == parameter]
+        return any(limit is not None and limit <= abs(size) for limit in limits)
+
+
+def pooled(plan: Plan, answers: Mapping[str, Answer]) -> list[Pooled]:
+    """Every effect that was found, in each class where it was found, in the order of the fleet."""
+    groups: dict[tuple[str, ...], list[_Seen]] = defaultdict(list)
+    for job in plan.jobs:
+        if job.command == "close-loop" and job.record and job.task and job.task.key in answers:
+            answer = answers[job.task.key]
+            if answer["verdict"] != FAILED:
+                key = (job.setup, job.model.name, job.record.kind)
+                groups[key].append(_Seen(job.record.vehicle, answer))
+    return [found for key, seen in groups.items() for found in _of_group(key, seen)]
+
+
+def _effect(row: Mapping[str, Any]) -> tuple[str, str] | None:
+    kind = row.get("kind")
+    return (kind, row["location"]) if kind and kind != CALIBRATED else None
+
+
+def _of_group(key: tuple[str, ...], seen: Sequence[_Seen]) -> Iterator[Pooled]:
+    sure = [s for s in seen if s.answer["verdict"] in SURE]
+    effects = dict.fromkeys(e for s in sure for row in s.answer["rows"] if (e := _effect(row)))
+    for effect in effects:
+        rows = [
+            (s.vehicle, row)
+            for s in sure
+            for row in s.answer["rows"]
+            if _effect(row) == effect and row["size"] is not None and row["std"]
+        ]
+        parameter = _amplitude(effect, sure, rows)
+        sizes = [row for _, row in rows if row["parameter"] == parameter]
+        if sizes:
+            mean = mean_over([r["size"] for r in sizes], [r["std"] for r in sizes])
+            yield _standing(key, effect, parameter, sizes[0]["unit"], mean, seen)
+
+
+def _amplitude(
+    effect: tuple[str, str], sure: Sequence[_Seen], rows: Sequence[tuple[str, Mapping[str, Any]]]
+) -> str:
+    """The parameter that says how large an effect is: the one of which records say what they would show."""
+    named = [
+        v["parameter"]
+        for s in sure
+        for v in s.answer["visible"]
+        if (v["kind"], v["location"]) == effect
+    ]  # fmt: skip
+    present = [row["parameter"] for _, row in rows]
+    return next((n for n in named if n in present), present[0] if present else "")
+
+
+def _standing(
+    key: tuple[str, ...], effect: tuple[str, str], parameter: str, unit: str, size: Mean,
+    seen: Sequence[_Seen],
+) -> Pooled:  # fmt: skip
+    """Each vehicle by its best record."""
+    by_vehicle: dict[str, list[_Seen]] = defaultdict(list)
+    for s in seen:
+        by_vehicle[s.vehicle].append(s)
+    shown: list[str] = []
+    possible: list[str] = []
+    absent: list[str] = []
+    blind: list[str] = []
+    for vehicle, records in by_vehicle.items():
+        if any(s.has(effect, sure=True) for s in records):
+            shown.append(vehicle)
+        elif any(s.has(effect, sure=False) for s in records):
+            possible.append(vehicle)
+        elif any(s.would_show(effect, parameter, size.value) for s in records):
+            absent.append(vehicle)
+        else:
+            blind.append(vehicle)
+    n, decided = len(shown), len(shown) + len(absent)
+    interval = binomtest(n, decided).proportion_ci(CONFIDENCE, "exact")
+    setup, model, vehicle_class = key
+    return Pooled(
+        setup, model, vehicle_class, effect[0], effect[1], parameter, unit, size, shown, possible, absent,
+        blind, n / decided, float(interval.low), float(interval.high),
+    )  # fmt: skip

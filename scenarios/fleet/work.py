@@ -1,0 +1,172 @@
+"""What a worker does with one record: check, estimate or close-loop, and the rows that say what was found."""
+
+import time
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from estimator.closeloop.checkpoints import Stages
+from estimator.closeloop.outcome import Outcome
+from estimator.plant import PLANTS
+from fmus.errors import BadInput
+from fmus.export.builders.hypotheses import build_quick
+from fmus.host.apart.isolation import Isolation
+from fmus.host.grading.check import grade
+from fmus.models import model_class
+from scenarios.closing.closing import Posed, closed, with_test_part
+from scenarios.closing.page.glossary import Glossary, glossary
+from scenarios.closing.result import Result, effects_of
+from scenarios.estimating.estimating import estimate
+from scenarios.estimating.result import BAND, EstimateResult
+from scenarios.experiment.declaration import Declaration
+from scenarios.experiment.experiment import Experiment, placed
+from scenarios.experiment.validation import of_file, read_table
+from scenarios.fleet.declaration import CALIBRATED
+from scenarios.tasks.hashes import hash_of_file
+from scenarios.tasks.running import Passing, Place
+from scenarios.tasks.store import FAILED, Answer
+
+Row = dict[str, Any]
+
+
+def answered(given: Mapping[str, Any], place: Place) -> Answer:
+    """The answer of a task: rows of what was found, or one row with the reason why nothing was.
+
+    given: `command`, `model` or `fmu` (its checksum), `isolation`, and of a record `table` (its experiment),
+    `file` (which messages name), `data_sha256` and `seed`. Raises Passing or OSError for a reason that may
+    pass, such as a full disk.
+    """
+    try:
+        return {"check": _check, "estimate": _estimate, "close-loop": _close_loop}[given["command"]](
+            given, place
+        )
+    except (OSError, MemoryError, Passing):
+        raise
+    except Exception as error:  # whatever one record does, it is one row
+        said = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
+        return failed(place.without(said).replace(f"{Path(given.get('file', '')).parent}/", ""))
+    finally:
+        PLANTS.close()
+
+
+def failed(reason: str) -> Answer:
+    """The answer of a task that cannot be done, with the reason."""
+    return {"verdict": FAILED, "rows": [{"verdict": FAILED, "reason": " ".join(reason.split())}]}
+
+
+def _experiment(given: Mapping[str, Any], place: Place) -> Experiment:
+    """The experiment of a task with the FMU that was shipped; Passing if its data have changed."""
+    file, table = Path(given["file"]), dict(given["table"])
+    if given["fmu"]:
+        table["fmu"] = str(place.fmu(given["fmu"]))
+    else:
+        table["model"] = given["model"]
+    with of_file(file):
+        e = placed(read_table(Declaration, table), file)
+    for data in e.data_files:
+        if hash_of_file(data) != given["data_sha256"]:
+            raise Passing(f"{data}: has changed since the fleet was planned; run the command again")
+    return e
+
+
+def _isolation(given: Mapping[str, Any]) -> Isolation | None:
+    return Isolation(**given["isolation"]) if given["isolation"] else None
+
+
+def _builds(given: Mapping[str, Any], place: Place) -> Path:
+    """The folder of the builds of a task's model, which all records of the model share."""
+    folder = place.builds / str(given["fmu"] or given["model"])
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _check(given: Mapping[str, Any], place: Place) -> Answer:
+    """One row for each trial of the FMU."""
+    if given["fmu"]:
+        fmu = place.fmu(given["fmu"])
+    else:
+        fmu = build_quick(model_class(given["model"])(), _builds(given, place) / "checked")
+    found = grade(fmu)
+    words = {True: "passed", False: "failed check", None: "not offered"}
+    rows = [{"kind": c.title, "verdict": words[c.passed], "reason": c.sentence} for c in found.checks]
+    return {"verdict": words[found.ok], "rows": rows}
+
+
+def _estimate(given: Mapping[str, Any], place: Place) -> Answer:
+    """One row for each state, parameter and unknown input, with its last value."""
+    e = _experiment(given, place)
+    found = estimate(e, isolation=_isolation(given), builds=_builds(given, place))
+    verdict = "diverged" if found.diverged else "consistent" if found.consistent else "inconsistent"
+    reason = found.reason if found.diverged else found.doubt
+    rows = [*_estimated(found)] or [{}]
+    return {"verdict": verdict, "rows": [{**row, "verdict": verdict, "reason": reason or ""} for row in rows]}
+
+
+def _estimated(found: EstimateResult) -> Iterator[Row]:
+    for name, e in found.estimated.items():
+        low, high = e["band_95"]
+        yield {
+            "kind": e["kind"], "location": name, "parameter": name, "size": finite(e["value"]),
+            "std": finite(e["std_error"]), "low_95": finite(low), "high_95": finite(high),
+            "unit": e["unit"] or "",
+        }  # fmt: skip
+
+
+def _close_loop(given: Mapping[str, Any], place: Place) -> Answer:
+    """A row for each parameter of each effect in the answer and each calibrated one, and what was visible."""
+    e = with_test_part(_experiment(given, place))
+    posed = Posed.of(e, _builds(given, place), _isolation(given))
+    begun = time.monotonic()
+    found, result = closed(posed, None, lambda _: None, 1, given["seed"], begun, Stages())
+    ratios = [x["after"] / x["noise"] for x in result.error.values() if x["noise"]]
+    common = {
+        "verdict": str(result.verdict),
+        "reason": result.reason,
+        "error_over_noise": finite(max(ratios)) if ratios else None,
+        "policy": result.policy,
+    }
+    words = glossary(found.baseline.problem, found.judgement.members)
+    rows = [*_effects(found, result, words), *_calibrated(result, words)]
+    return {
+        "verdict": str(result.verdict),
+        "rows": [{**row, **common} for row in rows],
+        "visible": [
+            {k: line[k] for k in ("kind", "location", "parameter", "smallest", "largest")}
+            for line in result.power
+        ],
+        "decision": result.decision,
+    }
+
+
+def _effects(found: Outcome, result: Result, words: Glossary) -> Iterator[Row]:
+    """The effects of the answer; of one without effects a row that has none."""
+    members = found.judgement.members
+    if not members:
+        yield {"probability": result.probability.get("no_discrepancy")}
+    for h in members:
+        for c, effect in zip(h.candidates, effects_of(h), strict=True):
+            named = {
+                "kind": c.kind, "location": c.location, "probability": result.probability.get(h.label),
+            }  # fmt: skip
+            for parameter, (size, std) in effect.parameters.items():
+                yield {**named, **sized(parameter, size, std, words.unit_of_parameter(c, parameter))}
+
+
+def _calibrated(result: Result, words: Glossary) -> Iterator[Row]:
+    for name, (size, std) in result.calibrated.items():
+        yield {"kind": CALIBRATED, "location": name, **sized(name, size, std, words.unit(name))}
+
+
+def sized(parameter: str, size: float, std: float, unit: str) -> Row:
+    """A parameter with its standard error and its 95 % interval."""
+    half = BAND * std
+    return {
+        "parameter": parameter, "size": finite(size), "std": finite(std), "low_95": finite(size - half),
+        "high_95": finite(size + half), "unit": unit,
+    }  # fmt: skip
+
+
+def finite(value: float) -> float | None:
+    """A number that JSON can hold."""
+    return float(value) if isfinite(value) else None
