@@ -1,0 +1,270 @@
+"""The driven wheelset: its laws, its torsion against the eigenvalues, and the independent truth."""
+
+from dataclasses import fields, replace
+
+import casadi as cs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scipy.linalg import eigvals
+
+from fmus.effects import EFFECTS
+from fmus.export.builders.native.build import build_native
+from fmus.host.fmu import Fmu
+from fmus.model import equations
+from fmus.traction.model import OMEGA_MIN, V_MIN, Traction
+from fmus.variables import (
+    Input,
+    Output,
+    Parameter,
+    State,
+)
+from tests.helpers.everything import start, values
+from tests.helpers.native import native
+from tests.truth import traction as truth
+
+MODEL = Traction()
+MADE = equations(MODEL)
+STATES, INPUTS, PARAMETERS, OUTPUTS = (
+    [v.name for v in MODEL.of(k)] for k in (State, Input, Parameter, Output)
+)
+P = dict(zip(PARAMETERS, start(MODEL, Parameter).tolist(), strict=True))
+U = dict(zip(INPUTS, start(MODEL, Input).tolist(), strict=True))
+SAME = {"nu": 0.25}  # the truth's column of Kalker's table
+speeds = st.floats(0.5, 60.0)
+slips = st.floats(-0.9, 0.9)
+twists = st.floats(-3e-3, 3e-3)
+
+
+def rolling(V, left=0.0, right=0.0, motor=0.0, **others):
+    """A state at speed V, m/s, the wheels and the motor turning faster by shares of it."""
+    omega = V / P["r0"]
+    own = {"V": V, "omega_left": omega * (1 + left), "omega_right": omega * (1 + right)}
+    return {**dict.fromkeys(STATES, 0.0), **own, "omega_m": P["i_g"] * omega * (1 + motor), **others}
+
+
+def at(function, x, inputs=None, parameters=None):
+    """Results of f or h by name."""
+    point = list(x.values()), list((U | (inputs or {})).values()), list((P | (parameters or {})).values())
+    names = STATES if function is MADE.f else OUTPUTS
+    return dict(zip(names, values(function, *point), strict=True))
+
+
+states = st.builds(
+    rolling, speeds, slips, slips, slips, theta_s=twists, theta_g=twists, theta_left=st.floats(-10, 10)
+)
+torques = st.fixed_dictionaries(
+    {
+        "T_m": st.floats(-9e3, 9e3),
+        "T_b": st.floats(0.0, 2e4),
+        "F_x_ext": st.floats(-1e5, 1e5),
+        "y": st.floats(-5e-3, 5e-3),
+        "psi": st.floats(-5e-3, 5e-3),
+        "y_dot": st.floats(-0.1, 0.1),
+        "psi_dot": st.floats(-0.1, 0.1),
+    }
+)
+
+
+@given(states, torques)
+def test_power_goes_into_motion_torsion_and_what_is_lost(x, inputs):
+    """Straight from energy: only contacts, brakes and dampers lose it."""
+    inputs = inputs | {"y_dot": 0.0, "psi": 0.0, "psi_dot": 0.0}  # what steers does work elsewhere
+    parameters = {"c_s": 100.0}
+    dx, seen = at(MADE.f, x, inputs, parameters), at(MADE.h, x, inputs, parameters)
+    stored = (
+        P["I_left"] * x["omega_left"] * dx["omega_left"] + P["I_right"] * x["omega_right"] * dx["omega_right"]
+        + P["J_m"] * x["omega_m"] * dx["omega_m"] + P["M_v"] * x["V"] * dx["V"]
+        + P["k_s"] * x["theta_s"] * dx["theta_s"] + P["k_g"] * x["theta_g"] * dx["theta_g"]
+    )  # fmt: skip
+    given_in = inputs["T_m"] * x["omega_m"] + inputs["F_x_ext"] * x["V"]
+    lost = 100.0 * dx["theta_s"] ** 2 + P["c_g"] * dx["theta_g"] ** 2
+    for side in ("left", "right"):
+        omega = x[f"omega_{side}"]
+        slipping = x["V"] - seen[f"r_{side}"] * omega
+        contact = -seen[f"F_x_{side}"] * slipping
+        brake = inputs["T_b"] * np.tanh(omega / OMEGA_MIN) * omega
+        assert contact >= 0
+        assert brake >= 0
+        lost += contact + brake
+    size = abs(given_in) + lost + 1.0
+    assert abs(stored - given_in + lost) < 1e-9 * size
+
+
+@given(states, torques)
+def test_no_wheel_takes_more_than_its_friction_and_force_opposes_slip(x, inputs):
+    seen = at(MADE.h, x, inputs)
+    for side in ("left", "right"):
+        F = np.array([seen[f"F_x_{side}"], seen[f"F_y_{side}"]])
+        xi = np.array([seen[f"xi_x_{side}"], seen[f"xi_y_{side}"]])
+        assert np.hypot(*F) <= P["mu0"] * P["F_n"] * (1 + 1e-12)
+        assert F @ xi <= 0
+
+
+@given(states, torques)
+def test_backwards_is_forwards_mirrored(x, inputs):
+    """All that moves turned round: so is all that follows, but for yaw, which steers by where it points."""
+    still = {"psi": 0.0, "y": 0.0, "T_b": inputs["T_b"]}
+    turned = {n: -u for n, u in inputs.items()} | still
+    forwards = at(MADE.f, x, inputs | still)
+    backwards = at(MADE.f, {n: -value for n, value in x.items()}, turned)
+    size = np.abs([*forwards.values()]).max()
+    assert_allclose([*backwards.values()], [-v for v in forwards.values()], atol=1e-9 * size)
+
+
+@given(states, torques)
+def test_forces_and_accelerations_are_the_truths(x, inputs):
+    """The equations written a second time, from absolute angles and Mal's contact shear stiffness."""
+    p = truth.Traction()
+    seen = at(MADE.h, x, inputs, SAME)
+    left, right = x["theta_left"], x["theta_left"] + x["theta_s"]
+    other = np.array([left, right, P["i_g"] * (right + x["theta_g"]), 0.0,
+                      x["omega_left"], x["omega_right"], x["omega_m"], x["V"]])  # fmt: skip
+    u = dict.fromkeys(truth.INPUTS, 0.0) | inputs
+    expected = truth.outputs(p, other, u)
+    for name in (
+        "r_left",
+        "xi_x_left",
+        "xi_x_right",
+        "xi_y_right",
+        "F_x_left",
+        "F_x_right",
+        "F_y_left",
+        "F_x",
+    ):
+        assert_allclose(seen[name], expected[name], rtol=1e-8, atol=1e-6, err_msg=name)
+    t = np.array([0.0, 1.0])
+    inputs_then = truth.Inputs(t, {name: np.full(2, value) for name, value in inputs.items()})
+    rates = dict(zip(truth.STATES, truth.motion(p, inputs_then)(0.5, other), strict=True))
+    dx = at(MADE.f, x, inputs, SAME)
+    for name in ("omega_left", "omega_right", "omega_m", "V"):
+        assert_allclose(dx[name], rates[name], rtol=1e-6, atol=1e-3, err_msg=name)
+
+
+def test_declared_values_are_the_truths():
+    assert {f.name: f.default for f in fields(truth.Traction) if f.name in P} == {
+        f.name: P[f.name] for f in fields(truth.Traction) if f.name in P
+    }
+    assert len([f for f in fields(truth.Traction) if f.name in P]) > 20
+
+
+def modes(**parameters):
+    """Eigenvalues of the linearised model, rolling freely at 20 m/s."""
+    point = [list(rolling(20.0).values()), list(U.values()), list((P | parameters).values())]
+    x = cs.MX.sym("x", len(STATES))
+    A = cs.Function("A", [x], [cs.jacobian(MADE.f(x, *point[1:]), x)])
+    return eigvals(A(point[0]).full())
+
+
+def frequencies(values_of):
+    return np.sort(values_of.imag[values_of.imag > 1]) / (2 * np.pi)
+
+
+@given(st.floats(20.0, 200.0), st.floats(0.5, 8.0), st.floats(1e6, 2e7), st.floats(1e6, 1e8))
+def test_lifted_off_the_rail_it_swings_at_the_chains_eigenvalues(I_left, J_m, k_s, k_g):
+    off = {"a": 1e-6, "b": 1e-6, "c_g": 0.0}
+    given_p = {"I_left": I_left, "J_m": J_m, "k_s": k_s, "k_g": k_g}
+    expected = np.sort(truth.Traction(**given_p).frequencies())
+    assert_allclose(frequencies(modes(**off, **given_p)), expected, rtol=1e-4)
+
+
+def test_a_stiff_drive_leaves_the_two_inertias_of_the_source():
+    """Table 1: 64 and 134 kg.m2 on 6063260 N.m/rad."""
+    found = frequencies(modes(a=1e-6, b=1e-6, c_g=0.0, k_g=1e12))[0]
+    assert_allclose(found, np.sqrt(6063260 * (1 / 64 + 1 / 134)) / (2 * np.pi), rtol=1e-4)
+
+
+def test_on_the_rail_every_swing_is_damped_and_past_the_peak_one_grows():
+    def fastest(creep):
+        x = rolling(10.0, creep, creep, creep)
+        symbol = cs.MX.sym("x", len(STATES))
+        slope = cs.jacobian(MADE.f(symbol, list(U.values()), list((P | {"M_v": 1e8}).values())), symbol)
+        found = eigvals(cs.Function("A", [symbol], [slope])(list(x.values())).full())
+        return found[np.abs(found.imag) > 2 * np.pi * 20].real.max(initial=-np.inf)
+
+    assert fastest(0.003) < -10
+    assert fastest(0.008) < -1
+    assert fastest(0.02) > 5
+    assert fastest(0.03) > 5
+
+
+def test_a_cone_and_a_given_growth_make_the_radii():
+    shifted = {"y": 3e-3, "y_irr": 1e-3, "dr_left": 1e-4, "dr_right": -2e-4}
+    seen = at(MADE.h, rolling(20.0), shifted)
+    assert_allclose(seen["r_left"], 0.5 + 0.15 * 2e-3 + 1e-4)
+    assert_allclose(seen["r_right"], 0.5 - 0.15 * 2e-3 - 2e-4)
+    # a shift to the left lets the left wheel run ahead: its creep force pulls back and turns to the right
+    cone = at(MADE.h, rolling(20.0), {"y": 1e-4})
+    assert cone["F_x_left"] > 0 > cone["F_x_right"]
+    assert cone["M_z"] < 0
+    assert_allclose(cone["M_z"], 0.75 * (cone["F_x_right"] - cone["F_x_left"]))
+
+
+def test_lateral_creepage_and_traction_share_one_friction():
+    pulling = at(MADE.h, rolling(20.0, 0.02, 0.02, 0.02))
+    yawed = at(MADE.h, rolling(20.0, 0.02, 0.02, 0.02), {"psi": 0.02})
+    alone = at(MADE.h, rolling(20.0), {"psi": 0.02})
+    assert yawed["F_x_left"] < 0.8 * pulling["F_x_left"]
+    assert 0 < yawed["F_y_left"] < 0.8 * alone["F_y_left"]
+    assert_allclose(yawed["F_x_left"], yawed["F_y_left"], rtol=1e-9)  # as large, as both creepages are
+
+
+def run(path, t, names, first, **inputs):
+    """Free run of an FMU: named outputs (N, n), inputs (N,) held at the mean of both ends of a step."""
+    held = {name: (u[1:] + u[:-1]) / 2 for name, u in inputs.items()}
+    with Fmu(path) as fmu:
+        return fmu.simulate(t, held, names, first)
+
+
+SEEN = ("omega_left", "omega_right", "omega_m", "V")
+ENCODERS = np.array([1e-2, 1e-2, 5e-2, 2e-2])  # rad/s, m/s: noise of a record
+
+
+@pytest.mark.parametrize("friction", [(0.46, 0.4, 0.6), (0.2, 0.1, 0.2)], ids=["dry", "poor"])
+def test_it_runs_as_the_truth_through_slip_and_back(friction):
+    mu0, A, B = friction
+    t = np.arange(1501) * 1e-3
+    limit = mu0 * 2 * P["F_n"] * P["r0"] / P["i_g"]
+    T_m = limit * np.interp(t, [0, 0.5, 0.9, 1.0, 1.1, 1.5], [0, 0.8, 1.1, 1.1, 0.2, 0.2])
+    rails = {"y": 2e-3 * np.sin(6 * t), "y_dot": 12e-3 * np.cos(6 * t), "psi": 1e-3 * np.cos(6 * t),
+             "psi_dot": -6e-3 * np.sin(6 * t)}  # fmt: skip
+    p = replace(truth.Traction(), mu0=mu0, A=A, B=B)
+    expected = truth.simulate(truth.Inputs(t, {"T_m": T_m, **rails}), p, truth.rolling(p, 10.0))[:, 4:]
+    first = {n: v for n, v in rolling(10.0).items() if v} | {"mu0": mu0, "A": A, "B": B, **SAME}
+    found = run(native("traction"), t, SEEN, first, T_m=T_m, **rails)
+    assert np.abs(expected[:, 0] * P["r0"] / expected[:, 3] - 1).max() > 0.01  # it slips
+    assert (np.sqrt(np.mean((found - expected) ** 2, axis=0)) / ENCODERS).max() < 0.1
+
+
+def test_it_brakes_to_a_stop_and_stays_there():
+    t = np.arange(7001) * 1e-3
+    first = {n: v for n, v in rolling(10.0).items() if v}
+    V, omega = run(native("traction"), t, ("V", "omega_left"), first, T_b=np.full_like(t, 8e3)).T
+    slowed = 2 * 8e3 / P["r0"] / (P["M_v"] + (128 + 70) / P["r0"] ** 2)
+    assert_allclose(V[2000], 10 - 2 * slowed, rtol=5e-3)
+    assert np.diff(V).max() < 1e-9
+    assert abs(V[-1]) < V_MIN
+    assert abs(omega[-1]) < 0.05
+
+
+def test_nothing_moves_at_rest_without_torque():
+    t = np.linspace(0, 1, 101)
+    assert np.abs(run(native("traction"), t, SEEN, {}, T_m=np.zeros_like(t))).max() == 0.0
+
+
+def test_dampers_as_effects_are_dampers_as_parameters(tmp_path):
+    places = {"axle": "c_s", "drive": "c_g"}
+    built = build_native(Traction([(EFFECTS["viscous_damping"], place) for place in places]), tmp_path)
+    t = np.arange(201) * 1e-3
+    # on a patch so small that it hardly holds
+    first = {n: v for n, v in rolling(20.0).items() if v} | {"theta_s": 1e-3, "theta_g": 3e-4, "a": 1e-6}
+    names = ("theta_s", "theta_g", "omega_m")
+    T_m = np.full_like(t, 2e3)
+    for place, parameter in places.items():
+        by_effect = run(built, t, names, {**first, f"viscous_damping_{place}_c": 400.0}, T_m=T_m)
+        by_parameter = run(native("traction"), t, names, {**first, parameter: P[parameter] + 400.0}, T_m=T_m)
+        without = run(native("traction"), t, names, first, T_m=T_m)
+        assert_allclose(by_effect, by_parameter, rtol=1e-6, atol=1e-9)
+        assert np.abs(without - by_parameter)[:, 0].max() > 1e-5
