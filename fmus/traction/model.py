@@ -40,15 +40,16 @@ class Traction(Model):
 
     name = "Traction"
     step_size = 1e-4
-    method = "rodas3"
+    method = "rodas4"
 
+    # speeds between the parts are states, not differences of two large ones
     theta_left = State("rad", doc="angle of the left wheel", nominal=100.0)
     theta_s = State("rad", doc="twist of the axle, right wheel less left wheel", nominal=1e-3)
     theta_g = State("rad", doc="twist of the drive, motor over the ratio less right wheel", nominal=1e-3)
-    omega_left = State("rad/s", doc="speed of the left wheel", nominal=10.0)
-    omega_right = State("rad/s", doc="speed of the right wheel", nominal=10.0)
-    omega_m = State("rad/s", doc="speed of the motor", nominal=50.0)
     x = State("m", doc="distance travelled", nominal=100.0)
+    omega_left = State("rad/s", doc="speed of the left wheel", nominal=10.0)
+    theta_s_dot = State("rad/s", doc="rate of the axle's twist", nominal=0.5)
+    theta_g_dot = State("rad/s", doc="rate of the drive's twist", nominal=0.5)
     V = State("m/s", doc="speed of travel", nominal=10.0)
 
     T_m = Input("N.m", doc="torque of the motor, traction positive", nominal=1e3)
@@ -96,10 +97,11 @@ class Traction(Model):
     nu = Parameter("1", 0.28, min=0.0, max=0.5, doc="Poisson's ratio of steel", source="Kalker 1990")
 
     omega_left_dot = rate(omega_left, "rad/s2", "angular acceleration of the left wheel")
-    omega_right_dot = rate(omega_right, "rad/s2", "angular acceleration of the right wheel")
-    omega_m_dot = rate(omega_m, "rad/s2", "angular acceleration of the motor")
-    theta_s_dot = rate(theta_s, "rad/s", "rate of the axle's twist")
+    theta_s_ddot = rate(theta_s_dot, "rad/s2", "acceleration of the axle's twist")
+    theta_g_ddot = rate(theta_g_dot, "rad/s2", "acceleration of the drive's twist")
     V_dot = rate(V, "m/s2", "acceleration of the vehicle")
+    omega_right = Output("rad/s", doc="speed of the right wheel", nominal=10.0)
+    omega_m = Output("rad/s", doc="speed of the motor", nominal=50.0)
     T_s = Output("N.m", doc="torsional torque of the axle, from the right to the left wheel", nominal=1e3)
     T_g = Output("N.m", doc="torque of the drive on the right wheel", nominal=1e3)
     # vars() of a class body is its namespace: what both wheels have is written once
@@ -125,17 +127,18 @@ class Traction(Model):
         """See Model.derivatives (Mal et al. 2020, eq. 14 to 17, the motor on a gearbox)."""
         T_s, T_g = m._torques()
         F_x_left, F_x_right = (m._contacts[side][0] for side in SIDES)
-        r_left, r_right = (m._radius(side) for side in SIDES)
-        torque_left = T_s - r_left * F_x_left - m._brake(m.omega_left) + m.T_left_ext
-        torque_right = T_g - T_s - r_right * F_x_right - m._brake(m.omega_right) + m.T_right_ext
+        torque_left = T_s + m._outside("left")
+        torque_right = T_g - T_s + m._outside("right")
+        torque_m = m.T_m - T_g / m.i_g + m.T_m_ext
+        left, right = torque_left / m.I_left, torque_right / m.I_right
         return {
             "theta_left": m.omega_left,
-            "theta_s": m.omega_right - m.omega_left,
-            "theta_g": m.omega_m / m.i_g - m.omega_right,
-            "omega_left": torque_left / m.I_left,
-            "omega_right": torque_right / m.I_right,
-            "omega_m": (m.T_m - T_g / m.i_g + m.T_m_ext) / m.J_m,
+            "theta_s": m.theta_s_dot,
+            "theta_g": m.theta_g_dot,
             "x": m.V,
+            "omega_left": left,
+            "theta_s_dot": right - left,
+            "theta_g_dot": torque_m / m.J_m / m.i_g - right,
             "V": (F_x_left + F_x_right + m.F_x_ext) / m.M_v,
         }
 
@@ -143,6 +146,7 @@ class Traction(Model):
         """See Model.outputs."""
         T_s, T_g = m._torques()
         found: dict[str, Expr] = {"T_s": T_s, "T_g": T_g}
+        found |= {"omega_right": m._omega("right"), "omega_m": m._omega_m}
         for side in SIDES:
             F_x, F_y = m._contacts[side]
             xi_x, xi_y = m._creepages(side)
@@ -157,8 +161,7 @@ class Traction(Model):
     def ports(m) -> dict[str, Port]:
         """Motor, wheels, vehicle; axle and drive between them; the contacts (slip of wheel over rail)."""
         right = m.theta_left + m.theta_s
-        turned = {"left": (m.theta_left, m.omega_left), "right": (right, m.omega_right)}
-        twisting = m.omega_m / m.i_g - m.omega_right
+        turned = {"left": (m.theta_left, m.omega_left), "right": (right, m._omega("right"))}
         wheels: dict[str, Port] = {}
         contacts: dict[str, Port] = {}
         for side, (angle, speed) in turned.items():
@@ -170,12 +173,10 @@ class Traction(Model):
         motor = m.i_g * (right + m.theta_g)
         return {
             **wheels,
-            "motor": Port(motor, m.omega_m, {"T_m_ext": 1.0}, "rotation", "turns"),
+            "motor": Port(motor, m._omega_m, {"T_m_ext": 1.0}, "rotation", "turns"),
             "vehicle": Port(m.x, m.V, {"F_x_ext": 1.0}, place="slips"),
-            "axle": Port(
-                m.theta_s, m.omega_right - m.omega_left, {"T_right_ext": 1.0, "T_left_ext": -1.0}, "rotation"
-            ),
-            "drive": Port(m.theta_g, twisting, {"T_m_ext": 1 / m.i_g, "T_right_ext": -1.0}, "rotation"),
+            "axle": Port(m.theta_s, m.theta_s_dot, {"T_right_ext": 1.0, "T_left_ext": -1.0}, "rotation"),
+            "drive": Port(m.theta_g, m.theta_g_dot, {"T_m_ext": 1 / m.i_g, "T_right_ext": -1.0}, "rotation"),
             **contacts,
         }
 
@@ -187,14 +188,24 @@ class Traction(Model):
         """What a change of the rail's surface changes together."""
         return {"friction_condition": PARAMETERS}
 
+    def _omega(m, side: str) -> Expr:
+        """Speed of a wheel."""
+        return m.omega_left if side == "left" else m.omega_left + m.theta_s_dot
+
+    @property
+    def _omega_m(m) -> Expr:
+        """Speed of the motor."""
+        return m.i_g * (m._omega("right") + m.theta_g_dot)
+
     def _torques(m) -> tuple[Expr, Expr]:
         """Torques of the axle and of the drive."""
-        T_s = m.k_s * m.theta_s + m.c_s * (m.omega_right - m.omega_left)
-        T_g = m.k_g * m.theta_g + m.c_g * (m.omega_m / m.i_g - m.omega_right)
-        return T_s, T_g
+        return m.k_s * m.theta_s + m.c_s * m.theta_s_dot, m.k_g * m.theta_g + m.c_g * m.theta_g_dot
 
-    def _brake(m, omega: Expr) -> Expr:
-        return m.T_b * cs.tanh(omega / OMEGA_MIN)
+    def _outside(m, side: str) -> Expr:
+        """Torque on a wheel by its contact, its brake and its port."""
+        brake = m.T_b * cs.tanh(m._omega(side) / OMEGA_MIN)
+        port = m.T_left_ext if side == "left" else m.T_right_ext
+        return port - brake - m._radius(side) * m._contacts[side][0]
 
     def _radius(m, side: str) -> Expr:
         return m.r0 + SIGN[side] * m.lambda_w * (m.y - m.y_irr) + (m.dr_left, m.dr_right)[SIDES.index(side)]
@@ -202,8 +213,7 @@ class Traction(Model):
     def _creepages(m, side: str) -> tuple[Expr, Expr]:
         """Longitudinal and lateral creepage (Mal et al. 2020, eq. 1, 2 and 5, before they are simplified)."""
         V = cs.hypot(m.V, V_MIN)
-        omega = m.omega_left if side == "left" else m.omega_right
-        along = m.V - m._radius(side) * omega - SIGN[side] * m.s * m.psi_dot
+        along = m.V - m._radius(side) * m._omega(side) - SIGN[side] * m.s * m.psi_dot
         return along / V, (m.y_dot - m.V * m.psi) / V
 
     @cached_property

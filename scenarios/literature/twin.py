@@ -117,8 +117,7 @@ def _pulls(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
 
 
 def _rolling(speed: float) -> dict[str, float]:
-    omega = speed / WHEEL
-    return {"V": speed, "omega_left": omega, "omega_right": omega, "omega_m": GEAR * omega}
+    return {"V": speed, "omega_left": speed / WHEEL}
 
 
 INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
