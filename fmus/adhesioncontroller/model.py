@@ -16,23 +16,22 @@ from fmus.variables import (
 
 CHOICE = "this model"
 MAL = "Mal et al. 2020, Table 1"
-TORQUE_MIN = 1.0  # N.m, rounds the load torque by which the slope is divided
-VARIANCE_MIN = 1e-12  # of the creep, keeps the slope finite without a swing
+TORQUE_MIN = 100.0  # N.m, rounds the load torque by which its swing is divided
+SQUARE_MIN = 1e-12  # of the creep, keeps the slope's rate finite without a swing
 
 
 class AdhesionController(Model):
     """Keeps the creep of a driven wheelset at the peak of adhesion by swinging it: extremum seeking."""
 
     name = "AdhesionController"
-    step_size = 1e-3
+    step_size = 2e-4
 
     omega_f = State("rad/s", doc="motor speed, filtered", nominal=50.0)
     T_f = State("N.m", doc="motor torque, filtered", nominal=1e3)
     xi_f = State("1", doc="creep, filtered like the load torque", nominal=1e-3)
     T_0 = State("N.m", doc="mean of the load torque", nominal=1e3)
     xi_0 = State("1", doc="mean of the creep", nominal=1e-3)
-    c_Txi = State("N.m", doc="covariance of load torque and creep", nominal=1e-1)
-    c_xixi = State("1", doc="variance of the creep", nominal=1e-6)
+    load_slope = State("1", doc="relative slope of the load torque over the creep", nominal=100.0)
     xi_set = State("1", 0.005, doc="creep at which the torque is limited", nominal=1e-3)
     phi = State("rad", doc="phase of the swing", nominal=10.0)
 
@@ -50,41 +49,39 @@ class AdhesionController(Model):
     omega_o = Parameter("rad/s", 100.0, min=0.1, doc="corner of the filters of load torque and creep",
                         source=CHOICE)  # fmt: skip
     omega_h = Parameter("rad/s", 5.0, min=0.01, doc="corner above which the swing counts", source=CHOICE)
-    omega_c = Parameter("rad/s", 3.0, min=0.01, doc="corner of the means of the covariances", source=CHOICE)
+    omega_c = Parameter("rad/s", 7.0, min=0.01, doc="rate at which the slope is learnt", source=CHOICE)
     f_d = Parameter("Hz", 2.0, min=0.01, doc="frequency of the swing", source=CHOICE)
     xi_d = Parameter("1", 0.001, min=0.0, doc="amplitude of the swing", source=CHOICE)
     xi_s = Parameter("1", 0.2, min=1e-6, doc="creep over which the relative slope counts as steep",
                      source=CHOICE)  # fmt: skip
-    k_e = Parameter("1/s", 0.006, min=0.0, doc="fastest change of the creep at which torque is limited",
+    k_e = Parameter("1/s", 0.01, min=0.0, doc="fastest change of the creep at which torque is limited",
                     source=CHOICE)  # fmt: skip
-    xi_min = Parameter("1", 0.001, min=0.0, doc="least creep at which torque is limited", source=CHOICE)
-    xi_max = Parameter("1", 0.1, min=0.0, doc="largest creep at which torque is limited", source=CHOICE)
+    xi_min = Parameter("1", 0.001, min=1e-6, doc="least creep at which torque is limited", source=CHOICE)
+    xi_max = Parameter("1", 0.1, min=1e-6, doc="largest creep at which torque is limited", source=CHOICE)
     V_min = Parameter("m/s", 1.0, min=1e-3, doc="speed below which creep is slip over this speed",
                       source=CHOICE)  # fmt: skip
 
     T = Output("N.m", doc="torque request of the motor, traction positive", nominal=1e3)
+    T_limit = Output("N.m", doc="torque that holds the creep at its limit", nominal=1e3)
     T_load = Output("N.m", doc="load torque at the motor, observed", nominal=1e3)
     xi = Output("1", doc="creep of the wheels by the motor's speed, traction positive", nominal=1e-3)
-    load_slope = Output("1", doc="relative slope of the load torque over the creep", nominal=100.0)
     limiting = Output("1", doc="1 where the controller limits the torque that is demanded")
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
         swing_T, swing_xi = m._load() - m.T_0, m.xi_f - m.xi_0
-        uphill = m.k_e * cs.tanh(m._slope() * m.xi_s)
-        outwards = cs.logic_or(
-            cs.logic_and(m.xi_set >= m.xi_max, uphill > 0), cs.logic_and(m.xi_set <= m.xi_min, uphill < 0)
-        )
+        missed = swing_T / cs.hypot(m.T_0, TORQUE_MIN) - m.load_slope * swing_xi
+        steep = m.load_slope * m.xi_s
+        uphill = m.k_e * steep / cs.hypot(1, steep) * m._room()
         return {
             "omega_f": m.omega_o * (m.omega_m - m.omega_f),
             "T_f": m.omega_o * (m._torque() - m.T_f),
             "xi_f": m.omega_o * (m._creep() - m.xi_f),
             "T_0": m.omega_h * swing_T,
             "xi_0": m.omega_h * swing_xi,
-            "c_Txi": m.omega_c * (swing_T * swing_xi - m.c_Txi),
-            "c_xixi": m.omega_c * (swing_xi**2 - m.c_xixi),
+            "load_slope": m.omega_c * swing_xi * missed / (swing_xi**2 + m.xi_d**2 / 2 + SQUARE_MIN),
             # what the driver does to the torque says nothing of the peak
-            "xi_set": cs.if_else(cs.logic_or(outwards, cs.logic_not(m._limiting())), 0.0, uphill),
+            "xi_set": cs.if_else(m._limiting(), uphill, 0.0),
             "phi": 2 * cs.pi * m.f_d,
         }
 
@@ -92,9 +89,9 @@ class AdhesionController(Model):
         """See Model.outputs."""
         return {
             "T": m._torque(),
+            "T_limit": m._limit(),
             "T_load": m._load(),
             "xi": m._creep(),
-            "load_slope": m._slope(),
             "limiting": m._limiting(),
         }
 
@@ -108,18 +105,20 @@ class AdhesionController(Model):
         """Load torque: what the motor's torque did not turn into acceleration."""
         return m.T_f - m.J * m.omega_o * (m.omega_m - m.omega_f)
 
-    def _slope(m) -> Expr:
-        """Regression of the load torque on the creep over the swing, over the load torque; 1 over creep."""
-        return m.c_Txi / (m.c_xixi + VARIANCE_MIN) / cs.hypot(m.T_0, TORQUE_MIN)
+    def _room(m) -> Expr:
+        """Share of its fastest change that the creep's limit has left between its bounds."""
+        above = (m.xi_max - m.xi_set) / (m.xi_max + cs.fabs(m.xi_set))
+        below = (m.xi_set - m.xi_min) / (m.xi_min + cs.fabs(m.xi_set))
+        return above * below
 
     def _limit(m) -> Expr:
         """Torque that holds the creep at its limit, which swings."""
         xi = m.xi_set + m.xi_d * cs.sin(m.phi)
         omega = (m.V + xi * m._speed()) * m.i_g / m.r0
-        return cs.fmax(m._load() + m.k_p * (omega - m.omega_m), 0)
+        return m._load() + m.k_p * (omega - m.omega_m)
 
     def _limiting(m) -> Expr:
         return m._limit() < m.T_demand
 
     def _torque(m) -> Expr:
-        return cs.fmin(m._limit(), m.T_demand)
+        return cs.fmin(cs.fmax(m._limit(), 0), m.T_demand)
