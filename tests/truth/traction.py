@@ -17,11 +17,13 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from tests.truth.contact import Array, Patch, fastsim
+from tests.truth.laws import Law
 
 SLOWEST = 0.01  # m/s, below which the creepage no longer grows
 BRAKE_ROUNDING = 0.1  # rad/s
 INPUTS = ("T_m", "T_b", "y", "psi", "y_dot", "psi_dot", "y_irr", "F_x_ext")
 STATES = ("theta_left", "theta_right", "theta_m", "x", "omega_left", "omega_right", "omega_m", "V")
+Push = tuple[str, Law]  # a place and the law there
 CREEPS = np.geomspace(1e-3, 1e3, 121)  # at which FASTSIM is worked out, in units of full slip's order
 
 
@@ -140,8 +142,32 @@ def contacts(p: Traction, x: Sequence[float], u: Mapping[str, float]) -> dict[st
     return found
 
 
-def motion(p: Traction, inputs: Inputs) -> Callable[[float, Array], Array]:
-    """Right-hand side for the STATES."""
+def direction(p: Traction, place: str) -> Array:
+    """How a force at a place enters the four coordinates, (4,); its motion there is this times theirs."""
+    left, right, motor, along = np.eye(4)
+    return {
+        "wheel_left": left,
+        "wheel_right": right,
+        "motor": motor,
+        "vehicle": along,
+        "axle": right - left,
+        "drive": motor / p.i_g - right,
+        "contact_left": p.r0 * left - along,
+        "contact_right": p.r0 * right - along,
+    }[place]
+
+
+def pushed(p: Traction, pushes: Sequence[Push], t: float, x: Array) -> Array:
+    """Generalised forces (4,) of laws at places, for the states x (8,)."""
+    total = np.zeros(4)
+    for place, law in pushes:
+        b = direction(p, place)
+        total += b * law.force(t, float(b @ x[:4]), float(b @ x[4:]), ())
+    return total
+
+
+def motion(p: Traction, inputs: Inputs, pushes: Sequence[Push] = ()) -> Callable[[float, Array], Array]:
+    """Right-hand side for the STATES, with laws that have no memory at places."""
     springs, dampers = p.shafts(p.k_s, p.k_g), p.shafts(p.c_s, p.c_g)
 
     def rates(t: float, x: Array) -> Array:
@@ -151,8 +177,9 @@ def motion(p: Traction, inputs: Inputs) -> Callable[[float, Array], Array]:
         outside = np.array(
             [-at["r_left"] * at["F_x_left"] - brake[0], -at["r_right"] * at["F_x_right"] - brake[1], u["T_m"]]
         )
-        spun = (outside - springs @ x[:3] - dampers @ x[4:7]) / p.inertia
-        pull = at["F_x_left"] + at["F_x_right"] + u["F_x_ext"]
+        more = pushed(p, pushes, t, x)
+        spun = (outside + more[:3] - springs @ x[:3] - dampers @ x[4:7]) / p.inertia
+        pull = at["F_x_left"] + at["F_x_right"] + u["F_x_ext"] + more[3]
         return np.array([x[4], x[5], x[6], x[7], *spun, pull / p.M_v])
 
     return rates
@@ -170,8 +197,11 @@ def simulate(
     start: Array,
     changes: Sequence[tuple[float, Traction]] = (),
     tolerance: float = 1e-9,
+    pushes: Sequence[Push] = (),
 ) -> Array:
     """States (n, 8) at the times of the inputs; changes: times [s] and the parameters from then on.
+
+    pushes: laws at places, see `direction`.
 
     Raises ValueError where the integration fails.
     """
@@ -180,8 +210,8 @@ def simulate(
     rows, x = [start[None]], start
     for (first, last), now in zip(pairwise(edges), (p, *(q for _, q in changes)), strict=True):
         solution = solve_ivp(
-            motion(now, inputs), (t[first], t[last]), x, method="LSODA", t_eval=t[first + 1 : last + 1],
-            rtol=tolerance, atol=1e-2 * tolerance, max_step=1e-2,
+            motion(now, inputs, pushes), (t[first], t[last]), x, method="LSODA",
+            t_eval=t[first + 1 : last + 1], rtol=tolerance, atol=1e-2 * tolerance, max_step=1e-2,
         )  # fmt: skip
         if not solution.success:
             raise ValueError(f"inputs: integration stopped at {solution.t[-1]:g} s: {solution.message}")
