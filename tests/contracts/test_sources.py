@@ -9,11 +9,10 @@ from scenarios.literature import ROWS
 from tests.helpers.paths import ROOT
 
 PAGE = (ROOT / "docs" / "sources.md").read_text(encoding="utf-8")
-ITEMS = [
-    [cell.strip() for cell in line.strip("|").split("|")]
-    for line in PAGE.splitlines()
-    if line.startswith("| ") and not line.startswith("| item")
+ROWS_OF_TABLES = [
+    [c.strip() for c in line[1:-1].split("|")] for line in PAGE.splitlines() if line[:2] == "| "
 ]
+ITEMS = [row for row in ROWS_OF_TABLES if len(row) == 5 and row[0] != "item"]
 
 
 @pytest.mark.parametrize("item", ITEMS, ids=lambda item: item[0])
