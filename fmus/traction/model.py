@@ -30,7 +30,7 @@ DRY = "Mal et al. 2020, Table 3, dry"
 CHOICE = "this model"
 V_MIN = 0.01  # m/s, rounds the speed of travel near standstill, where creepage has no limit
 W_MIN = 1e-9  # m/s, rounds the slip speed at zero
-OMEGA_MIN = 0.1  # rad/s, within which the friction brake changes its direction
+OMEGA_MIN = 1e-3  # rad/s, within which the friction brake changes its direction
 SIDES = ("left", "right")
 SIGN = {"left": 1.0, "right": -1.0}  # of y there
 

@@ -20,7 +20,7 @@ from tests.truth.contact import Array, Patch, fastsim
 from tests.truth.laws import Law
 
 SLOWEST = 0.01  # m/s, below which the creepage no longer grows
-BRAKE_ROUNDING = 0.1  # rad/s
+BRAKE_ROUNDING = 1e-3  # rad/s
 INPUTS = ("T_m", "T_b", "y", "psi", "y_dot", "psi_dot", "y_irr", "F_x_ext")
 STATES = ("theta_left", "theta_right", "theta_m", "x", "omega_left", "omega_right", "omega_m", "V")
 Push = tuple[str, Law]  # a place and the law there
