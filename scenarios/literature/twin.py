@@ -26,6 +26,8 @@ LINES = 160
 AXLES = 19.0  # m between the bogie centres
 TORQUE = 852.0  # N.m, thesis 4.5
 REST = 5.0  # s without torque at the beginning and the end, there
+WHEEL, GEAR = 0.5, 5.0  # m, 1: rolling radius and gearbox of the driven wheelset
+PULL = 1.1 * 2 * 79.7e3 * WHEEL / GEAR  # N.m over mu0, a little above the adhesion of both wheels
 
 
 def twin(fmu: Path) -> Source:
@@ -36,7 +38,8 @@ def twin(fmu: Path) -> Source:
         rng, t = np.random.default_rng(case.seed), case.times
         inputs = INPUTS[case.model](case, t, rng)
         edges = [0, *(round(when / case.dt) for when, _ in case.jumps), len(t) - 1]
-        start = {**({"V": case.speed} if case.model == "wheelset" else {}), **case.true}
+        begun = STARTS.get(case.model)
+        start = {**(begun(case.speed) if begun else {}), **case.true}
         found = []
         with Fmu(fmu) as plant:
             states = list(plant.description.states)
@@ -109,8 +112,21 @@ def _torque(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
     return {"T_P": np.interp(t, knots, values), "f_sync": np.full_like(t, case.speed)}
 
 
+def _pulls(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    return {"T_m": PULL * case.true["mu0"] * np.clip(1.5 * np.sin(2 * np.pi * t), 0.1, 1.0)}
+
+
+def _rolling(speed: float) -> dict[str, float]:
+    return {"V": speed, "omega_left": speed / WHEEL}
+
+
 INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
     "wheelset": _alignment,
     "vehicle7dof": _rails,
     "testrig": _torque,
+    "traction": _pulls,
+}
+STARTS: dict[str, Callable[[float], dict[str, float]]] = {
+    "wheelset": lambda speed: {"V": speed},
+    "traction": _rolling,
 }

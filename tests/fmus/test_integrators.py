@@ -1,6 +1,7 @@
 """Integrators: order, damping of what is stiff, and steps that shorten themselves."""
 
 from array import array
+from fractions import Fraction
 from functools import partial
 
 import casadi as cs
@@ -17,11 +18,13 @@ from fmus.export.runtime.symbolic import on_memory
 from fmus.integrators import INTEGRATORS
 from fmus.integrators.rk4 import Rk4
 from fmus.integrators.rodas3 import Rodas3
+from fmus.integrators.rodas4 import GAMMA, POINTS, RATES, Rodas4
 from fmus.model import equations
 from fmus.models import MODELS
 from tests.helpers.everything import near_start, values
 
 every_integrator = pytest.mark.parametrize("method", INTEGRATORS.values(), ids=INTEGRATORS)
+stiff = pytest.mark.parametrize("method", [Rodas3, Rodas4])
 
 
 def compiled(rates, n, method=Rodas3, tolerated=1e-6):
@@ -53,44 +56,99 @@ def test_order_of_convergence(method):
     assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), method.order, atol=0.15)
 
 
-def test_error_estimate_of_rodas3_has_order_three_and_is_no_less_than_the_error():
-    step, fine = compiled(pendulum, 2, Rodas3, 1e-6), compiled(pendulum, 2, Rk4)
+@stiff
+def test_error_estimate_has_the_methods_order_and_is_no_less_than_the_error(method):
+    step, fine = compiled(pendulum, 2, method, 1e-6), compiled(pendulum, 2, Rk4)
     estimates = []
     for h in (0.1, 0.05, 0.025):
         x1, error = step([1.0, 0.5], 0.2, 0.3, h)
         true = np.abs(np.array(x1).ravel() - march(fine, [1.0, 0.5], 0.2, 0.3, h, 20)).max()
         assert float(error) >= true / 1e-6
         estimates.append(float(error))
-    assert_allclose(np.log2(np.divide(estimates[:-1], estimates[1:])), 3, atol=0.3)
+    assert_allclose(np.log2(np.divide(estimates[:-1], estimates[1:])), method.order, atol=0.3)
 
 
 def test_rk4_claims_no_error():
     assert float(compiled(pendulum, 2, Rk4)([1.0, 0.5], 0.2, 0.3, 0.5)[1]) == 0.0
 
 
-@given(st.floats(-1e8, 0.0), st.floats(-1e8, 1e8))
-def test_rodas3_is_a_stable(real, imaginary):
-    step = compiled(lambda x, u, p: (u * x[0] - p * x[1], p * x[0] + u * x[1]), 2)
+@stiff
+@given(real=st.floats(-1e8, 0.0), imaginary=st.floats(-1e8, 1e8))
+def test_it_is_a_stable(method, real, imaginary):
+    step = compiled(lambda x, u, p: (u * x[0] - p * x[1], p * x[0] + u * x[1]), 2, method)
     x1 = np.array(step([1.0, 0.0], real, imaginary, 1.0)[0])
     assert np.hypot(*x1.ravel()) <= 1 + 1e-9
 
 
+@stiff
 @pytest.mark.parametrize("rate", [1e4, 1e6, 1e8])
-def test_rodas3_is_l_stable(rate):
-    step = compiled(lambda x, u, p: (-p * (x[0] - u),), 1)
+def test_it_is_l_stable(method, rate):
+    step = compiled(lambda x, u, p: (-p * (x[0] - u),), 1, method)
     # one step across 1e4 to 1e8 time constants: nothing of the start is left, R(z) = O(1/z)
     assert abs(float(step([5.0], 2.0, rate, 1.0)[0]) - 2.0) < 30 / rate
 
 
-def test_prothero_robinson_follows_the_slow_solution():
+@stiff
+def test_prothero_robinson_follows_the_slow_solution(method):
     def rates(x, u, p):
         return -p * (x[0] - cs.cos(x[1])) - cs.sin(x[1]), 1.0
 
-    step = compiled(rates, 2)
+    step = compiled(rates, 2, method)
     for rate in (1e2, 1e4, 1e6):
         errors = [abs(march(step, [1.0, 0.0], 0.0, rate, 2.0, n)[0] - np.cos(2.0)) for n in (10, 20, 40)]
         assert errors[0] < 0.02 / rate  # a stiffly accurate method: the stiffer, the better
         assert errors[2] < errors[1] < errors[0]
+
+
+# a twist of some mrad on a stiff shaft beside the speeds of two masses, which a contact brakes
+SHAFT = [[0, 1, 0], [-300000, -4000, 2000], [1400000, 100, -100]]
+
+
+def exact_step(x, h):
+    """A step of the method for x' = SHAFT x in fractions, by Gauss-Jordan: no digit is lost."""
+    x, h = [Fraction(v) for v in x], Fraction(h)
+
+    def rates(point):
+        return [sum(a * v for a, v in zip(row, point, strict=True)) for row in SHAFT]
+
+    def plus(vector, shares, k, by):
+        return [v + by * sum(Fraction(s) * ki[i] for s, ki in zip(shares, k, strict=True))
+                for i, v in enumerate(vector)]  # fmt: skip
+
+    k = []
+    for points, shares in zip(POINTS, RATES, strict=True):
+        point = plus(x, points, k, 1)
+        rows = [[(i == j) / (Fraction(GAMMA) * h) - SHAFT[i][j] for j in range(3)] for i in range(3)]
+        rows = [[*row, b] for row, b in zip(rows, plus(rates(point), shares, k, 1 / h), strict=True)]
+        for i in range(3):
+            rows[i] = [v / rows[i][i] for v in rows[i]]
+            rows = [row if j == i else [a - row[i] * b for a, b in zip(row, rows[i], strict=True)]
+                    for j, row in enumerate(rows)]  # fmt: skip
+        k.append([row[-1] for row in rows])
+    return [float(a + b) for a, b in zip(point, k[-1], strict=True)]
+
+
+def test_a_small_state_beside_large_ones_keeps_its_digits_with_rodas4():
+    def rates(x, u, p):
+        return cs.vertsplit(cs.DM(SHAFT) @ x)
+
+    start, h = [5e-4, -13.0, 37.0], 1e-4
+    found, exact = np.array(compiled(rates, 3, Rodas4)(start, 0.0, 0.0, h)[0]).ravel(), exact_step(start, h)
+    assert_allclose(found[0], exact[0], rtol=1e-13)
+    assert_allclose(found, exact, rtol=1e-11)  # the speeds fall to a part of their stages
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-10.0, 10.0), st.floats(1e-4, 0.5))
+def test_a_state_that_is_not_felt_changes_no_bit_with_rodas4(q, v, h):
+    def alone(x, u, p):
+        return x[1], -1e5 * cs.sin(x[0]) - 300 * x[1]
+
+    def watched(x, u, p):  # a lag that a force could feel by p
+        return x[1], -1e5 * cs.sin(x[0]) - 300 * x[1] + p * x[2], (x[1] - x[2]) / 0.02
+
+    bare = np.array(compiled(alone, 2, Rodas4)([q, v], 0.0, 0.0, h)[0]).ravel()
+    with_lag = np.array(compiled(watched, 3, Rodas4)([q, v, 0.7], 0.0, 0.0, h)[0]).ravel()
+    assert with_lag[:2].tolist() == bare.tolist()
 
 
 def test_short_steps_follow_stiff_van_der_pol():

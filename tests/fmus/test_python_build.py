@@ -5,6 +5,8 @@ import shutil
 import subprocess
 import sys
 import textwrap
+from array import array
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fmus.export.builders.pythonfmu import build_python
+from fmus.export.runtime.stepping import Stepper
+from fmus.export.runtime.symbolic import on_memory
 from fmus.host.archive import Archive
 from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmu import Fmu
@@ -31,6 +35,13 @@ from tests.helpers.runs import (
 )
 
 
+def shortened(step, x, u, p):
+    """States after DT by the rule for shorter steps, which has tests of its own."""
+    x, u, p = (memoryview(array("d", v)) for v in (x, u, p))
+    assert Stepper(partial(on_memory, step), x, u, p, DT).advance(DT)
+    return np.array(x)
+
+
 @every_model
 @pytest.mark.parametrize("seed", range(3))
 def test_a_step_is_the_equations_step(built, name, seed):
@@ -42,8 +53,8 @@ def test_a_step_is_the_equations_step(built, name, seed):
         for row in stirred(model, rng):
             u = np.array(list(row.values()))
             x1, error = made.step(x, u, p, DT)
-            assert float(error) <= 1, "the model asks for shorter steps here; the test is of one"
-            x = x1.full().ravel()
+            # a stiff contact under inputs that jump may ask for shorter steps
+            x = x1.full().ravel() if float(error) <= 1 else shortened(made.step, x, u, p)
             fmu.step(DT, **row)
             assert_allclose(fmu.read(names(model, State)), x, rtol=1e-9)
             assert_allclose(fmu.read(names(model, Output)), values(made.h, x, u, p), rtol=1e-9)

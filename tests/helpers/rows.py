@@ -17,6 +17,7 @@ from scenarios.literature import ROWS
 from scenarios.literature.case import TIME, Case, Record
 from tests.helpers.rows_charles import of_charles
 from tests.helpers.rows_mal import of_mal, piece
+from tests.helpers.rows_torsion import of_torsion
 from tests.helpers.rows_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
 from tests.truth.rig_inputs import Inputs, trapezium
@@ -39,7 +40,7 @@ def truth(case: Case, form: Form = SAME) -> Record:
         return of_mal(case, form)
     if case.model == "wheelset":
         return of_wheelset(case, form)
-    return {"testrig": of_rig, "vehicle7dof": of_vehicle}[case.model](case)
+    return {"testrig": of_rig, "vehicle7dof": of_vehicle, "traction": of_torsion}[case.model](case)
 
 
 def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:

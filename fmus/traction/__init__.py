@@ -1,0 +1,1 @@
+"""Torsional wheelset with gearbox and motor; equations in README.md."""
