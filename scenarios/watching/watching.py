@@ -37,6 +37,7 @@ from scenarios.watching.tracing import Tracing
 from scenarios.watching.windows import Reading, follow_on
 
 POLL = 0.2  # s, between looks for new windows
+RESTING = 10.0  # times as long as a look took, at least, between looks: a folder may hold very many files
 SHOWN = 10  # alarms on the page
 RECENT = 20  # windows over which the speed is measured
 
@@ -84,13 +85,13 @@ def watch(
         stack.callback(making.joint.close)
         following = Following(c, making, declared.test.settings, declared.trigger)
         capturing = Capturing(folder, e, declared.trace)
-        watcher = Watcher(declared, c, following, reading, source, capturing, folder, key, kept, show)
+        watcher = Watcher(e.id, declared, c, following, reading, source, capturing, folder, key, kept, show)
         if port is not None:
             stack.enter_context(watcher.serving.at(port))
             show([f"page: http://127.0.0.1:{watcher.serving.port}/"])
         stack.callback(watcher.tracing.stop)
         watcher.run(once, tell)
-        return watcher.finish(e.id)
+        return watcher.finish()
 
 
 def _source(declared: Watched) -> Source:
@@ -104,10 +105,11 @@ class Watcher:
     """The loop: what comes is read, put in order, filtered and tested, logged, and kept in the checkpoint."""
 
     def __init__(
-        self, declared: Watched, c: Commissioned, following: Following, reading: Reading, source: Source,
-        capturing: Capturing, folder: Path, key: str, kept: Checkpoint | None, show: Show,
+        self, name: str, declared: Watched, c: Commissioned, following: Following, reading: Reading,
+        source: Source, capturing: Capturing, folder: Path, key: str, kept: Checkpoint | None, show: Show,
     ) -> None:  # fmt: skip
-        self._declared, self._c, self._following, self._reading = declared, c, following, reading
+        self._name, self._declared, self._c = name, declared, c
+        self._following, self._reading = following, reading
         self._source, self._capturing, self._folder, self._key = source, capturing, folder, key
         self._show = show
         names = [n for name in following.names for n in (name, f"{name}_std")]
@@ -126,7 +128,7 @@ class Watcher:
         """Until interrupted; with `once` until no further window is there and close-loop has ended."""
         quiet_since = time.monotonic()
         while True:
-            handled = False
+            handled, begun = False, time.monotonic()
             for arrival in self._source.arrivals():
                 if self._arrived(arrival):
                     handled = True
@@ -137,7 +139,7 @@ class Watcher:
                 continue
             if once and time.monotonic() - quiet_since > self._declared.stream.settle + 2 * POLL:
                 break
-            time.sleep(POLL)
+            time.sleep(max(POLL, RESTING * (time.monotonic() - begun)))
         for window in self._joining.ready(self._following.until, flush=True):
             self._finish(self._following.take(window))
         self.tracing.add(self._capturing.complete(self._following.until, at_end=True))
@@ -148,11 +150,11 @@ class Watcher:
             time.sleep(POLL)
             self._look()
 
-    def finish(self, experiment: str) -> WatchResult:
+    def finish(self) -> WatchResult:
         """The result, which is written too."""
         f = self._following
         result = WatchResult(
-            experiment, f.counts, f.until, f.monitor.learning, dict(f.estimates), tuple(self._alarms),
+            self._name, f.counts, f.until, f.monitor.learning, dict(f.estimates), tuple(self._alarms),
             tuple(self.tracing.state()),
         )  # fmt: skip
         result.write(self._folder / RESULT)
@@ -195,14 +197,13 @@ class Watcher:
 
     def _captured(self, o: Outcome) -> list[Path]:
         """Keep the window for an alarm that may come; the folders of events whose record is complete now."""
-        f, trace = self._following, self._declared.trace
-        if o.window is None or o.state not in (TESTED, LEARNING) or not trace.most:
-            return []
-        self._capturing.add(o.window)
+        f, most = self._following, self._declared.trace.most
+        if o.window is not None and o.state in (TESTED, LEARNING) and most:
+            self._capturing.add(o.window)
         for i, alarm in enumerate(o.alarms, f.counts.alarms - len(o.alarms) + 1):
             self._alarms.append(sentence(alarm))
             self._show([f"alarm {i}: {sentence(alarm)}"])
-            if i <= trace.most:
+            if i <= most:
                 self._capturing.alarm(alarm, i)
         return self._capturing.complete(f.until)
 
@@ -252,7 +253,7 @@ class Watcher:
         record, spent = (sum(pair[i] for pair in self._spent) for i in (0, 1))
         values = tuple((n, f.estimates[n], f.estimates[f"{n}_std"]) for n in f.names if n in f.estimates)
         return Status(
-            self._declared.folder.name, f.counts, f.until, f.monitor.learning, f.monitor.rejects(f.until),
+            self._name, f.counts, f.until, f.monitor.learning, f.monitor.rejects(f.until),
             self._declared.test.false_alarms_per_hour, self._heights(), values, tuple(self._alarms),
             tuple(self.tracing.state()), o.milliseconds if o else 0.0, record / spent if spent else 0.0,
             self._backward, time.time() if o else float("nan"),

@@ -8,18 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.signal import lfilter
 
+from benchmarks.watching.false_alarms import autoregression, false_alarms, heavy_tails
 from estimator.filters.history import History
 from estimator.monitoring.blocks import block_statistics, statistics
-from estimator.monitoring.cusum import ALLOWANCE, Sums, mean_run, threshold
+from estimator.monitoring.cusum import ALLOWANCE, mean_run, threshold
 from estimator.monitoring.monitor import KEPT, Monitor, Settings
 from estimator.monitoring.reference import Reference, correlation, learned
 from fmus import codec
 
-BLOCK = 0.25  # s
-STATISTICS = 5
-STREAMS = 60
 SETTINGS = Settings(false_alarms_per_hour=1.0, block=0.1, learn=5.0, settle=0.2, quiet=1.0)
 
 
@@ -44,12 +41,6 @@ def history(innovation, dt=0.01, t0=0.0):
         np.nansum(innovation**2, axis=1), there.sum(axis=1).astype(float), np.zeros((n, 2), bool),
         np.zeros(n), None, "",
     )  # fmt: skip
-
-
-def correlated(rng, n, columns, memory):
-    """A stationary autoregression of first order with unit variance, (n, columns)."""
-    white = rng.normal(size=(n + 300, columns))
-    return np.sqrt(1 - memory**2) * lfilter([1.0], [1.0, -memory], white, axis=0)[300:]
 
 
 def test_statistics_of_white_innovations_are_standard_normal():
@@ -94,29 +85,16 @@ def test_the_mean_run_of_normal_values_is_the_stated_one_or_longer():
     assert asked < np.mean(runs) < 5 * asked
 
 
-def false_alarms(memory, rate, learn, hours, seed, scale=lambda r: r):
-    """Alarms an hour of STREAMS streams, each with its own reference, which `scale` may spoil."""
-    rng = np.random.default_rng(seed)
-    h = threshold(mean_run(rate, BLOCK, STATISTICS))
-    n = round(hours * 3600 / BLOCK)
-    values = correlated(rng, learn + n, STREAMS * STATISTICS, memory)
-    reference = scale(learned(values[:learn], 2 * ALLOWANCE * h))
-    sums, alarms = Sums.begun(STREAMS * STATISTICS, 0.0), 0
-    for k in range(learn, len(values)):
-        sums = sums.after(values[k], 0.0, reference, h)
-        hit = sums.height.reshape(STREAMS, STATISTICS).max(axis=1) > h
-        if hit.any():
-            alarms += int(hit.sum())
-            still = np.repeat(~hit, STATISTICS)
-            sums = Sums(sums.above * still, sums.below * still, sums.above_since, sums.below_since)
-    return alarms / (STREAMS * hours)
-
-
-@pytest.mark.parametrize(("memory", "learn"), [(0.0, 240), (0.5, 480), (0.8, 960)])
-def test_false_alarms_are_at_most_as_many_as_stated_also_on_correlated_blocks(memory, learn):
-    """Over 15 hours of streams at 20 an hour; each stream has learned from its own 1 to 4 minutes."""
-    rate = 20.0
-    assert false_alarms(memory, rate, learn, 0.25, seed=17) <= rate
+@pytest.mark.parametrize(
+    ("draw", "learn"),
+    [(autoregression(0.0), 240), (autoregression(0.5), 480), (autoregression(0.8), 240), (heavy_tails, 240)],
+    ids=["white", "correlated", "much correlated", "heavy tails"],
+)
+def test_false_alarms_are_at_most_as_many_as_stated(draw, learn):
+    """Over ten hours of 40 streams at 20 an hour; each has learned from its own blocks."""
+    found = false_alarms(draw, 20.0, learn, 0.25, 40, seed=17)
+    assert found.unlearned == 0
+    assert found.rate <= 20.0
 
 
 def test_without_the_long_run_scale_the_rate_is_not_kept():
@@ -125,19 +103,19 @@ def test_without_the_long_run_scale_the_rate_is_not_kept():
     def plain(r):
         return Reference(r.mean, np.ones(len(r.mean)), r.blocks)
 
-    assert false_alarms(0.5, 20.0, 480, 0.25, seed=17, scale=plain) > 2 * 20.0
+    assert false_alarms(autoregression(0.5), 20.0, 480, 0.25, 40, seed=17, spoil=plain).rate > 2 * 20.0
 
 
 def test_a_reference_waits_until_the_blocks_tell_enough():
-    values = correlated(np.random.default_rng(5), 400, 3, 0.9)
+    values = autoregression(0.9)(np.random.default_rng(5), 400, 3)
     assert correlation(values) == pytest.approx(0.9, abs=0.1)
     assert learned(values[:200], 20.0) is None
-    assert learned(correlated(np.random.default_rng(5), 200, 3, 0.0), 20.0) is not None
+    assert learned(autoregression(0.0)(np.random.default_rng(5), 200, 3), 20.0) is not None
 
 
 def test_the_scale_of_a_reference_is_the_one_of_long_sums():
     memory = 0.6
-    values = correlated(np.random.default_rng(6), 20000, 4, memory)
+    values = autoregression(memory)(np.random.default_rng(6), 20000, 4)
     found = learned(values, 0.0)
     assert found is not None
     exact = np.sqrt((1 + memory) / (1 - memory))

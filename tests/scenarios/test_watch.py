@@ -327,6 +327,23 @@ def test_a_window_outside_a_trigger_is_not_filtered(rig, tmp_path):
     assert f.counts.outside == 1
 
 
+def test_directions_of_likeness_are_responses_of_the_fmu(rig):
+    """A torque on the wheel speeds both bodies up, which the contact couples; a gain acts with its input."""
+    tried = rig.making.directions()
+    forces = ("a force at 'T_w_ext'", "a force at 'T_r_ext'")
+    gains = ("another gain of 'T_P'", "another gain of 'f_sync'")
+    assert tried.names == (*forces, "another value of 'mu0'", *gains)
+    y = rig.data[["omega_w", "omega_r"]].to_numpy()[:1]
+    x = rig.making.start(0.0, np.zeros((1, 2)), y, None).x
+    rolling, braking = (tried.at(x, np.array([T_P, 7.5]), 0.0) for T_P in (0.0, 500.0))
+    assert np.all(rolling[0] > 0)
+    assert np.all(rolling[3] == 0)  # a gain of no torque changes nothing
+    assert np.all(braking[3] < 0)
+    for found in (rolling, braking):
+        length = np.linalg.norm(found, axis=1)
+        assert np.all((np.abs(length - 1) < 1e-12) | (length == 0))
+
+
 def test_memory_is_constant(rig, tmp_path):
     """Between the hundredth and the three hundredth window; one window's rows are 5 kB."""
     import tracemalloc
