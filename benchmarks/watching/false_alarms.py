@@ -68,6 +68,8 @@ def false_alarms(
                 references.append(spoil(reference))
                 kept.append(values[used : used + n])
                 break
+    if not kept:
+        return Found(0.0, 0.0, streams)
     whole = Reference(
         np.concatenate([r.mean for r in references]), np.concatenate([r.scale for r in references]),
         np.repeat([r.blocks for r in references], STATISTICS),  # type: ignore[arg-type]  # one of each stream

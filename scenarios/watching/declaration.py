@@ -11,6 +11,7 @@ from scenarios.experiment.validation import read_file, read_table
 from scenarios.watching.triggers import TRIGGERS
 from scenarios.watching.triggers.trigger import Trigger
 
+ENDING = r"^\.[A-Za-z0-9]{1,8}(\.gz)?$"  # of a file
 Count = Annotated[int, Field(strict=True, ge=0)]
 Port = Annotated[int, Field(strict=True, ge=1, le=65535)]
 
@@ -24,7 +25,7 @@ class Mqtt(Table):
     host: str
     topic: str
     port: Port = 1883
-    format: str = ".parquet"
+    format: Annotated[str, Field(pattern=ENDING)] = ".parquet"
     client: str = "railfmi-watch"
     user: str | None = None
     password_file: str | None = None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.drawing.pages import rendered
-from scenarios.drawing.typography import number, percent, with_error
+from scenarios.drawing.typography import capital, number, percent, with_error
 from scenarios.watching.checkpoint import Counts
 from scenarios.watching.tracing import Answer
 
@@ -137,7 +137,8 @@ def page(s: Status, now: float) -> str:
         "page.html.j2",
         status=s,
         counts=c,
-        trouble=s.trouble(now),
+        trouble=capital(s.trouble(now)),
+        alarms=[capital(a) for a in s.alarms],
         heights=rows,
         estimates=[(n, with_error(x, e)) for n, x, e in s.estimates],
         until=f"{s.until:.10g}" if isfinite(s.until) else "–",

@@ -20,7 +20,7 @@ from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import unwritten, writable
 from scenarios.watching import checkpoint
-from scenarios.watching.capturing import Capturing, sentence
+from scenarios.watching.capturing import EVENTS, Capturing, sentence
 from scenarios.watching.checkpoint import Checkpoint
 from scenarios.watching.commission import Commissioned, Making, commissioned
 from scenarios.watching.declaration import Watched, load_watching
@@ -79,6 +79,8 @@ def watch(
         folder = writable(Path(out))
         key = checkpoint.key_of(declared, e, fmu if e.model is None else None)
         kept = None if anew else checkpoint.read(folder, key)
+        if kept is None:
+            _check_no_events(folder)
         c = kept.commissioned if kept else commissioned(e, archive, record, tell)
         show(conversion_lines(record))
         making = Making(e, c, archive)
@@ -92,6 +94,14 @@ def watch(
         stack.callback(watcher.tracing.stop)
         watcher.run(once, tell)
         return watcher.finish()
+
+
+def _check_no_events(folder: Path) -> None:
+    """Raise BadInput where a stream that begins would mix its events with those of an earlier one."""
+    if any((folder / EVENTS).glob("*")):
+        raise BadInput(
+            f"{folder / EVENTS}: holds events of an earlier stream; move it away, or give another --out"
+        )
 
 
 def _source(declared: Watched) -> Source:

@@ -71,6 +71,7 @@ def test_the_page_escapes_what_it_is_told():
     assert "<b>something</b>" not in told
     assert "The model does not describe the stream" in told
     assert re.search(r"0\.400?.±.0\.010?", told)
+    assert "At t = 8 s: &lt;b&gt;" in told
     assert "src=" not in told  # it loads no other file
 
 
@@ -156,6 +157,9 @@ WRONG = {
         ["[derived.a]", "both sides"],
     ),
     "another checkpoint": (foreign_checkpoint, [FILE, "--anew"]),
+    "events of an earlier stream": (
+        lambda f: (f / "out" / "events" / "000001").mkdir(parents=True), ["events", "move it away"]
+    ),
 }  # fmt: skip
 
 

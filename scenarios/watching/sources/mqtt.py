@@ -16,7 +16,6 @@ QUEUED = 32  # messages that wait here; then the broker keeps the others
 KEEP_ALIVE = 30  # s
 CONNECTING = 5.0  # s, until the first connection must stand
 AT_LEAST_ONCE = 1  # quality of service: what is not confirmed comes again
-SUFFIX_TRIED = 8  # characters of the ending of a file, at most
 
 
 class Broker(Source):
@@ -90,7 +89,7 @@ class Broker(Source):
             self._count += 1
             name = f"{message.topic} {self._count}"
             self._open[name] = message
-            file = Path(self._work.name) / f"{self._count}{self._declared.format[-SUFFIX_TRIED:]}"
+            file = Path(self._work.name) / f"{self._count}{self._declared.format}"
             file.write_bytes(message.payload)
             yield Arrival(name, file)
             file.unlink(missing_ok=True)
