@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from scenarios.preparing.inspecting import inspect
     from scenarios.preparing.trial import dry_run
     from scenarios.reporting.report import report
+    from scenarios.watching.watching import watch
 
     __version__: str
 
@@ -44,12 +45,13 @@ _HOMES = {
     "load_experiment": "scenarios.experiment.experiment",
     "plan": "scenarios.planning.planning",
     "report": "scenarios.reporting.report",
+    "watch": "scenarios.watching.watching",
 }
 
 __all__ = [
     "BadInput", "Fmu", "FmuError", "__version__", "campaign", "close_loop", "close_loops",
     "contact_table", "creep_forces", "dry_run", "equivalent_conicity", "estimate", "fleet", "hertz",
-    "init", "inspect", "kalker", "load_experiment", "plan", "report",
+    "init", "inspect", "kalker", "load_experiment", "plan", "report", "watch",
 ]  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from math import ceil, log10
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.filters.algebra import compiled
 from estimator.filters.estimator import Diverged, Estimate
@@ -15,6 +16,7 @@ from fmus.aside import blocks, by_rows, joined, set_aside
 EVEN = 1e-6  # relative difference of time steps that is attributed to the rounding of printed times
 ROUNDING = 8.0  # units in the last place of a time, below which a difference of times is rounding
 TOLD = 200  # samples between two progress reports
+Indices = NDArray[np.intp]
 
 
 class Steps(Protocol):
@@ -47,42 +49,50 @@ class Samples:
     @property
     def steps(self) -> Array:
         """Lengths of the time steps (N - 1,), s; nearly equal steps are made exactly equal."""
-        steps, usual = np.diff(self.t), self.step
-        return np.where(np.abs(steps - usual) < EVEN * usual, usual, steps)
+        return evened(self.t, self.step)
 
     def first(self, n: int) -> "Samples":
         """The first n samples."""
         return Samples(self.t[:n], self.u[:n], self.held[: n - 1], self.y[:n])
 
 
+def evened(t: Array, usual: float) -> Array:
+    """Lengths of the steps between times (N,), (N - 1,) s; those nearly equal to the usual one become it."""
+    steps = np.diff(t)
+    return np.where(np.abs(steps - usual) < EVEN * usual, usual, steps)
+
+
 def samples(t: Array, u: Array, y: Array, every: int = 1, parts: int = 1) -> Samples:
     """Every `every`-th sample of a record, whose inputs are taken as piecewise linear.
 
     Between kept samples the inputs are replaced by their exact means over `parts` equal parts of the step.
+    Each step is computed from its own samples alone, so that a record in pieces gives the same numbers.
     """
     at = np.arange(0, len(t), every)
-    share = np.arange(parts) / parts
-    area = np.vstack([np.zeros(u.shape[1]), np.cumsum((u[1:] + u[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
-
-    def means(rows: slice) -> Array:
-        here = t[at[rows.start : rows.stop + 1]]
-        edges = np.append((here[:-1, None] + np.diff(here)[:, None] * share).ravel(), here[-1])
-        found = np.diff(_area(t, u, area, edges), axis=0) / np.diff(edges)[:, None]
-        return np.asarray(found.reshape(-1, parts, u.shape[1]))
-
-    held = by_rows((len(at) - 1, parts, u.shape[1]), means)
+    held = by_rows(
+        (len(at) - 1, parts, u.shape[1]), lambda rows: _means(t, u, at[rows], every, np.arange(parts) / parts)
+    )
     return Samples(t[at], u[at], held, y[at])
 
 
-def _area(t: Array, u: Array, area: Array, edges: Array) -> Array:
-    """Integral (M, n_u) from t[0] to edges (M,) of inputs (N, n_u) that are linear between times (N,).
+def _means(t: Array, u: Array, begins: Indices, every: int, share: Array) -> Array:
+    """Mean inputs (k, parts, n_u) over the parts of k steps, which begin at these samples (k,).
 
-    area: (N, n_u) that integral to each of the times.
+    t: (N,); u: (N, n_u); share: (parts,) of the step at which each part begins.
     """
-    k = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, len(t) - 2)
-    since = (edges - t[k])[:, None]
-    slope = (u[k + 1] - u[k]) / (t[k + 1] - t[k])[:, None]
-    found: Array = area[k] + u[k] * since + slope * since**2 / 2
+    within = begins[:, None] + np.arange(every + 1)
+    when, what = t[within], u[within]  # (k, every + 1), (k, every + 1, n_u)
+    pieces = (what[:, 1:] + what[:, :-1]) / 2 * np.diff(when)[:, :, None]
+    area = np.concatenate([np.zeros_like(what[:, :1]), np.cumsum(pieces, axis=1)], axis=1)
+    first, last = when[:, :1], when[:, -1:]
+    edges = first + (last - first) * share
+    k = np.maximum((when[:, None, :-1] <= edges[:, :, None]).sum(axis=2) - 1, 0)  # (k, parts)
+    row = np.arange(len(begins))[:, None]
+    since = (edges - when[row, k])[:, :, None]
+    slope = (what[row, k + 1] - what[row, k]) / (when[row, k + 1] - when[row, k])[:, :, None]
+    until = area[row, k] + what[row, k] * since + slope * since**2 / 2
+    until = np.concatenate([until, area[:, -1:]], axis=1)
+    found: Array = np.diff(until, axis=1) / np.diff(np.append(edges, last, axis=1))[:, :, None]
     return found
 
 
@@ -98,19 +108,32 @@ class History:
     nis: Array  # (N,) normalised squares of the innovations that were used
     freedom: Array  # (N,) number of channels that were used
     gated: BoolArray  # (N, m) channels that were measured but rejected by the gate
-    log_likelihood: float
+    likelihoods: Array  # (N,) log likelihood of each sample
     last: Estimate
     broken: str  # reason why the filter stopped early, empty if it did not
     estimates: Sequence[Estimate] = ()
 
+    @property
+    def log_likelihood(self) -> float:
+        """Of all samples."""
+        return float(self.likelihoods.sum())
+
 
 def filtered(
-    filter: Steps, s: Samples, tell: Callable[[float], None] = lambda _: None, keep: bool = False
+    filter: Steps,
+    s: Samples,
+    tell: Callable[[float], None] = lambda _: None,
+    keep: bool = False,
+    usual: float | None = None,
 ) -> History:
-    """Run a filter over samples, until it diverges at most; `tell` is called with the share that is done."""
+    """Run a filter over samples, until it diverges at most; `tell` is called with the share that is done.
+
+    A filter that is at the first sample already goes on from there; usual: time step, s, of the record that
+    these samples are a piece of, by default that of the samples.
+    """
     rows, kept, last, broken = _Rows(len(s.t), len(filter.names), s.y.shape[1]), [], filter.now, ""
-    steps = s.steps.tolist()
-    for k in range(len(s.t)):
+    steps = evened(s.t, s.step if usual is None else usual).tolist()
+    for k in range(0 if filter.now.u is None else 1, len(s.t)):
         try:
             if k == 0:
                 last = filter.step(s.u[0], s.y[0])
@@ -160,7 +183,7 @@ class _Rows:
         )
         return History(
             names, t[:, 0], x, std, innovation, nis[:, 0], freedom[:, 0], gated > 0,
-            float(likelihood[:, 0].sum()), last, broken, tuple(kept),
+            likelihood[:, 0], last, broken, tuple(kept),
         )  # fmt: skip
 
 

@@ -158,6 +158,20 @@ class Joint:
             x[:, i] = p.transform.theta(x[:, i])
         return x, std
 
+    def responses(self, x: Array, u: Array, t: float, dt: float, change: Mapping[str, float]) -> Array:
+        """Changes (k, m) of the outputs after a step of dt from x (n,) if each of k inputs is changed.
+
+        u: (n_u,) inputs that act over the step; change: by how much an input is changed, by its name.
+        """
+        row = self.rows(x[None], u, self._first_carried)[0]
+        values = np.tile(row, (1 + len(change), 1))
+        first = len(self.states) + len(self.others) + len(self.parameters)
+        for k, (name, by) in enumerate(change.items(), 1):
+            values[k, first + self.inputs.index(name)] += by
+        after = self._asked(self.copies.advance, values, t, dt)[:, self._seen]
+        found: Array = after[1:] - after[0]
+        return found
+
     def exchange(self) -> Exchange:
         """A new instance by model exchange, which the caller must close; raises BadInput if there is none."""
         told = self._put, self._get, self._fixed

@@ -31,7 +31,10 @@ FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary fil
 MEMORY_HINT = "; where memory runs out, the system does this"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-HINTS = {"close-loop": "; the same command with --resume continues from the last checkpoint, if there is one"}
+HINTS = {
+    "close-loop": "; the same command with --resume continues from the last checkpoint, if there is one",
+    "watch": "; the same command goes on from the last window",
+}
 
 
 class Interrupts:

@@ -30,6 +30,7 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.form import LEARNT, Form, begun_again, consistent, leading, widened
 from scenarios.estimating.setup import Setup, finely
+from scenarios.experiment.declaration import Options
 
 Tell = Callable[[str], None]
 MOVED = 0.1  # of its first deviation must an unknown move to be elsewhere than it was believed
@@ -93,13 +94,7 @@ def last_values(found: Findings, names: Sequence[str]) -> dict[str, float]:
 
 def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
     """The run of a filter, with all that belongs to it."""
-    share = None
-    if set(s.options.process_std) < {state.name for state in s.states}:
-        tell("finding how much of the states' motion is noise")
-        share = _noise_share(s, archive)
-    if s.form:
-        tell("learning where the parameters of the model's form begin")
-        s = _begun_again(s, archive, share or 0.0)
+    s, share = prepared(s, archive, tell)
     joint = s.joint(archive, share or 0.0)
     try:
         tell("weighing what the data can tell")
@@ -119,6 +114,18 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
     return Findings(s, joint, history, value, std, known, learnt, share)
 
 
+def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
+    """The setup with what its record says before the filter begins, and the share of motion that is noise."""
+    share = None
+    if set(s.options.process_std) < {state.name for state in s.states}:
+        tell("finding how much of the states' motion is noise")
+        share = _noise_share(s, archive)
+    if s.form:
+        tell("learning where the parameters of the model's form begin")
+        s = _begun_again(s, archive, share or 0.0)
+    return s, share
+
+
 def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
     """With start values from a first run over the beginning of the record, if the filter gets through it."""
     first = s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + LEARNT)))
@@ -134,14 +141,17 @@ def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
 
 def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
     """The filter that the options ask for."""
-    o, dt = s.options, s.samples.step
+    asked = request(s.options, s.noise, s.samples.step, s.samples.u[0])
+    return filters()[s.options.filter].of(joint, start, asked)
+
+
+def request(o: Options, noise: Array, dt: float, u: Array) -> Request:
+    """What the options ask of a filter; noise: (m,) standard deviations; u: (n_u,) first inputs."""
     gate = None if o.gate is None else Gate(o.gate)
     adapt = (
         Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None
     )
-    spread = Spread(o.alpha, o.beta, o.kappa)
-    asked = Request(np.diag(s.noise**2), dt, s.samples.u[0], gate, adapt, spread)
-    return filters()[o.filter].of(joint, start, asked)
+    return Request(np.diag(noise**2), dt, u, gate, adapt, Spread(o.alpha, o.beta, o.kappa))
 
 
 def _noise_share(s: Setup, archive: Archive) -> float:

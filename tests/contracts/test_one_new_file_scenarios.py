@@ -98,6 +98,41 @@ because = "the source has this amplitude"
 that = "abs(min(spoilt.vehicle.u_fl - plain.vehicle.u_fl) + 6e-3) < 1e-5"
 because = "the defect has this depth"
 """
+MOVING = '''
+"""Windows in which something moves."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from scenarios.experiment.declaration import Positive
+from scenarios.watching.triggers.trigger import Trigger
+
+
+class Moving(Trigger):
+    """A column changes by `more` at least."""
+
+    kind: ClassVar[str] = "moving"
+    column: str
+    more: Positive
+
+    @property
+    def columns(self):
+        """See Trigger."""
+        return (self.column,)
+
+    def holds(self, window):
+        """See Trigger."""
+        return bool(np.ptp(window[self.column]) >= self.more)
+'''
+WATCH = """
+experiment = "experiment.toml"
+stream.folder = "."
+[[trigger]]
+kind = "moving"
+column = "v"
+more = 2.0
+"""
 TSV = '''
 """Tables with tabs."""
 
@@ -152,6 +187,20 @@ def test_a_track_source_and_a_track_defect_are_one_file_each(mine):
 def test_a_track_defect_gets_the_contract_tests_for_free(mine):
     mine.write("scenarios/track/defects/squat.py", SQUAT)
     assert mine.passes("tests/scenarios/test_track.py", "-k", "squat or by_hand") == 10
+
+
+def test_a_trigger_of_a_stream_is_one_file(mine):
+    mine.write("scenarios/watching/triggers/moving.py", MOVING)
+    (mine.work / "watch.toml").write_text(WATCH)
+    read = """
+import numpy as np
+from scenarios.watching.declaration import load_watching
+[trigger] = load_watching("watch.toml").trigger
+print(trigger.holds({"v": np.array([1.0, 3.5])}), trigger.holds({"v": np.ones(2)}), trigger.sentence)
+"""
+    assert mine.says(read) == "True False outside the trigger moving of v"
+    (mine.work / "watch.toml").write_text(WATCH.replace("more", "moore"))
+    assert "did you mean 'more'" in mine.refused("watch", "watch.toml", "--out", "out")
 
 
 def write(mine: Further, data: pd.DataFrame) -> None:

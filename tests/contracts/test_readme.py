@@ -43,7 +43,9 @@ def test_the_readme_has_commands():
 def test_the_quick_commands_run_as_printed(clone, monkeypatch, capsys):
     monkeypatch.chdir(clone)
     quick = [c for c in COMMANDS if not {*c} & {*LONG}]
-    assert {c[0] for c in quick} == {"build", "check", "inspect", "estimate", "row", "conicity", "report"}
+    assert {c[0] for c in quick} == {
+        "build", "check", "inspect", "estimate", "watch", "row", "conicity", "report",
+    }  # fmt: skip
     for command in quick:
         assert run_safely(expanded(command)) == 0, (command, capsys.readouterr())
 

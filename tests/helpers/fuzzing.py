@@ -29,7 +29,9 @@ from scenarios.experiment.readers import read_sheet
 from scenarios.reporting.entries import entry
 from scenarios.simulating.expression import statement
 from scenarios.simulating.reading import load_scenario
+from scenarios.watching.declaration import load_watching
 from tests.helpers.misbehaving import DESCRIPTION, EXPERIMENT, SCENARIO
+from tests.helpers.paths import SHIPPED
 
 WORDS = (
     b"", b"0", b"-1", b"nan", b"inf", b"1e999", b"9" * 400, b"0x1p", b"2024-01-01", b"true", b"Real",
@@ -79,6 +81,7 @@ def targets() -> Mapping[str, Target]:
     found = [
         Target("experiment.toml", EXPERIMENT.encode(), load_experiment),
         Target("scenario.toml", SCENARIO.encode(), load_scenario),
+        Target("watch.toml", (SHIPPED / "watch" / "watch.toml").read_bytes(), load_watching),
         Target("modelDescription.xml", DESCRIPTION.replace("{fault}", "none").encode(), _described),
         Target("bad.fmu", _fmu(DESCRIPTION.replace("{fault}", "none").encode()), describe),
         Target("SystemStructure.ssd", STRUCTURE, _packaged),

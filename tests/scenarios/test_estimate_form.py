@@ -90,7 +90,7 @@ def run_of(level, log_likelihood, nis=2.0, broken=""):
     spread = np.random.default_rng(0).chisquare(2, n) * nis / 2
     return History(
         ("mu0", "v"), np.arange(n) / 1e3, x, np.full((n, 2), 0.01), np.zeros((n, 2)), spread,
-        np.full(n, 2), np.zeros((n, 2), bool), log_likelihood, None, broken,
+        np.full(n, 2), np.zeros((n, 2), bool), np.full(n, log_likelihood / n), None, broken,
     )  # fmt: skip
 
 

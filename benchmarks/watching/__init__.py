@@ -1,0 +1,1 @@
+"""Streams: how often the test alarms without a cause, and how fast and with what memory windows are taken."""

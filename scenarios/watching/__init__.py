@@ -1,0 +1,1 @@
+"""A stream of windows through one filter: the command `watch`."""

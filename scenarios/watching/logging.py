@@ -1,0 +1,51 @@
+"""The log of a stream: one line a window, in a file that a restart continues where its checkpoint was."""
+
+import csv
+import io
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+FILE, OLD = "windows.csv", "windows.1.csv"
+LONGEST = 50_000_000  # bytes, from which on a new file is begun; the one before is kept
+COLUMNS = ("window", "begin", "end", "rows", "state", "nis", "statistic", "height", "milliseconds", "notes")
+NUMBER = ".9g"  # form of the numbers, but of the estimates, which are written to the bit
+
+
+class Log:
+    """Lines are added as text. The first line names the columns: COLUMNS, then the estimates by name."""
+
+    def __init__(self, folder: Path, estimates: Sequence[str], size: int | None) -> None:
+        """size: bytes that a checkpoint says are there; lines behind it were written before a kill."""
+        self._folder, self._estimates = folder, tuple(estimates)
+        file = folder / FILE
+        if size is None:
+            (folder / OLD).unlink(missing_ok=True)
+            file.unlink(missing_ok=True)
+        elif file.exists() and file.stat().st_size > size:
+            os.truncate(file, size)
+        if not file.exists():
+            self._write([*COLUMNS, *self._estimates])
+
+    @property
+    def size(self) -> int:
+        """Bytes of the present file."""
+        return (self._folder / FILE).stat().st_size
+
+    def line(self, cells: Mapping[str, object], estimates: Mapping[str, float]) -> None:
+        """Add a line; what is not given stays empty."""
+        if self.size > LONGEST:
+            (self._folder / FILE).replace(self._folder / OLD)
+            self._write([*COLUMNS, *self._estimates])
+        first = [_cell(cells.get(c, "")) for c in COLUMNS]
+        self._write(first + [repr(estimates[n]) if n in estimates else "" for n in self._estimates])
+
+    def _write(self, cells: list[str]) -> None:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerow(cells)
+        with (self._folder / FILE).open("ab") as stream:
+            stream.write(text.getvalue().encode("utf-8"))
+
+
+def _cell(value: object) -> str:
+    return format(value, NUMBER) if isinstance(value, float) else str(value)
