@@ -21,6 +21,7 @@ from fmus.host.archive import describe
 from fmus.host.description import FmuDescription
 from fmus.host.master.recording import TIME
 from fmus.units import conversion
+from scenarios.exchange.loops import late_links
 from scenarios.exchange.settings import PLACE
 from scenarios.exchange.toml_text import toml_text
 from scenarios.output import writable, written_at_once
@@ -78,7 +79,10 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
     }
     table["fmus"] = {names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, tell) for c in members}
     links = [link for link in system.links if link.source[0] not in sources]
-    table["connections"] = [_wire(link, fmus, names, ours.get("delayed", [])) for link in links]
+    late = [_place(link, names) for link in late_links(links, fmus)] if not ours else []
+    for place in late:
+        tell(f"connection to {place} is one step late, as FMUs in its loop state no dependencies")
+    table["connections"] = [_wire(link, fmus, names, ours.get("delayed", late)) for link in links]
     for link in system.links:
         if link.source[0] in sources:
             data = {"data": sources[link.source[0]], "time": TIME, "column": link.source[1]}
@@ -157,10 +161,15 @@ def _member(
     return {key: value for key, value in member.items() if value not in ({}, None)}
 
 
+def _place(link: Link, names: Mapping[str, str]) -> str:
+    """The input to which a connection leads."""
+    return f"{names[link.target[0]]}.{link.target[1]}"
+
+
 def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: list[str]) -> dict[str, Any]:
     """A connection as a scenario declares it, in which units are converted before gain and offset."""
-    (source, output), (target, inlet) = link.source, link.target
-    to = f"{names[target]}.{inlet}"
+    source, output = link.source
+    to = _place(link, names)
     wire: dict[str, Any] = {"from": f"{names[source]}.{output}", "to": to}
     units = [
         fmus[name].variables[v].unit if v in fmus[name].variables else None

@@ -6,6 +6,7 @@ there, as 3.8 can; and one of matrices (MX) otherwise, which computes the same i
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from itertools import accumulate, pairwise
 from math import inf, nan
@@ -16,6 +17,12 @@ import casadi as cs
 
 SCALARS: Any = cs.SX
 MATRICES: Any = cs.MX
+
+
+KEPT: list[
+    Any
+] = []  # has a reference of its own that nobody gives back, so that nothing in it is ever destroyed
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(KEPT))
 
 
 class NoCalls(Exception):
@@ -59,11 +66,21 @@ class Entry:
     """A function of several arguments and results that is called from outside."""
 
     def __init__(self, function: cs.Function, given: list[int], found: list[int]) -> None:
-        self.function, self.given, self.found = function, given, found
+        self.function, self.given, self.found = kept(function), given, found
 
     def on_memory(self, arguments: Sequence[Any], results: Sequence[Any]) -> Callable[[], None]:
         """See Equations.on_memory."""
         return on_memory(self.function, arguments, results)
+
+
+def kept(function: cs.Function) -> cs.Function:
+    """The function, which is never destroyed.
+
+    A host that is not Python ends the interpreter when it exits, after CasADi's library has already taken
+    down what its functions refer to; a function that is destroyed then ends the process with an error.
+    """
+    KEPT.append(function)
+    return function
 
 
 def on_memory(function: cs.Function, arguments: Sequence[Any], results: Sequence[Any]) -> Callable[[], None]:
@@ -83,10 +100,9 @@ class Helper:
     """A function that others call, with a vector of scalars and a list of scalars as its result."""
 
     def __init__(self, function: cs.Function) -> None:
-        self.function = function
-        self.graph = (
-            function if function.is_a("MXFunction") else function.wrap()
-        )  # scalars call no other kind
+        self.function = kept(function)
+        # scalars call no other kind
+        self.graph = function if function.is_a("MXFunction") else kept(function.wrap())
 
     def __call__(self, x: Sequence[Any]) -> list[Any]:
         kind = MATRICES if any(isinstance(v, MATRICES) for v in x) else SCALARS

@@ -1,0 +1,1 @@
+"""Importers of FMUs that others wrote, one file each."""

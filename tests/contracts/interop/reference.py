@@ -1,0 +1,192 @@
+"""The Reference-FMUs through check, run and compare: `python -m tests.contracts.interop.reference FOLDER`.
+
+FOLDER holds the FMUs as `2/NAME.fmu` and `3/NAME.fmu`, and their authors' results of the default experiment
+as `NAME_out.csv`. The outcome is kept in reference.json and shown in docs/compatibility.md.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from fmpy import read_model_description
+from fmpy.model_description import ScalarVariable
+
+from fmus.host.master.recording import read_recording
+from tests.contracts.interop.record import PAGE, shown
+from tests.helpers.paths import ROOT
+
+RESULTS = Path(__file__).with_name("reference.json")
+BEGIN, END = "<!-- reference: begin -->\n", "<!-- reference: end -->\n"
+STEP = 0.1  # s, where the default experiment names none
+ROWS = 401  # of the record that compare is given; an experiment has at least 50 in each part
+LIMIT = 200  # s, for one command
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the three commands made of one FMU."""
+
+    name: str
+    fmi: int
+    check: str  # titles of the checks that failed; empty where all passed
+    run: float | None  # largest difference from the authors' results, of an output's largest value
+    said: str  # why it did not run
+    compare: str  # how the command ended with the other version of FMI
+
+
+def outcome(folder: Path, fmi: int, name: str) -> Outcome:
+    """The three commands with one FMU."""
+    fmu = folder / str(fmi) / f"{name}.fmu"
+    results = folder / f"{name}_out.csv"
+    with tempfile.TemporaryDirectory() as work:
+        run, said = _run(fmu, results, Path(work))
+        compare = _compare(folder, name, results, Path(work))
+    return Outcome(name, fmi, _check(fmu), run, said, compare)
+
+
+def _command(*arguments: str | Path) -> tuple[int, dict[str, object], str]:
+    """Exit code, the answer, and the last line of what was said."""
+    call = [sys.executable, "-m", "scenarios.cli", *map(str, arguments), "--json"]
+    done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    said = (done.stderr + done.stdout).strip().splitlines()
+    answer = json.loads(done.stdout) if done.stdout.lstrip().startswith("{") else {}
+    reasons = [line for line in done.stderr.splitlines() if line.startswith("railfmi:")]
+    return done.returncode, answer, (reasons or said or [""])[-1]
+
+
+def _check(fmu: Path) -> str:
+    code, answer, said = _command("check", fmu)
+    if code == 2:
+        return said
+    checks = answer["result"]["checks"]  # type: ignore[index]
+    return ", ".join(c["title"] for c in checks if c["passed"] is False)
+
+
+def _outputs(fmu: Path) -> dict[str, str | None]:
+    """Real outputs that are no arrays, those that can be recorded, with their units."""
+    about = read_model_description(fmu, validate=False)
+    outputs = [v for v in about.modelVariables if v.causality == "output" and not v.dimensions]
+    return {v.name: _unit(v) for v in outputs if v.type in ("Real", "Float64")}
+
+
+def _unit(variable: ScalarVariable) -> str | None:
+    return variable.unit or (variable.declaredType.unit if variable.declaredType else None)
+
+
+def _times(fmu: Path, wanted: pd.DataFrame) -> tuple[float, float]:
+    """Step and end of the default experiment, s."""
+    about = read_model_description(fmu, validate=False).defaultExperiment
+    step = float(about.stepSize) if about and about.stepSize else STEP
+    return step, float(wanted["time"].iloc[-1])
+
+
+def _run(fmu: Path, results: Path, work: Path) -> tuple[float | None, str]:
+    wanted = pd.read_csv(results)
+    step, stop = _times(fmu, wanted)
+    names = [n for n in _outputs(fmu) if n in wanted]
+    recorded = ", ".join(f'"it.{n}"' for n in names)
+    lines = [
+        'id = "it"',
+        'question = "Does it give what its authors say?"',
+        f"duration = {stop!r}",
+        f"step = {step!r}",
+        "[fmus.it]",
+        f'fmu = "{fmu}"',
+        "[record]",
+        *([f"names = [{recorded}]"] if names else []),
+        'format = "csv"',
+        "[[expect]]",
+        f'that = "max(abs(it.{names[0]})) < 1e300"' if names else 'that = "1 > 0"',
+        'because = "it runs"',
+    ]
+    (work / "it.toml").write_text("\n".join(lines) + "\n")
+    code, _, said = _command("run", work / "it.toml", "--out", work / "out")
+    if code:
+        return None, said.replace(f"railfmi: {work}/it.toml: ", "").split("; what was recorded")[0]
+    if not names:
+        return None, "runs; " + ("no results of its authors" if _outputs(fmu) else "no scalar real output")
+    [file] = (work / "out").rglob("*.csv")
+    found = read_recording(file).data
+    worst = 0.0
+    for name in names:
+        column = found[f"it.{name}"].to_numpy()
+        times = found["time"].to_numpy()
+        there = [abs(times - t).argmin() for t in wanted["time"]]
+        size = max(abs(wanted[name]).max(), 1e-9)
+        worst = max(worst, float(abs(column[there] - wanted[name]).max() / size))
+    return worst, ""
+
+
+def _compare(folder: Path, name: str, results: Path, work: Path) -> str:
+    """How compare ends with the FMUs of both versions."""
+    both = [folder / str(fmi) / f"{name}.fmu" for fmi in (2, 3)]
+    if not all(f.exists() for f in both):
+        return "one version only"
+    wanted = pd.read_csv(results)
+    units = [_outputs(fmu) for fmu in both]
+    names = [n for n in units[0] if n in units[1] and n in wanted]
+    if not names:
+        return "no real output"
+    stop = float(wanted["time"].iloc[-1])
+    times = np.linspace(0.0, stop, ROWS)
+    rows = {n: np.interp(times, wanted["time"], wanted[n]) for n in names}
+    pd.DataFrame({"time": times, **rows}).to_csv(work / "rows.csv", index=False)
+    lines = [
+        'id = "it"',
+        f'fmu = "{both[0]}"',
+        'data = "rows.csv"',
+        'time = "time"',
+        "[split]",
+        f"identify = [0.0, {stop / 2!r}]",
+        f"test = [{stop / 2!r}, {stop!r}]",
+        *(f'[outputs.{n}]\ncolumn = "{n}"\n{_stated(units[0][n])}' for n in names),
+    ]
+    (work / "experiment.toml").write_text("\n".join(lines) + "\n")
+    code, _, said = _command("compare", *both, work / "experiment.toml", "--out", work / "compared")
+    return {0: "agree", 1: "differ"}.get(code, said.replace(f"railfmi: {work}/experiment.toml: ", ""))
+
+
+def _stated(unit: str | None) -> str:
+    """The unit of a column in the experiment: that of the FMU, or none in both."""
+    return f'unit = "{unit}"' if unit else 'unit = "1"\nmodel_unit = "1"'
+
+
+def stored(file: Path = RESULTS) -> list[Outcome]:
+    """The outcomes that were recorded."""
+    return [Outcome(**row) for row in json.loads(file.read_text())]
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """The rows of the page."""
+    lines = [
+        "| FMU | FMI | `check` | `run`: difference from its authors' results | `compare` of both versions |",
+        "|---|---|---|---|---|",
+    ]
+    for o in outcomes:
+        run = o.said if o.run is None else shown(o.run)
+        check = f"failed: {o.check}" if o.check else "passed"
+        lines.append(f"| {o.name} | {o.fmi}.0 | {check} | {run} | {o.compare} |")
+    return "\n".join(lines) + "\n"
+
+
+def main(folder: Path) -> None:
+    """Record all FMUs of a folder, and put the table into the page."""
+    found = []
+    for fmi in (2, 3):
+        for fmu in sorted((folder / str(fmi)).glob("*.fmu")):
+            if (folder / f"{fmu.stem}_out.csv").exists():
+                found.append(outcome(folder, fmi, fmu.stem))
+                print(found[-1], flush=True)
+    RESULTS.write_text("[\n" + ",\n".join(json.dumps(asdict(o)) for o in found) + "\n]\n")
+    before, rest = PAGE.read_text().split(BEGIN)
+    PAGE.write_text(before + BEGIN + "\n" + table(found) + "\n" + END + rest.split(END)[1])
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]).resolve())
