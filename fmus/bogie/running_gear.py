@@ -61,7 +61,7 @@ class RunningGear(Model):
     s = Parameter("m", 0.75, min=0.05, doc="half the distance of the tape circles", source=BENCHMARK)
     c_p = Parameter("m", 1.0, min=0.0, doc="primary suspension from the centre line", source=BENCHMARK)
     c_s = Parameter("m", 1.0, min=0.0, doc="secondary suspension from the centre line", source=BENCHMARK)
-    c_d = Parameter("m", 1.4, min=0.0, doc="yaw dampers from the centre line", source=ASSUMED)
+    c_d = Parameter("m", 1.4, min=0.0, doc="yaw dampers from the centre line", source=ASSUMED, fixed=True)
     h_p = Parameter("m", 0.14, doc="frame's centre of mass above the primary suspension", source=BENCHMARK)
     h_s = Parameter(
         "m", 0.2275, doc="secondary suspension above the frame's centre of mass", source=BENCHMARK
@@ -94,7 +94,7 @@ class RunningGear(Model):
     k_b = Parameter("1", 1.0, min=0.1, max=10.0, doc="contacts' semi-axes b over the table's", source=FORM)
     k_spin = Parameter("1", 1.0, min=0.0, max=10.0, doc="spin coefficients over Kalker's", source=FORM)
     wear = Parameter(
-        "1", 0.0, min=0.0, max=1.5, source=CHOICE,
+        "1", 0.0, min=0.0, max=1.5, nominal=1.0, source=CHOICE,
         doc="how far the wheels are worn: 0 as the profile, 1 as the worn profile",
     )  # fmt: skip
     creep_law = Parameter(
