@@ -13,6 +13,11 @@ from fmus.bogie.running_gear import GRAVITY, RunningGear
 from fmus.variables import Expr
 
 
+def sideways(V: Expr, kappa: Expr, cant: Expr) -> Expr:
+    """Lateral acceleration in the plane of a track, m/s2, less that of gravity."""
+    return V**2 * kappa * cs.cos(cant) - GRAVITY * cs.sin(cant)
+
+
 @dataclass(frozen=True)
 class Chord:
     """What two wheelsets of a model, named by their numbers, feel of the track."""
@@ -31,8 +36,7 @@ class Chord:
 
     def aside_at(self, i: str) -> Expr:
         """Lateral acceleration of the track under a wheelset less that of gravity, m/s2."""
-        cant = self.felt(i, "cant")
-        return self.m.V**2 * self.felt(i, "kappa") * cs.cos(cant) - GRAVITY * cs.sin(cant)
+        return sideways(self.m.V, self.felt(i, "kappa"), self.felt(i, "cant"))
 
     @property
     def aside(self) -> Expr:

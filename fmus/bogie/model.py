@@ -10,7 +10,7 @@ from functools import cached_property
 import casadi as cs
 
 from fmus.bogie.chord import Chord
-from fmus.bogie.declared import BODY, body_variables, wheelset_variables
+from fmus.bogie.declared import BODY, PORT, body_variables, wheelset_variables
 from fmus.bogie.mechanics import Body
 from fmus.bogie.mechanics import Bogie as Mechanics
 from fmus.bogie.running_gear import RunningGear
@@ -19,11 +19,6 @@ from fmus.port import Port
 from fmus.variables import Expr, Input, OnTrack, Output
 
 WHEELSETS, FRAME = ("1", "2"), "b"
-ON_BODY = {
-    "y": ("F_y_c", "N", "lateral force"),
-    "psi": ("M_z_c", "N.m", "yaw moment"),
-    "phi": ("M_x_c", "N.m", "roll moment"),
-}
 
 
 class Bogie(RunningGear):
@@ -47,8 +42,10 @@ class Bogie(RunningGear):
     )
     vars().update(
         {
-            name: Output(unit, doc=f"{what} on the body at the height of its centre of mass", nominal=1e3)
-            for name, unit, what in ON_BODY.values()
+            f"{name}_c": Output(
+                unit, doc=f"{what} on the body at the height of its centre of mass", nominal=1e3
+            )
+            for name, unit, what in PORT.values()
         }
     )
     flange_contact = Output("1", doc="1 where a flange touches: beyond it the model is not valid")
@@ -61,7 +58,7 @@ class Bogie(RunningGear):
         """See Model.outputs."""
         from fmus.contact.geometry.search import FLANGE_ANGLE  # loads SciPy, which other models do without
 
-        found = m._bogie.outputs() | {ON_BODY[q][0]: force for q, force in m._bogie.on_body.items()}
+        found = m._bogie.outputs() | {f"{PORT[q][0]}_c": force for q, force in m._bogie.on_body.items()}
         steepest = cs.mmax(cs.vertcat(*(c.delta for c in m._bogie.contacts)))
         return found | {"flange_contact": steepest > FLANGE_ANGLE}
 

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from functools import cached_property
 
-import casadi as cs
-
-from fmus.bogie.declared import BODY
-from fmus.bogie.running_gear import BENCHMARK, GRAVITY
+from fmus.bogie.chord import sideways
+from fmus.bogie.declared import BODY, PORT
+from fmus.bogie.running_gear import BENCHMARK
 from fmus.carbody.declared import car_body
 from fmus.carbody.equations import ENDS, UnderBody, body_ports, body_rates, over_bogie
 from fmus.model import Model
@@ -18,11 +17,6 @@ from fmus.port import Port
 from fmus.variables import Expr, Input, OnTrack, Output, Parameter
 
 NAMES = {"f": "front", "r": "rear"}
-FORCES = {
-    "y": ("F_y", "N", "lateral force"),
-    "psi": ("M_z", "N.m", "yaw moment"),
-    "phi": ("M_x", "N.m", "roll moment"),
-}
 TRACK = {
     "kappa": ("1/m", "curvature, positive to the left,", 1e-3),
     "kappa_dot": ("1/(m.s)", "rate of the curvature", 1e-3),
@@ -51,7 +45,7 @@ class Carbody(Model):
         {
             f"{name}_{end}": Input(unit, doc=f"{what} on the body by the {at} bogie", nominal=1e3)
             for end, at in NAMES.items()
-            for name, unit, what in FORCES.values()
+            for name, unit, what in PORT.values()
         }
     )
     vars().update(
@@ -72,7 +66,7 @@ class Carbody(Model):
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
-        forces = {end: {q: m.symbols[f"{FORCES[q][0]}_{end}"] for q in BODY} for end in ENDS}
+        forces = {end: {q: m.symbols[f"{PORT[q][0]}_{end}"] for q in BODY} for end in ENDS}
         return body_rates(m.symbols, m._track, forces)
 
     def outputs(m) -> dict[str, Expr]:
@@ -90,10 +84,6 @@ class Carbody(Model):
 
     @cached_property
     def _track(m) -> UnderBody:
-        aside = {
-            end: m.V**2 * m.symbols[f"kappa_{end}"] * cs.cos(m.symbols[f"cant_{end}"])
-            - GRAVITY * cs.sin(m.symbols[f"cant_{end}"])
-            for end in ENDS
-        }
+        aside = {end: sideways(m.V, m.symbols[f"kappa_{end}"], m.symbols[f"cant_{end}"]) for end in ENDS}
         felt = {name: {end: m.symbols[at_bogie(name, end)] for end in ENDS} for name in TRACK}
         return UnderBody(aside, **felt)
