@@ -10,13 +10,15 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.helpers.paths import SHARED
-from tests.truth import contact as other_contact
 from tests.truth import (
+    bogie,
+    bogie_linear,
     wheelset_contact,
     wheelset_effects,
     wheelset_motion,
     wheelset_track,
 )
+from tests.truth import contact as other_contact
 from tests.truth.wheelset import (
     NOISE,
     main,
@@ -59,7 +61,7 @@ def shows(a, b):
 
 
 def test_it_knows_nothing_of_the_product():
-    for module in (wheelset_contact, wheelset_effects, wheelset_motion, wheelset_track):
+    for module in (bogie, bogie_linear, wheelset_contact, wheelset_effects, wheelset_motion, wheelset_track):
         tree = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8"))
         nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Import | ast.ImportFrom)]
         names = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}

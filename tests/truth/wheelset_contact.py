@@ -24,6 +24,7 @@ ROOT += [-4.687195829e-5, -2.25275554e-7]
 # 60E1, EN 13674-1: arcs of the head, (up to |y|, radius, centre across, centre below the crown), mm
 HEAD = [(10.228, 300.0, 0.0, 300.0), (26.0265, 80.0, 7.500533333, 80.127896268)]
 HEAD += [(35.9998, 13.0, 23.016030417, 14.949147045)]
+WORN_AT, WORN_REACH = 5.0, 26.0  # mm, middle and half width of a hollow tread
 
 ETA = np.arange(-41.0, 45.0, 0.02)  # mm, places on the wheel
 SHIFTS = np.arange(-7.0, 7.001, 0.05)  # mm
@@ -61,8 +62,8 @@ class Contacts:
     b: Array
 
 
-def wheel(eta: Array) -> tuple[Array, Array, Array]:
-    """Growth of the radius, mm, its slope, and its second derivative, 1/mm, at eta, mm."""
+def wheel(eta: Array, hollow: float = 0.0) -> tuple[Array, Array, Array]:
+    """Growth of the radius, mm, its slope and second derivative, 1/mm, at eta, mm; hollow: mm of wear."""
     found = []
     for order in range(3):
         tread, root = (np.polyder(np.poly1d(c[::-1]), order) for c in (TREAD, ROOT))
@@ -73,6 +74,10 @@ def wheel(eta: Array) -> tuple[Array, Array, Array]:
         slope = (1.36432364 - 0.066666667 * eta, np.full_like(eta, -0.066666667), 0 * eta)[order]
         places = [eta < -38.426669071, eta < -35.0, eta < -26.0, eta < 32.15796]
         found.append(np.select(places, [flank, arc, root(eta), tread(eta)], slope))
+    if hollow:
+        u, inside = (eta - WORN_AT) / WORN_REACH, np.abs(eta - WORN_AT) < WORN_REACH
+        depths = ((1 - u**2) ** 2, -4 * u * (1 - u**2) / WORN_REACH, (12 * u**2 - 4) / WORN_REACH**2)
+        found = [f - np.where(inside, hollow * d, 0.0) for f, d in zip(found, depths, strict=True)]
     return found[0], found[1], found[2]
 
 
@@ -96,9 +101,9 @@ def rail(across: Array) -> tuple[Array, Array]:
     return np.interp(across, y, z, np.nan, np.nan), np.interp(across, y, bend[seen], np.nan, np.nan)
 
 
-def gaps(y: Array, phi: Array) -> tuple[Array, Array]:
+def gaps(y: Array, phi: Array, hollow: float = 0.0) -> tuple[Array, Array]:
     """Distances (n, m), mm, of the left wheel's places to the rail, and the rail's curvature below them."""
-    growth, _, _ = wheel(ETA)
+    growth, _, _ = wheel(ETA, hollow)
     out, down = TAPE + ETA, R0 + growth
     across = y[:, None] + out * np.cos(phi)[:, None] + down * np.sin(phi)[:, None]
     height, bend = rail(across)
@@ -115,12 +120,12 @@ def least(gap: Array) -> Array:
     return found
 
 
-def rolls(y: Array) -> Array:
+def rolls(y: Array, hollow: float = 0.0) -> Array:
     """Roll (n,), rad, at which both wheels are equally near to their rails, by the secant rule."""
     phi, before, slope = np.zeros_like(y), np.zeros_like(y), np.full_like(y, 2 * TAPE)
     step = np.zeros_like(y)
     for turn in range(12):
-        apart = least(gaps(y, phi)[0]) - least(gaps(-y, -phi)[0])
+        apart = least(gaps(y, phi, hollow)[0]) - least(gaps(-y, -phi, hollow)[0])
         if turn:
             moved = np.abs(step) > 1e-12
             fresh = np.divide(apart - before, step, out=slope.copy(), where=moved)
@@ -169,20 +174,20 @@ def ellipse(A: Array, B: Array, load: float) -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=8)
-def contacts(smoothed: float = LAMBDA, penetration: bool = False) -> Contacts:
+def contacts(smoothed: float = LAMBDA, penetration: bool = False, hollow: float = 0.0) -> Contacts:
     """Contacts at SHIFTS. smoothed: mm, weight of the curvatures' mean, LAMBDA as for the place.
 
-    penetration: semi-axes by virtual penetration instead of Hertz's.
+    penetration: semi-axes by virtual penetration instead of Hertz's; hollow: mm, depth of a worn tread.
     """
-    phi = rolls(SHIFTS)
-    gap, bend = gaps(SHIFTS, phi)
-    _, slope, second = wheel(ETA)
+    phi = rolls(SHIFTS, hollow)
+    gap, bend = gaps(SHIFTS, phi, hollow)
+    _, slope, second = wheel(ETA, hollow)
     gap = gap - least(gap)[:, None]
     near, wide = (np.exp(-np.minimum(gap / s, 700.0)) for s in (LAMBDA, smoothed))
     eta = (near @ ETA) / near.sum(axis=1)
     own = second / (1 + slope**2) ** 1.5
     B = 1e3 * (wide * (bend - own)).sum(axis=1) / wide.sum(axis=1) / 2
-    grown, steep, _ = wheel(eta)
+    grown, steep, _ = wheel(eta, hollow)
     delta = np.arctan(-steep)
     A = 1e3 * np.cos(delta) / (2 * (R0 + grown))
     a, b = (penetrated if penetration else hertz)(A, np.maximum(B, FLATTEST))

@@ -1,0 +1,1 @@
+"""Car body on two bogies, lateral, yaw and roll; equations in README.md."""

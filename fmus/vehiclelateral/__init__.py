@@ -1,0 +1,1 @@
+"""Lateral vehicle: two bogies and a car body in curves; equations in README.md."""
