@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -274,7 +276,11 @@ def test_a_campaign_from_its_file_to_its_page(tmp_path):
 
 @pytest.mark.slow
 def test_a_name_that_no_fmu_has_fails_every_point_and_is_told(tmp_path):
+    """As a command, since the workers' event loop outlives a test."""
     file = written(tmp_path, ("parameters.k1", "parameters.stiffness"))
-    with pytest.raises(BadInput, match=r"every point failed, the first one so: .*stiffness"):
-        campaign(file, tmp_path / "out", workers=1)
+    run = [sys.executable, "-m", "railfmi", "campaign", str(file), "--out", str(tmp_path / "out")]
+    found = subprocess.run([*run, "--workers", "1", "-q"], cwd=ROOT, capture_output=True, text=True)
+    assert found.returncode == 2
+    assert "every point failed, the first one so: " in found.stderr
+    assert "stiffness" in found.stderr
     assert not (tmp_path / "out" / "result.json").exists()

@@ -24,7 +24,7 @@ pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
 
 import psutil
 
-from scenarios.fleet.fleet import Assembled, assembled, fleet, rejected, write_tables
+from scenarios.fleet.fleet import Assembled, assembled, rejected, write_tables
 from scenarios.fleet.page import write_page
 from scenarios.fleet.planning import Plan, plan_of
 from scenarios.fleet.pooling import pooled
@@ -336,16 +336,21 @@ def test_what_a_worker_does_with_a_record_that_shows_an_effect(tmp_path):
 
 @pytest.mark.slow
 def test_the_shipped_fleet_from_its_file_to_its_page(tmp_path):
-    first = fleet(SHIPPED / "fleet.toml", tmp_path / "one", workers=1)
-    again = fleet(SHIPPED / "fleet.toml", tmp_path / "two", workers=2)
-    for name in ("results", "drifts.parquet", "levels.parquet", "effects.parquet"):
-        here = [tmp_path / "one" / name, *(tmp_path / "one" / name).rglob("*.parquet")]
-        for file in (f for f in here if f.is_file()):
-            assert file.read_bytes() == (tmp_path / "two" / file.relative_to(tmp_path / "one")).read_bytes()
-    assert first.tasks == again.tasks
-    assert [d["vehicle"] for d in first.drifts] == ["rig-004"]
-    assert [f["record"] for f in first.failed] == ["rig-001-bench-a-02"]
-    assert json.loads((tmp_path / "one" / "result.json").read_text())["fleet"] == "rigs"
+    """As commands, since the workers' event loop outlives a test."""
+    found = []
+    for n in (1, 2):
+        out = tmp_path / f"{n}"
+        run = [sys.executable, "-m", "railfmi", "fleet", str(SHIPPED / "fleet.toml"), "--out", str(out), "-q"]
+        subprocess.run([*run, "--workers", f"{n}"], cwd=ROOT, check=True, capture_output=True)
+        found.append(json.loads((out / "result.json").read_text()))
+    files = [f.relative_to(tmp_path / "1") for f in (tmp_path / "1").rglob("*.parquet")]
+    assert len(files) == 4
+    for file in files:
+        assert (tmp_path / "1" / file).read_bytes() == (tmp_path / "2" / file).read_bytes()
+    first, again = found
+    assert first["tasks"] == again["tasks"]
+    assert [d["vehicle"] for d in first["drifts"]] == ["rig-004"]
+    assert [f["record"] for f in first["failed"]] == ["rig-001-bench-a-02"]
 
 
 @pytest.mark.slow
