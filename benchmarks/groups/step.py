@@ -11,7 +11,6 @@ from benchmarks.timing import Run, in_turns
 from fmus.contact.forces.laws import LAWS
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
-from fmus.host.rows import AT_ONCE
 from fmus.models import MODELS
 from fmus.variables import State
 from fmus.wheelset.model import Wheelset
@@ -98,21 +97,23 @@ def _rows(name: str, fmu: Fmu, loops: Loops, steps: int) -> Row:
     """Rows of values side by side through a record in one call, beside steps of one instance."""
     start, t = start_of(MODELS[name]()), DT * np.arange(steps + 1)
     states = [v.name for v in MODELS[name]().of(State)]
-    found = fmu.simulate_rows(t[:101], {}, states, [start] * AT_ONCE)
+    found = fmu.simulate_rows(t[:101], {}, states, [start] * fmu.at_once)
     loops.steps(fmu, start, DT, 100)
     agreed(
         np.array([] if found is None else found[-1, -1]), np.array(fmu.read(states)), SAME, f"{name}, rows"
     )
     times = in_turns(
         {
-            "ours": lambda: fmu.simulate_rows(t, {}, states[:1], [start] * AT_ONCE),
+            "ours": lambda: fmu.simulate_rows(t, {}, states[:1], [start] * fmu.at_once),
             "one instance": lambda: loops.steps(fmu, start, DT, steps),
         },
         9,
     )
-    how = f"{AT_ONCE} rows through {steps} steps of 1 ms in one call; doStep of one instance, called from C"
+    how = (
+        f"{fmu.at_once} rows through {steps} steps of 1 ms in one call; doStep of one instance, called from C"
+    )
     return times.row(
-        f"{name}: row and step", "ours", "one instance", "µs", how, factor=1e6 / steps / AT_ONCE,
+        f"{name}: row and step", "ours", "one instance", "µs", how, factor=1e6 / steps / fmu.at_once,
         peer_factor=1e6 / steps,
     )  # fmt: skip
 

@@ -40,6 +40,7 @@ class RunningGear(Model):
     V: Expr  # m/s, speed of travel, an input of every model
 
     step_size = 1e-3
+    tolerance = 1e-3  # of a state's nominal; creep forces turn within a step far from a usual motion
     method = "rk4_within_stability"
     form = MappingProxyType({"k_a": (0.5, 1.6), "k_b": (0.6, 2.6), "k_spin": (0.2, 1.2)})
     form_choices = MappingProxyType({"patch": (0.0, 1.0)})

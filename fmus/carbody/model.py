@@ -35,7 +35,7 @@ class Carbody(Model):
     """Car body on two bogies: lateral motion, yaw and roll in curves; the bogies are FMUs of their own."""
 
     name = "Carbody"
-    step_size = 5e-3
+    step_size = 1e-3  # s, in which effects with memory of their own are stable too
 
     V = Input("m/s", 40.0, min=0.0, doc="speed of travel", nominal=1.0, on_track=OnTrack("speed"))
     m_c = Parameter("kg", 32000.0, min=1.0, doc="mass of the car body", source=BENCHMARK)

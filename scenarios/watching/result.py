@@ -5,18 +5,24 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
 
 from scenarios.drawing.typography import with_error
 from scenarios.output import written
+from scenarios.shown import Shown, axes_or_new
 from scenarios.watching.checkpoint import Counts
 from scenarios.watching.tracing import Answer
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 RESULT = "watch.json"
 
 
-@dataclass(frozen=True)
-class WatchResult:
+@dataclass(frozen=True, repr=False)
+class WatchResult(Shown):
     """The state at the end: counts, time of the last sample [s], share of the reference that is learned,
     estimates with their standard deviations by NAME and NAME_std, the last alarms and what was found about
     the last events.
@@ -30,14 +36,35 @@ class WatchResult:
     alarms: tuple[str, ...]
     answers: tuple[Answer, ...]
 
-    def lines(self) -> Iterator[str]:
-        """The result in a few lines."""
+    def lines(self) -> list[str]:
+        """See Shown.lines."""
+        return [*self._lines()]
+
+    def to_frame(self) -> pd.DataFrame:
+        """The last estimates with their standard deviations, a row each."""
+        kept = {n: v for n, v in self.estimates.items() if f"{n}_std" in self.estimates}
+        std = [self.estimates[f"{name}_std"] for name in kept]
+        return pd.DataFrame({"value": [*kept.values()], "std": std}, index=[*kept])
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """How many windows were tested, learned from, or not used, and how many alarms there were."""
+        drawn = axes_or_new(ax)
+        counts = {"windows": self.counts.windows, **self._uses(), "alarms": self.counts.alarms}
+        drawn.barh([*counts], [*counts.values()])
+        drawn.set(xlabel="number", title=self.experiment)
+        return drawn
+
+    def _uses(self) -> dict[str, int]:
+        """What windows were used for, or why not."""
         c = self.counts
-        states = {
+        return {
             "tested": c.tested, "learned from": c.learning, "outside the triggers": c.outside,
             "late or repeated": c.past, "not usable": c.unusable,
         }  # fmt: skip
-        found = ", ".join(f"{n} {name}" for name, n in states.items() if n)
+
+    def _lines(self) -> Iterator[str]:
+        c = self.counts
+        found = ", ".join(f"{n} {name}" for name, n in self._uses().items() if n)
         yield f"{self.experiment}: {c.windows} windows" + (f" ({found})" if found else "")
         for name, value in self.estimates.items():
             if f"{name}_std" in self.estimates:

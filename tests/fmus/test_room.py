@@ -1,6 +1,7 @@
 """FMUs in a process of their own: the same numbers, every end told, and nothing that comes back can run."""
 
 import contextlib
+import copyreg
 import math
 import operator
 import pickle
@@ -241,6 +242,19 @@ def test_values_come_through_as_they_are(value):
         assert same(value, here.receive())
         here.send(value)
         assert same(value, there.receive())
+
+
+def test_exceptions_come_through_whatever_a_library_has_registered_for_them():
+    """Dask's tblib does so for every class of exception that is there when it is imported."""
+    copyreg.pickle(BadInput, lambda error: (print, error.args))
+    try:
+        with ends() as (here, there):
+            there.send(BadInput("not today"))
+            found = here.receive()
+    finally:
+        del copyreg.dispatch_table[BadInput]
+    assert isinstance(found, BadInput)
+    assert found.args == ("not today",)
 
 
 @pytest.mark.parametrize("planted", ["harmful", print, np.load], ids=["harmful", "print", "load"])

@@ -5,10 +5,10 @@ import numpy as np
 RISE = 0.02
 
 
-def begun(t, t0):
-    """0 before, 1 after, a cubic in between."""
-    s = np.clip((t - t0) / RISE + 0.5, 0, 1)
-    return 1.0 if t0 == 0 else 3 * s**2 - 2 * s**3
+def begun(t, p):
+    """0 before t0, 1 after, a cubic over T_r in between."""
+    s = np.clip((t - p["t0"]) / p.get("T_r", RISE) + 0.5, 0, 1)
+    return 1.0 if p["t0"] == 0 else 3 * s**2 - 2 * s**3
 
 
 def friction(v, v_s):
@@ -18,7 +18,7 @@ def friction(v, v_s):
 # force at a port by time, way, displacement, velocity, parameters and states
 FORCES = {
     "constant_force": lambda t, x, q, v, p: -p["F_0"],
-    "step_force": lambda t, x, q, v, p: -p["F_0"] * begun(t, p["t0"]),
+    "step_force": lambda t, x, q, v, p: -p["F_0"] * begun(t, p),
     "coulomb_friction": lambda t, x, q, v, p: -p["F_c"] * friction(v, p["v_s"]),
     "stribeck_friction": lambda t, x, q, v, p: (
         -(p["F_c"] + p["F_b"] * np.exp(-np.minimum(v * v / p["v_b"] ** 2, 700))) * friction(v, p["v_s"])
@@ -68,8 +68,8 @@ RATES = {
 # value of a parameter by time
 PARAMETERS = {
     "parameter_offset": lambda t, value, p: value + p["delta"],
-    "parameter_step": lambda t, value, p: value + p["delta"] * begun(t, p["t0"]),
+    "parameter_step": lambda t, value, p: value + p["delta"] * begun(t, p),
     "parameter_drift": lambda t, value, p: value + p["rate"] * t,
-    "stiffness_change": lambda t, value, p: value * (1 + p["change"] * begun(t, p["t0"])),
-    "damping_change": lambda t, value, p: value * (1 + p["change"] * begun(t, p["t0"])),
+    "stiffness_change": lambda t, value, p: value * (1 + p["change"] * begun(t, p)),
+    "damping_change": lambda t, value, p: value * (1 + p["change"] * begun(t, p)),
 }

@@ -4,12 +4,15 @@ The process of the FMUs may be damaged by them. What comes from there is therefo
 run: arrays, plain values, and this project's dataclasses, enumerations and exceptions.
 """
 
+import copyreg
 import io
 import pickle
 import socket
 import struct
+from collections.abc import Callable
 from dataclasses import is_dataclass
 from enum import Enum
+from types import TracebackType
 from typing import Any
 
 from fmus.host.apart.memory import Memory
@@ -42,9 +45,9 @@ class Channel:
     def send(self, value: Any) -> None:
         """Send a value; pickle's errors where that cannot be."""
         buffers: list[pickle.PickleBuffer] = []
-        data = pickle.dumps(value, 5, buffer_callback=buffers.append)
+        data = _dumped(value, buffers.append)
         if len(buffers) > MOST_BUFFERS:
-            data, buffers = pickle.dumps(value, 5), []
+            data, buffers = _dumped(value), []
         parts = [memoryview(data), *(b.raw() for b in buffers)]
         lengths = [part.nbytes for part in parts]
         self._memory.reserve(sum(map(_room, lengths)))
@@ -76,6 +79,22 @@ class Channel:
                 parts.append(bytearray(memory[at : at + length]))
                 at += _room(length)
         return self._loads(parts[0], buffers=parts[1:])
+
+
+def _dumped(value: Any, callback: Callable[[pickle.PickleBuffer], Any] | None = None) -> bytes:
+    """A value pickled; exceptions in Python's own way, whatever another library has registered for them.
+
+    Dask registers functions for every class of exception that is there, which would be no value.
+    """
+    file = io.BytesIO()
+    pickler = pickle.Pickler(file, 5, buffer_callback=callback)
+    pickler.dispatch_table = {
+        kind: reduce
+        for kind, reduce in copyreg.dispatch_table.items()
+        if not (isinstance(kind, type) and issubclass(kind, BaseException | TracebackType))
+    }
+    pickler.dump(value)
+    return file.getvalue()
 
 
 def _room(length: int) -> int:
