@@ -108,7 +108,7 @@ class StartPolicy:
     error: float = limit(
         3.0,
         "times the scatter",
-        "error of the guess, by which the start state is moved to see whether it is to be fitted",
+        "bound of the error of the guess within which the start state is fitted",
         "derivation: 1 in 370 by the normal distribution",
     )
 

@@ -68,11 +68,7 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
 
 
 def _start_unknowns(problem: Problem) -> list[Unknown]:
-    """The free start states whose error would be visible in the residual, as unknowns without bounds.
-
-    A first guess by a sensor is where the fit begins. It is no limit: the residual holds the same samples,
-    and the sensor may be the one that is wrong.
-    """
+    """The free start states whose error would be visible in the residual, as unknowns."""
     guess = problem.start_states(problem.record.runs[0])
     if not guess:
         return []
@@ -85,5 +81,5 @@ def _start_unknowns(problem: Problem) -> list[Unknown]:
         scale = error if np.isfinite(error) else 0.01 * (known[name].nominal or 1.0)
         moved = problem.residuals({**start, name: value + scale})[0] - as_guessed[0]
         if np.sum((moved / size) ** 2) > SEEN:
-            found.append(Unknown(name, value, -np.inf, np.inf, float(scale)))
+            found.append(Unknown(name, value, value - error, value + error, float(scale)))
     return found

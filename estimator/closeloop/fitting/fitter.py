@@ -11,6 +11,7 @@ from joblib import Parallel, delayed
 from estimator.closeloop.fitting.fit import REFUSED, fit
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.question.problem import Problem, Unknown
@@ -136,7 +137,8 @@ def hypothesis(
     """
     here = built(problem, promise.candidates)
     own = [u for c in promise.candidates for u in c.unknowns]
-    found = fit(here, [*unknowns, *own], weighting, promise.start, None, evaluations, known, guess, step=step)
+    others = _doubting(problem, promise.candidates, unknowns)
+    found = fit(here, [*others, *own], weighting, promise.start, None, evaluations, known, guess, step=step)
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
@@ -144,6 +146,17 @@ def hypothesis(
     if not all(np.all(np.abs(r) < REFUSED * weighting.size) for r in residuals):
         return None
     return Hypothesis(promise.candidates, found, tuple(residuals))
+
+
+def _doubting(
+    problem: Problem, candidates: Sequence[Candidate], unknowns: Sequence[Unknown]
+) -> list[Unknown]:
+    """The unknowns without the bounds that a start state has from a sensor, if this sensor is held faulty."""
+    doubted = {c.location for c in candidates if c.is_fault}
+    return [
+        replace(u, low=-np.inf, high=np.inf) if u.name in doubted and u.name in problem.free_states else u
+        for u in unknowns
+    ]
 
 
 def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:

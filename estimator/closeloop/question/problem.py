@@ -154,10 +154,10 @@ class Problem:
         return tuple(_cut(self.record.runs, 1.0))
 
     def start_states(self, run: Run) -> dict[str, tuple[float, float]]:
-        """First guess of each free state, and the size of its error.
+        """First guess of each free state, and a bound of its error.
 
         If the state is measured, the guess comes from a polynomial through the first samples; otherwise it is
-        the start value of the FMU, with an infinite error.
+        the start value of the FMU, with an infinite bound.
         """
         limits = self.policy.start
         head = slice(limits.samples)
