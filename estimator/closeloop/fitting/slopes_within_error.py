@@ -29,11 +29,10 @@ def within_error(built: Problem, h: Hypothesis, weighting: Weighting) -> Hypothe
     moved = [(u, column) for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True) if not u.is_onset]
     ends = [_ends(u, h.theta[u.name], column) for u, column in moved]
     asked = [{**h.theta, u.name: x} for (u, _), pair in zip(moved, ends, strict=True) for x in pair]
-    there = in_turn(built, asked, weighting)
-    found = {
-        u.name: set_aside((next(there) - below) / (high - low))
-        for (u, _), (low, high), below in zip(moved, ends, there, strict=False)
-    }
+    residuals, found = in_turn(built, asked, weighting), {}
+    for (u, _), (low, high) in zip(moved, ends, strict=True):
+        below, above = next(residuals), next(residuals)
+        found[u.name] = set_aside((above - below) / (high - low))
     slopes = [found.get(u.name, column) for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True)]
     scale = np.array([u.scale for u in h.fit.unknowns])
     width = np.array([u.high - u.low for u in h.fit.unknowns])

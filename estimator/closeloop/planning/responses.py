@@ -171,19 +171,14 @@ def _slopes(
         STEP * u.scale if now + STEP * u.scale <= u.high else -STEP * u.scale
         for u, now in zip(unknowns, values, strict=True)
     ]
+    # simulations at once need the same names
+    every = {**dict(zip((u.name for u in unknowns), values, strict=True)), **theta}
     moved = zip(unknowns, values, steps, strict=True)
-    shown = problem.simulate_several([_all(theta, unknowns, values) | {u.name: x + h} for u, x, h in moved])
+    shown = problem.simulate_several([{**every, u.name: x + h} for u, x, h in moved])
     return tuple(
         np.asarray((-np.sign(h) * (aside - y) / size / STEP).ravel())
         for h, [aside] in zip(steps, shown, strict=True)
     )
-
-
-def _all(
-    theta: Mapping[str, float], unknowns: Sequence[Unknown], values: Sequence[float]
-) -> dict[str, float]:
-    """Values of theta and of all unknowns, as simulations at once need the same names."""
-    return {**dict(zip((u.name for u in unknowns), values, strict=True)), **theta}
 
 
 def _moved(c: Candidate) -> list[Candidate]:
