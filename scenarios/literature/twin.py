@@ -88,10 +88,16 @@ def _waves(spectrum: Spectrum, s: Array, rng: np.random.Generator) -> tuple[Arra
     return grown * z, grown * slope + growing * z
 
 
+def alignment(speed: float, t: Array, rng: np.random.Generator, deviation: float) -> tuple[Array, Array]:
+    """Random alignment (N,), m, of that deviation at times t (N,), s, and its rate, m/s; speed: m/s."""
+    z, slope = _waves(SPECTRA["erri_low"]["alignment"], speed * t, rng)
+    scale = deviation / z.std()
+    return scale * z, scale * speed * slope
+
+
 def _alignment(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
-    z, slope = _waves(SPECTRA["erri_low"]["alignment"], case.speed * t, rng)
-    scale = CHOCEN_DOBRIKOV["alignment"].sd / z.std()
-    return {"y_irr": scale * z, "y_irr_dot": scale * case.speed * slope}
+    y, y_dot = alignment(case.speed, t, rng, CHOCEN_DOBRIKOV["alignment"].sd)
+    return {"y_irr": y, "y_irr_dot": y_dot}
 
 
 def _rails(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:

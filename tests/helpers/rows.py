@@ -37,7 +37,7 @@ def truth(case: Case, form: Form = SAME) -> Record:
     """The record of a case, by the truth model of its kind; form: of the wheelset's contact."""
     if "gauge_sd" in case.true:
         return of_ward(case)
-    if "alignment_sd" in case.true:
+    if "alignment_sd" in case.true or "alignment_step" in case.true:
         return of_charles(case)
     if "lambda_w" in case.true:
         return of_cone(case)
