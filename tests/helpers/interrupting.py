@@ -26,19 +26,23 @@ AGAIN = 0.5  # s, within which an impatient user sends the signal again
 
 
 def interrupted(
-    arguments: Sequence[str], folder: Path, temporary: Path, number: int | None, *after: float
+    arguments: Sequence[str], folder: Path, temporary: Path, number: int, *after: float
 ) -> tuple[int, str]:
-    """Exit code and output of a command that got a signal after each of these times [s], or none."""
+    """Exit code and output of a command that got a signal after each of these times [s], if it still ran."""
     process = subprocess.Popen(
         [sys.executable, "-m", "scenarios.cli", *arguments], text=True, cwd=folder,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | {"TMPDIR": str(temporary)},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
-    for wait in after if number is not None else ():
+    for wait in after:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(wait)
         process.send_signal(number)
-    said, _ = process.communicate(timeout=PATIENCE)
+    try:
+        said, _ = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()  # what it had started is found as an orphan
+        said, _ = process.communicate(timeout=PATIENCE)
     return process.returncode, said
 
 
@@ -78,9 +82,9 @@ def tried(command: str, seed: int, times: int, folder: Path) -> list[str]:
     temporary.mkdir()
     arguments, rng = command_line(command, out), np.random.default_rng(seed)
     begun = time.monotonic()
-    code, said = interrupted(arguments, folder, temporary, None)
+    code, said = interrupted(arguments, folder, temporary, signal.SIGINT, LONGEST)
     lasts, found = min(time.monotonic() - begun, LONGEST), []
-    if code not in (0, 1):
+    if code not in (0, 1, SIGNALS[signal.SIGINT]):
         return [f"{command} is not sound: exit code {code}: {said}"]
     for i in range(times):
         shutil.rmtree(out, ignore_errors=True)
