@@ -65,6 +65,6 @@ class Iterated(Ukf):
         draw(x, checked(x, P, self.names, at.t), self._scale, X)
         expect(self.system.h(X, at.u, at.t, at.carried), self._Wm, self._Wc, Y, y, S)
         cross(Y, y, X, x, self._Wc, Psi)
-        H: Array = np.linalg.lstsq(P, Psi.T, rcond=None)[0].T
+        H: Array = np.asarray(np.linalg.lstsq(P, Psi.T, rcond=None)[0].T, dtype=np.float64)
         rest: Array = S - H @ P @ H.T
         return H, y, (rest + rest.T) / 2

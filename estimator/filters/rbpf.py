@@ -122,7 +122,9 @@ class Rbpf(Estimator):
     @property
     def probabilities(self) -> Array:
         """Probability of each mode, (k,)."""
-        found: Array = np.bincount(self.cloud.mode, np.exp(self.cloud.weights), len(self.modes))
+        found: Array = np.bincount(self.cloud.mode, np.exp(self.cloud.weights), len(self.modes)).astype(
+            np.float64
+        )
         return found
 
     def _first(self, N: int) -> Cloud:

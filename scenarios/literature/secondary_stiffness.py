@@ -139,6 +139,8 @@ def _as_printed(case: Case, way: str, found: Followed) -> list[Finding]:
     """How far the printed rule comes, and where it wanders on the way, which has no target."""
     k1 = KILO * found.value["k1"]
     known = np.isfinite(k1)
+    if not known.any():
+        return [Finding(case.name, f"{way}: time until it ends", "s", 0.0, note=found.reason)]
     until, true = float(found.t[known][-1]), KILO * case.truth("k1", found.t)[known]
     off = rmse(k1[known], true) / (KILO * TRUE)
     made = [

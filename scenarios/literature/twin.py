@@ -27,11 +27,9 @@ AXLES = 19.0  # m between the bogie centres
 TORQUE = 852.0  # N.m, thesis 4.5
 REST = 5.0  # s without torque at the beginning and the end, there
 WHEEL, GEAR = 0.5, 5.0  # m, 1: rolling radius and gearbox of the driven wheelset
-POLE_PAIRS, RIG_RADII = (
-    5,
-    (0.3482, 0.45215),
-)  # 1, m: of the rig's motor; its wheel and roller, thesis 4.1, 4.6.4
-BRAKE = 1.1 * 8000.0 * RIG_RADII[0]  # N.m over mu0, a little above the adhesion of the rig's wheel
+POLE_PAIRS = 5  # of the rig's motor
+R_WHEEL, R_ROLLER = 0.3482, 0.45215  # m, of the rig: thesis 4.6.4, 4.1
+BRAKE = 1.1 * 8000.0 * R_WHEEL  # N.m over mu0, a little above the adhesion of the rig's wheel
 PULL = 1.1 * 2 * 79.7e3 * WHEEL / GEAR  # N.m over mu0, a little above the adhesion of both wheels
 
 
@@ -136,7 +134,7 @@ def _rolling(speed: float) -> dict[str, float]:
 
 def _synchronous(supply: float) -> dict[str, float]:
     omega_r = 2 * np.pi * supply / POLE_PAIRS
-    return {"omega_r": omega_r, "omega_w": omega_r * RIG_RADII[1] / RIG_RADII[0]}
+    return {"omega_r": omega_r, "omega_w": omega_r * R_ROLLER / R_WHEEL}
 
 
 INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
