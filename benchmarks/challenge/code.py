@@ -66,7 +66,10 @@ def _trace(record: Path) -> set[str]:
     return {
         p.relative_to(ROOT).as_posix()
         for p in inside
-        if p.is_file() and p.suffix not in WRITTEN and COMPILED not in p.parts and not tops.isdisjoint(p.parents)
+        if p.is_file()
+        and p.suffix not in WRITTEN
+        and COMPILED not in p.parts
+        and not tops.isdisjoint(p.parents)
     }
 
 
