@@ -60,7 +60,8 @@ def whole(file: Path) -> bool:
     try:
         if file.suffix == ".json":
             json.loads(data)
-        elif file.suffix == ".toml":
+            return True
+        if file.suffix == ".toml":
             tomllib.loads(data.decode())
         elif file.suffix in (".fmu", ".ssp", ".checkpoint"):
             with zipfile.ZipFile(file) as packed:

