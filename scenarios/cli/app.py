@@ -18,7 +18,7 @@ from scenarios.cli.supervision import INTERRUPTED, supervised
 from scenarios.cli.voice import VOICE, said
 
 FOLDER = Path(__file__).parent
-NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision", "voice")
+NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision", "tasks", "voice")
 COMMANDS = {  # module by the name of its command
     module.name.replace("_", "-"): module.name
     for module in iter_modules([str(FOLDER)])
