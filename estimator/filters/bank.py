@@ -4,17 +4,15 @@ Sources: Blom and Bar-Shalom, IEEE Trans. Autom. Control 33 (1988) 780, for inte
 Freitas, Murphy and Russell, UAI 2000, for particles of which each has a Kalman filter.
 """
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from estimator.filters.estimator import Diverged
+from estimator.filters.imm import LEAST
+from estimator.filters.modes import mixed
 from estimator.record import Array
-
-Numbers: TypeAlias = NDArray[np.integer[Any]]
-LEAST = -600.0  # logarithm of the smallest weight, far above the smallest double
 
 
 class Bank(NamedTuple):
@@ -105,22 +103,6 @@ def neighbours(k: int, stay: float, dt: float) -> Array:
     beside = np.eye(k, k, 1) + np.eye(k, k, -1)
     found: Array = (1 - left) * np.eye(k) + left * beside / beside.sum(axis=1, keepdims=True)
     return found
-
-
-def mixed(weights: Array, x: Array, P: Array) -> tuple[Array, Array]:
-    """Mean (n,) and covariance (n, n) of normals x (k, n), P (k, n, n) mixed by weights (k,)."""
-    mean = weights @ x
-    off = x - mean
-    spread: Array = np.einsum("k,kij->ij", weights, P) + np.einsum("k,ki,kj->ij", weights, off, off)
-    return mean, (spread + spread.T) / 2
-
-
-def systematic(weights: Array, rng: np.random.Generator) -> Numbers:
-    """Numbers (k,) of the filters that are drawn, each about as often as its weight (k,) says."""
-    edges = np.cumsum(weights)
-    edges[-1] = 1.0
-    k = len(weights)
-    return np.searchsorted(edges, (rng.random() + np.arange(k)) / k)
 
 
 def _symmetric(P: Array) -> Array:

@@ -9,8 +9,7 @@ import numpy as np
 from estimator.filters.ekf import Ekf
 from estimator.filters.estimator import Estimate
 from estimator.record import Array
-from fmus.errors import BadInput
-from scenarios.literature.case import TRUE, Case, Record
+from scenarios.literature.case import TRUE, Case, Record, Source
 from scenarios.literature.conicity_banks import particles, several_models
 from scenarios.literature.conicity_figures import figures
 from scenarios.literature.conicity_fits import (
@@ -30,9 +29,10 @@ from scenarios.literature.conicity_model import (
     V,
     Wheelset,
 )
-from scenarios.literature.conicity_run import simulated
+from scenarios.literature.conicity_run import own_record
 from scenarios.literature.conicity_table import Tabled
 from scenarios.literature.following import BAND, Followed, covered, follow, rmse
+from scenarios.literature.linear_creep import by_fmu
 from scenarios.literature.outcome import Bound, Finding, Outcome
 from scenarios.literature.row import Measured, Row, Tell
 from scenarios.literature.wheelset import variances
@@ -57,8 +57,9 @@ BANKS = ("several models", "particles")
 FITS = ("one cubic", "piecewise cubics")
 AIMS: Mapping[str, tuple[float, Bound]] = {  # of the error over the conicity's own deviation
     "constant": (1.0, ">="), "irregularity too": (0.5, "<="), "table": (0.5, "<="),
-    "several models": (0.5, "<="), "particles": (0.5, "<="),
+    "particles": (0.5, "<="),
 }  # fmt: skip
+NO_AIM: tuple[float | None, Bound] = (None, "<=")
 IN_TURNS = 0.02  # RMSE of the hybrid's curve: less than that of the filter's own table
 GENERIC = "generic"
 
@@ -163,14 +164,10 @@ def tried(case: Case, record: Record, tell: Tell) -> Tried:
     return Tried(case, record, filters, fits, table, in_turns(record))
 
 
-def own_record(case: Case) -> Record:
-    """The record of a case by the equations of the row; BadInput for the case of other equations."""
-    if case.true == OTHER_EQUATIONS:
-        raise BadInput(
-            f"case '{case.name}': its record is not of this row's equations; give records, or choose case "
-            f"'{GENERIC}'"
-        )
-    return simulated(case)
+def simulated(fmu: Path) -> Source:
+    """Makes the record of a case by the row's equations, or in the case of other equations by the FMU."""
+    others = by_fmu(fmu)
+    return lambda case: others(case) if case.true == OTHER_EQUATIONS else own_record(case)
 
 
 def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
@@ -185,7 +182,8 @@ def _filters(one: Tried) -> list[Finding]:
     true = one.true[late]
     spread, made = float(true.std()), []
     for way, found in one.filters.items():
-        aim, bound = AIMS[way] if one.case.name == GENERIC else (None, AIMS[way][1])
+        target, bound = AIMS.get(way, NO_AIM)
+        aim = target if one.case.name == GENERIC else None
         error = rmse(found.value["conicity"][late], true) / spread
         what = f"filter, {way}: RMSE of conicity over its deviation"
         made.append(Finding(one.case.name, what, "1", error, target=aim, bound=bound, note=found.reason))
@@ -246,5 +244,5 @@ ROW = Row(
     "wheelset",
     CASES,
     rebuilt,
-    own_record,
+    simulated,
 )

@@ -15,12 +15,12 @@ from estimator.filters.bank import (
     bank_of,
     corrected,
     interacted,
-    mixed,
     neighbours,
     predicted,
-    systematic,
 )
 from estimator.filters.estimator import Diverged
+from estimator.filters.modes import mixed
+from estimator.filters.rbpf import systematic
 from estimator.record import Array
 from scenarios.literature.case import Record
 from scenarios.literature.conicity_model import (

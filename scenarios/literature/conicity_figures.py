@@ -54,7 +54,7 @@ def _over_time(one: Tried, name: str) -> Plot:
 def _over_shift(one: Tried, name: str) -> Plot:
     figure, axes = sheet(5.2, [["table", "fits"], ["yaw", "yaw"]])
     x, nodes = 1e3 * one.grid, one.table.nodes
-    axes["fits"].plot(x, one.both.curve(one.grid), color=LAW, linewidth=1.0, linestyle="--")
+    axes["fits"].plot(x, one.both.curve(one.grid), color=LAW, linewidth=1.2, linestyle="--", zorder=5)
     axes["table"].plot([], [], color=LAW, linestyle="--", label="hybrid, track unknown")  # for the legend
     for key in ("table", "fits"):
         axes[key].plot(x, one.curve(one.grid), color=CLOUD, linewidth=2.8, label="true")

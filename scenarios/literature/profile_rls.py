@@ -22,6 +22,7 @@ from scenarios.drawing.sheet import (
     sheet,
 )
 from scenarios.literature.case import Case, Record
+from scenarios.literature.linear_creep import by_fmu
 from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.row import Measured, Row, Tell
 
@@ -164,7 +165,7 @@ def region(true: Curves, gauge: float) -> tuple[Array, Array]:
 
 
 def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
-    """See Row; no FMU is needed, the equations are the source's."""
+    """See Row; no FMU is needed but for records, the equations are the source's."""
     true = geometry()
     findings: list[Finding] = []
     plots: list[Plot] = []
@@ -241,4 +242,5 @@ ROW = Row(
     "wheelset",
     CASES,
     rebuilt,
+    by_fmu,
 )

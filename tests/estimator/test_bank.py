@@ -12,14 +12,13 @@ from estimator.filters.bank import (
     bank_of,
     corrected,
     interacted,
-    mixed,
     neighbours,
     predicted,
-    systematic,
 )
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.filters.kf import Kf
 from estimator.filters.linear import Linear
+from estimator.filters.modes import mixed
 from estimator.record import Array
 
 N, M, STEPS = 3, 2, 40
@@ -118,18 +117,6 @@ def test_without_change_mixing_leaves_every_model_alone() -> None:
     assert_allclose(after.x, bank.x)
     assert_allclose(after.P, bank.P)
     assert_allclose(after.probabilities, bank.probabilities)
-
-
-@given(st.integers(0, 1000))
-def test_filters_are_drawn_as_often_as_they_weigh(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    weights = rng.dirichlet(np.ones(20))
-    drawn = systematic(weights, np.random.default_rng(seed))
-    times = np.bincount(drawn, minlength=20)
-    assert np.all(np.abs(times - 20 * weights) < 1 + 1e-9)
-    edges = np.cumsum(weights)
-    place = (np.random.default_rng(seed).random() + np.arange(20)) / 20
-    assert drawn.tolist() == [int(np.argmax(edges > at)) for at in place]
 
 
 def test_outputs_that_no_filter_can_explain_are_told() -> None:
