@@ -16,6 +16,8 @@ from scenarios.literature.case import TIME, TRUE, Case, Record, Source
 from scenarios.literature.twin import alignment
 
 NONE = 1e-9  # N.m2: a creep coefficient of 0 would mean Kalker's
+LIMIT = 2.2  # deviations, beyond which no irregularity goes, else the flange comes into it
+TINY = 1e-12  # m, of an irregularity that is none
 CENTRED = 1e-4  # m, a shift within which its conicity is that at this shift
 # two springs of each kind, the yaw's on a lever of 1 m; one wheel carries half of W
 TABLE_A1 = MappingProxyType({
@@ -32,8 +34,8 @@ def by_fmu(fmu: Path) -> Source:
 
     def make(case: Case) -> Record:
         rng, t = np.random.default_rng(case.seed), case.times
-        d, d_dot = alignment(case.speed, t, rng, case.true["alignment_sd"])
-        gauge, _ = alignment(case.speed, t, rng, case.true.get("gauge_sd", 0.0))
+        d, d_dot = _limited(*alignment(case.speed, t, rng, case.true["alignment_sd"]))
+        gauge, _ = _limited(*alignment(case.speed, t, rng, case.true.get("gauge_sd", 0.0)))
         given = {"y_irr": d, "y_irr_dot": d_dot, "gauge_irr": gauge}
         wanted = [*dict.fromkeys([*(n for n in case.noise if n != "phi_dot"), *ALWAYS])]
         with Fmu(fmu) as plant:
@@ -46,6 +48,12 @@ def by_fmu(fmu: Path) -> Source:
         return Record({TIME: t, **inputs, **seen, **{n + TRUE: true[n] for n in case.judged}})
 
     return make
+
+
+def _limited(z: Array, rate: Array) -> tuple[Array, Array]:
+    """An irregularity and its rate (N,), made smaller where it goes beyond LIMIT."""
+    share = LIMIT * float(z.std()) / max(float(np.abs(z).max()), TINY)
+    return min(share, 1.0) * z, min(share, 1.0) * rate
 
 
 def _conicity(shift: Array, difference: Array) -> Array:

@@ -41,7 +41,7 @@ LEAST = 1e-9  # m, of a bin's width
 KNOWN_TO = np.array([5e-3, 5e-3, 0.5, 0.5, 5e-3, 0.5, 5e-3, 0.5])
 SUMS = 5  # knots of the sum of the angles over the roll
 SMALLEST, LARGEST = 0.01, 1.0  # rad, of that sum
-NOISY = 1e-6  # rad, noise of the roll that is tried beside the source's ideal sensors
+NOISY = (1e-7, 1e-6)  # rad, noise of the roll, tried beside the source's ideal sensors
 NEAR = 0.2  # of the shift's deviation: what its error may be after the rounds
 RADII, ANGLES = 1, 3  # places of both differences among the combinations
 
@@ -158,16 +158,16 @@ def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
             aim = None if record.columns["gauge_irr"].any() else NEAR
             findings += _judged(case, record, name, drawn[name], aim)
             tell(f"{case.name}: from {name}, with a noisy roll")
-            blurred = looped(_noisy(record, case.seed), assumed)
-            findings += _judged(case, record, f"{name}, roll with noise of {1e6 * NOISY:g} urad", blurred)[
-                1:3
-            ]
+            for std in NOISY:
+                blurred = looped(noisy(record, std, case.seed), assumed)
+                findings.append(_judged(case, record, f"{name}, noise of {1e6 * std:g} urad", blurred)[1])
         plots.append(_figure(case, record, drawn))
     return Outcome(ROW.name, findings, plots, NOTES)
 
 
-def _noisy(record: Record, seed: int) -> Record:
-    noise = np.random.default_rng(seed).normal(0.0, NOISY, len(record.t))
+def noisy(record: Record, std: float, seed: int) -> Record:
+    """The record with white noise on the roll, rad."""
+    noise = np.random.default_rng(seed).normal(0.0, std, len(record.t))
     return Record({**record.columns, "phi": record.columns["phi"] + noise})
 
 

@@ -20,7 +20,7 @@ from scenarios.literature.conicity_fits import CUBIC, Fit, knots_of, piecewise, 
 from scenarios.literature.conicity_hybrid import OnCurve, flat
 from scenarios.literature.conicity_model import DT, MOTION, Curved
 from scenarios.literature.following import moving_mean, rmse
-from scenarios.literature.linear_creep import by_fmu
+from scenarios.literature.linear_creep import LIMIT, by_fmu
 from tests.helpers.native import native
 from tests.helpers.rows import truth
 from tests.helpers.rows_charles import conicity
@@ -88,7 +88,7 @@ def test_least_squares_in_bins_of_the_true_shift_find_the_geometry_within_their_
 def test_without_an_ideal_roll_the_loop_does_not_close(known):
     record, shift, found = known
     start = next(iter(loop.assumptions().values()))
-    blurred = loop.looped(loop._noisy(record, 1), start)
+    blurred = loop.looped(loop.noisy(record, 1e-6, seed=1), start)
     assert off(blurred[-1], shift) > 2 * off(next(iter(found.values()))[-1], shift)
 
 
@@ -111,7 +111,9 @@ def test_the_fmu_makes_the_records_of_other_equations(row, name):
     record = by_fmu(native("wheelset"))(case)
     assert set(record.columns) == set(case.columns)
     assert all(np.isfinite(x).all() for x in record.columns.values())
-    assert record.columns["y_irr"].std() == pytest.approx(case.true["alignment_sd"])
+    size, sd = np.abs(record.columns["y_irr"]), case.true["alignment_sd"]
+    assert 0.5 * sd < record.columns["y_irr"].std() <= sd * (1 + 1e-9)
+    assert size.max() <= LIMIT * sd * (1 + 1e-9)
 
 
 def test_the_fmus_record_obeys_the_rows_equations():
