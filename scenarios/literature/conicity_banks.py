@@ -117,5 +117,5 @@ def _run(record: Record, bank: Bank, step: Step) -> Followed:
         std[:, i] = np.sqrt([P[Y, Y], P[-1, -1], spread])
         likelihood, nis = likelihood + told.log_likelihood, nis + told.nis
     took = perf_counter() - begun
-    by_name = (dict(zip(names, found, strict=True)) for found in (value, std))
-    return Followed(record.t, *by_name, likelihood, nis / len(record.t), took, reason)
+    values, spreads = (dict(zip(names, found, strict=True)) for found in (value, std))
+    return Followed(record.t, values, spreads, likelihood, nis / len(record.t), took, reason)

@@ -132,7 +132,8 @@ def sum_of_angles(bins: Bins, fine: Array) -> Array:
     hats = np.column_stack([np.interp(bins.roll, knots, hat) for hat in np.eye(SUMS)])
     total, std = bins.value[:, 2], bins.std[:, 2]
     found = np.linalg.lstsq(hats / std[:, None], total / std, rcond=None)[0]
-    return np.clip(np.interp(fine, knots, found), SMALLEST, LARGEST)
+    sums: Array = np.clip(np.interp(fine, knots, found), SMALLEST, LARGEST)
+    return sums
 
 
 def rolled(total: Array, fine: Array, centred: float) -> Rolling:

@@ -127,7 +127,8 @@ def _place(record: Record) -> IntArray:
 def identified(record: Record, gauge_known: bool = False) -> Curves:
     """Recursive least squares in each bin of the shift, sample by sample; at nominal gauge if it is known."""
     X, rest = regression(record, gauge_known)
-    names, known_to = (*COMBINATIONS, *SLOPES), KNOWN_TO
+    names: tuple[str, ...] = (*COMBINATIONS, *SLOPES)
+    known_to = KNOWN_TO
     if gauge_known:
         names += tuple(f"{name} by {powers}" for powers in GAUGED for name in COMBINATIONS[1::2])
         known_to = np.concatenate([KNOWN_TO, np.tile(CHANGES_BY, len(GAUGED))])

@@ -58,7 +58,7 @@ def content(signals: Array, dt: float) -> Array:
 
 def library(fmu: Path, track: Array, speed: float) -> Array:
     """Contents (9, m, 16) in every state of GRID, over ALIGNMENT (N, 4), with the noise of the sensors."""
-    t = DT * np.arange(len(track))
+    t = DT * np.arange(len(track), dtype=np.float64)
     inputs = dict(zip(ALIGNMENT, track.T, strict=True))
     floor = 2 * DT * np.square([*NOISE.values()])[:, None]  # power density of white noise
     found = []

@@ -357,7 +357,8 @@ def test_the_profile_is_found_bin_by_bin_and_gauge_blurs_it():
     for name in ("alignment", "gauge too"):
         case = case_of("profile_rls", name, duration=16.0)
         outcome = profile.rebuilt([(case, truth(case))], fmu=None, tell=print)
-        errors[name] = [f.ours for f in outcome.findings if "RMSE" in f.what]
+        alone = [f for f in outcome.findings if not f.what.startswith("gauge known")]
+        errors[name] = [f.ours for f in alone if "RMSE" in f.what]
     sums_of_radii, differences, _, angles = zip(*errors.values(), strict=True)
     for alone, blurred in (sums_of_radii, differences, angles):
         assert alone < 0.02

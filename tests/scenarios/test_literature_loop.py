@@ -23,7 +23,7 @@ from scenarios.literature.following import moving_mean, rmse
 from scenarios.literature.linear_creep import LIMIT, by_fmu
 from tests.helpers.native import native
 from tests.helpers.rows import truth
-from tests.helpers.rows_charles import conicity
+from tests.helpers.rows_charles import conicity, of_charles
 
 
 def case_of(row, name, **changed):
@@ -163,6 +163,16 @@ def test_filter_and_least_squares_in_turns_find_the_curve_that_neither_knew(gene
     assert rmse(found.curve(at), conicity(at)) > rmse(
         piecewise(generic)(at), conicity(at)
     )  # which know the track
+
+
+def test_it_is_the_roll_of_the_source_that_tells_conicity_from_irregularity(generic):
+    """A wheelset that rolls over the track, as real ones do, loses the hybrid's curve."""
+    real = of_charles(case_of("conicity", "generic", duration=12.0), rolls_over_track=True)
+    errors = []
+    for record in (generic, real):
+        at = np.linspace(*np.percentile(shift_of(record), (5, 95)), 60)
+        errors.append(rmse(cone.in_turns(record).curve(at), conicity(at)))
+    assert errors[1] > 5 * errors[0]
 
 
 @pytest.mark.parametrize("way", cone.BANKS)
