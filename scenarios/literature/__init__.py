@@ -12,7 +12,6 @@ from fmus.models import model_class
 from scenarios.literature.case import Source, recorded
 from scenarios.literature.outcome import Outcome
 from scenarios.literature.row import Row, Tell
-from scenarios.literature.twin import twin
 from scenarios.output import writable
 
 __all__ = ["ROWS", "Outcome", "Row", "run_row"]
@@ -68,5 +67,5 @@ def run_row(
 
 def _source(records: Path | Source | None, row: Row, fmu: Path) -> Source:
     if records is None:
-        return row.simulated or twin(fmu)
+        return row.simulated(fmu)
     return recorded(records) if isinstance(records, Path) else records

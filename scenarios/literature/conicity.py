@@ -9,8 +9,8 @@ import numpy as np
 from estimator.filters.ekf import Ekf
 from estimator.filters.estimator import Estimate
 from estimator.record import Array
-from fmus.errors import BadInput
-from scenarios.literature.case import TRUE, Case, Record
+from scenarios.literature.case import TRUE, Case, Record, Source
+from scenarios.literature.conicity_banks import particles, several_models
 from scenarios.literature.conicity_figures import figures
 from scenarios.literature.conicity_fits import (
     Fit,
@@ -19,6 +19,7 @@ from scenarios.literature.conicity_fits import (
     shift_of,
     yaw_response,
 )
+from scenarios.literature.conicity_hybrid import Hybrid, hybrid
 from scenarios.literature.conicity_model import (
     DT,
     MOTION,
@@ -28,9 +29,10 @@ from scenarios.literature.conicity_model import (
     V,
     Wheelset,
 )
-from scenarios.literature.conicity_run import simulated
+from scenarios.literature.conicity_run import own_record
 from scenarios.literature.conicity_table import Tabled
-from scenarios.literature.following import Followed, follow, rmse
+from scenarios.literature.following import BAND, Followed, covered, follow, rmse
+from scenarios.literature.linear_creep import by_fmu
 from scenarios.literature.outcome import Bound, Finding, Outcome
 from scenarios.literature.row import Measured, Row, Tell
 from scenarios.literature.wheelset import variances
@@ -43,17 +45,22 @@ GUESS, STD = 0.15, 0.1  # conicity at the start, and its deviation
 STARTS = (1e-3, 1e-3, 1e-2, 1e-2, 1e-3, 1e-2)  # deviation of the motion at the start
 DRIVEN = (1e-7, 1e-7, 1e-3, 1e-3, 1e-8, 1e-6)  # process noise of the equations of motion per second^1/2
 SLIDES = 2e-2  # m, process noise of the irregularity per second^1/2
-KEPT = (1 - SLIDES**2 * DT / DEVIATION**2) ** 0.5  # share left after a sample; keeps its deviation
+# both for several models and particles: the conicity changes within a sample, and the irregularity drifts
+CHANGING, DRIFTS = (1e-7, 1e-7, 2e-3, 1e-2, 1e-8, 1e-6), 5e-3
 TAKEN_FOR_NOISE = 0.5  # process noise of the conicity per second^1/2, if the irregularity is not estimated
 FREE, LED = 0.3, 0.1  # the same if the irregularity is estimated, and if a table is used too
 NODES = 1e-3 * np.arange(-6.0, 6.1, 0.75)  # m, of the table
 MEMORY = 0.01  # share of an estimate's information that a sample adds to the table
 START_UP = 2.0  # s
 WAYS = ("constant", "irregularity too", "table")
+BANKS = ("several models", "particles")
 FITS = ("one cubic", "piecewise cubics")
 AIMS: Mapping[str, tuple[float, Bound]] = {  # of the error over the conicity's own deviation
     "constant": (1.0, ">="), "irregularity too": (0.5, "<="), "table": (0.5, "<="),
+    "particles": (0.5, "<="),
 }  # fmt: skip
+NO_AIM: tuple[float | None, Bound] = (None, "<=")
+IN_TURNS = 0.02  # RMSE of the hybrid's curve: less than that of the filter's own table
 GENERIC = "generic"
 
 DRAWN = Case(
@@ -66,13 +73,14 @@ CASES = (DRAWN, replace(DRAWN, name="S1002 on 60E1", duration=20.0, true=OTHER_E
 
 @dataclass(frozen=True)
 class Tried:
-    """The results of one case: filters by WAYS, fits by FITS, and the table that a filter has learnt."""
+    """The results of one case: filters by WAYS and BANKS, fits by FITS, the table of one, and the hybrid."""
 
     case: Case
     record: Record
     filters: Mapping[str, Followed]
     fits: Mapping[str, Fit]
     table: Tabled
+    both: Hybrid
 
     @property
     def true(self) -> Array:
@@ -107,10 +115,15 @@ class Taught(Ekf):
         return now
 
 
+def kept(slides: float) -> float:
+    """Share of the irregularity that a sample leaves, so that with this process noise its deviation stays."""
+    return float((1 - slides**2 * DT / DEVIATION**2) ** 0.5)
+
+
 def followed(way: str, record: Record) -> tuple[Followed, Tabled]:
     """Run a filter of the outputs alone on a record; returns it with its table, used by the last way only."""
-    table = Tabled(NODES, GUESS, STD, MEMORY, KEPT)
-    belief: Constant = {"constant": Constant(), "irregularity too": Along(KEPT), "table": table}[way]
+    table = Tabled(NODES, GUESS, STD, MEMORY, kept(SLIDES))
+    belief: Constant = {"constant": Constant(), "irregularity too": Along(kept(SLIDES)), "table": table}[way]
     alone = way == WAYS[0]
     more = {"constant": (TAKEN_FOR_NOISE,), "irregularity too": (FREE, SLIDES), "table": (LED, SLIDES)}[way]
     x = np.array([0.0] * len(MOTION) + [GUESS] + [0.0] * (not alone))
@@ -121,30 +134,46 @@ def followed(way: str, record: Record) -> tuple[Followed, Tabled]:
     return follow(filter, plain, record.t, record.table(()), record.table(OUTPUTS)), table
 
 
+def banked(way: str, record: Record, seed: int) -> Followed:
+    """Run several models or particles of the outputs alone on a record."""
+    start = np.zeros(len(MOTION) + 1), np.diag(np.square([*STARTS, 1e-3]))
+    Q, R = np.diag(np.square([*CHANGING, DRIFTS])) * DT, variances(NOISE)
+    if way == BANKS[0]:
+        return several_models(record, start, Q, R, kept(DRIFTS))
+    return particles(record, start, Q, R, kept(DRIFTS), np.random.default_rng(seed))
+
+
+def in_turns(record: Record) -> Hybrid:
+    """Run the hybrid of filter and least squares, of the outputs alone, on a record."""
+    start = Estimate(0.0, np.zeros(len(MOTION) + 1), np.diag(np.square([*STARTS, 1e-3])))
+    Q = np.diag(np.square([*DRIVEN, SLIDES])) * DT
+    return hybrid(record, start, Q, variances(NOISE), GUESS, kept(SLIDES))
+
+
 def tried(case: Case, record: Record, tell: Tell) -> Tried:
     """Run all filters and fits on a case."""
     filters = {}
     for way in WAYS:
         tell(f"{case.name}: conicity by a filter, {way}")
         filters[way], table = followed(way, record)
+    for way in BANKS:
+        tell(f"{case.name}: conicity by {way}")
+        filters[way] = banked(way, record, case.seed)
+    tell(f"{case.name}: filter and least squares in turns")
     fits = dict(zip(FITS, (one_cubic(record), piecewise(record)), strict=True))
-    return Tried(case, record, filters, fits, table)
+    return Tried(case, record, filters, fits, table, in_turns(record))
 
 
-def own_record(case: Case) -> Record:
-    """The record of a case by the equations of the row; BadInput for the case of other equations."""
-    if case.true == OTHER_EQUATIONS:
-        raise BadInput(
-            f"case '{case.name}': its record is not of this row's equations; give records, or choose case "
-            f"'{GENERIC}'"
-        )
-    return simulated(case)
+def simulated(fmu: Path) -> Source:
+    """Makes the record of a case by the row's equations, or in the case of other equations by the FMU."""
+    others = by_fmu(fmu)
+    return lambda case: others(case) if case.true == OTHER_EQUATIONS else own_record(case)
 
 
 def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
     """See Row; no FMU is needed, the equations are the source's."""
     every = [tried(case, record, tell) for case, record in measured]
-    findings = [finding for one in every for finding in (*_filters(one), *_fits(one))]
+    findings = [finding for one in every for finding in (*_filters(one), *_in_turns(one), *_fits(one))]
     return Outcome(ROW.name, findings, [plot for one in every for plot in figures(one)], NOTES)
 
 
@@ -153,7 +182,8 @@ def _filters(one: Tried) -> list[Finding]:
     true = one.true[late]
     spread, made = float(true.std()), []
     for way, found in one.filters.items():
-        aim, bound = AIMS[way] if one.case.name == GENERIC else (None, AIMS[way][1])
+        target, bound = AIMS.get(way, NO_AIM)
+        aim = target if one.case.name == GENERIC else None
         error = rmse(found.value["conicity"][late], true) / spread
         what = f"filter, {way}: RMSE of conicity over its deviation"
         made.append(Finding(one.case.name, what, "1", error, target=aim, bound=bound, note=found.reason))
@@ -162,9 +192,28 @@ def _filters(one: Tried) -> list[Finding]:
             made.append(
                 Finding(one.case.name, f"filter, {way}: error of y - d, rms over its deviation", "1", off)
             )
+        if way in BANKS:
+            held = covered(found, "conicity", one.true, START_UP)
+            made.append(Finding(one.case.name, f"filter, {way}: {BAND}", "1", held))
     off = rmse(one.table.curve(one.grid), one.curve(one.grid))
     made.append(Finding(one.case.name, "the filter's own table: RMSE of conicity over the shift", "1", off))
     return made
+
+
+def _in_turns(one: Tried) -> list[Finding]:
+    late, shift, found = one.record.t >= START_UP, shift_of(one.record), one.both
+    off = rmse(found.curve(one.grid), one.curve(one.grid))
+    apart = rmse(found.shift[late], shift[late]) / float(shift[late].std())
+    of = found.curve(found.shift)[late]
+    error = rmse(of, one.true[late]) / float(one.true[late].std())
+    aim = IN_TURNS if one.case.name == GENERIC else None
+    name = "hybrid of filter and least squares"
+    return [
+        Finding(one.case.name, f"{name}: RMSE of conicity over the shift", "1", off, target=aim),
+        Finding(one.case.name, f"{name}: RMSE of conicity over its deviation", "1", error),
+        Finding(one.case.name, f"{name}: error of y - d, rms over its deviation", "1", apart),
+        Finding(one.case.name, f"{name}: rounds", "1", len(found.rounds), note=found.filter.reason),
+    ]
 
 
 def _fits(one: Tried) -> list[Finding]:
@@ -191,9 +240,9 @@ NOTES = (
 ROW = Row(
     "conicity",
     "Nonlinear conicity by Kalman filters and by least squares",
-    "Charles et al. 2008, Fig. 5 to 9",
+    "Charles et al. 2008, Fig. 5 to 9, section 6",
     "wheelset",
     CASES,
     rebuilt,
-    own_record,
+    simulated,
 )

@@ -10,6 +10,7 @@ from scenarios.drawing.sheet import (
     AFTER,
     BEFORE,
     CLOUD,
+    LAW,
     Plot,
     legend,
     name_axes,
@@ -47,12 +48,14 @@ def _over_time(one: Tried, name: str) -> Plot:
         name_axes(ax, "time [s]" if last else "", "conicity", f"filter: {way}")
         ax.set_xlim(t[part][0], t[-1])
     legend(figure, axes["constant"])
-    return Plot(name, figure, "Conicity under the wheelset, and what three Kalman filters make of it.")
+    return Plot(name, figure, "Conicity under the wheelset, and what filters make of it.")
 
 
 def _over_shift(one: Tried, name: str) -> Plot:
     figure, axes = sheet(5.2, [["table", "fits"], ["yaw", "yaw"]])
     x, nodes = 1e3 * one.grid, one.table.nodes
+    axes["fits"].plot(x, one.both.curve(one.grid), color=LAW, linewidth=1.2, linestyle="--", zorder=5)
+    axes["table"].plot([], [], color=LAW, linestyle="--", label="hybrid, track unknown")  # for the legend
     for key in ("table", "fits"):
         axes[key].plot(x, one.curve(one.grid), color=CLOUD, linewidth=2.8, label="true")
     axes["table"].plot(

@@ -36,6 +36,12 @@ class Fit:
         found: Array = self.spline(np.clip(shift, self.spline.t[0], self.spline.t[-1]))
         return found
 
+    def slope(self, shift: Array) -> Array:
+        """Change of conicity with the shift, 1/m, at shifts (n,), m; 0 beyond the outermost knots."""
+        inside = (shift >= self.spline.t[0]) & (shift <= self.spline.t[-1])
+        found: Array = np.where(inside, self.spline(shift, 1), 0.0)
+        return found
+
 
 def shift_of(record: Record) -> Array:
     """Of the wheelset over the track (N,), m."""
@@ -51,14 +57,26 @@ def one_cubic(record: Record) -> Fit:
 def piecewise(record: Record) -> Fit:
     """A cubic in each piece whose value and slope go through at its ends (eq. 27): the knots are double."""
     low, high = np.percentile(shift_of(record), (100 * RARE, 100 * (1 - RARE)))
-    return _fitted(record, np.repeat(PIECES[(low < PIECES) & (high > PIECES)], 2), CUBIC)
+    return _fitted(record, _double(low, high), CUBIC)
+
+
+def knots_of(low: float, high: float) -> Array:
+    """Knots of piecewise cubics between two shifts [m], as in eq. 27."""
+    return _ended(low, _double(low, high), high, CUBIC)
+
+
+def _double(low: float, high: float) -> Array:
+    return np.repeat(PIECES[(low < PIECES) & (high > PIECES)], 2)
+
+
+def _ended(low: float, inner: Array, high: float, degree: int) -> Array:
+    return np.concatenate([np.full(degree + 1, low), inner, np.full(degree + 1, high)])
 
 
 def _fitted(record: Record, inner: Array, degree: int) -> Fit:
     """Splines of that degree whose conicity times shift explains the yaw's equation best."""
     shift, c = shift_of(record), record.columns
-    ends = (np.full(degree + 1, end) for end in (shift.min(), shift.max()))
-    knots = np.concatenate([next(ends), inner, next(ends)])
+    knots = _ended(shift.min(), inner, shift.max(), degree)
     # half the difference of the rolling radii, from eq. 35
     half = -(I_Z * c["psi_ddot"] + DAMPED * c["psi_dot" + TRUE] + K_PSI * c["psi" + TRUE]) / GAIN
     regressors = BSpline.design_matrix(shift, knots, degree).toarray() * shift[:, None]

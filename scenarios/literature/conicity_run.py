@@ -39,7 +39,7 @@ def response(d: Array) -> dict[str, Array]:
     return {**found, **{n: dot[:, i] for n, i in ACCELERATED.items()}, "conicity": conicity}
 
 
-def simulated(case: Case) -> Record:
+def own_record(case: Case) -> Record:
     """The record of a case, over random irregularity of its deviation or a step at the time of the case."""
     rng, t = np.random.default_rng(case.seed), case.times
     if "alignment_step" in case.true:

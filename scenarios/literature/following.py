@@ -94,3 +94,12 @@ def first_below(t: Array, x: Array, limit: float, since: float) -> float:
     """Time [s] from `since` to the first sample below a limit; inf if there is none."""
     hit = (t >= since) & (x < limit)
     return float(t[int(np.argmax(hit))] - since) if hit.any() else np.inf
+
+
+def moving_mean(x: Array, samples: int) -> Array:
+    """Mean (N,) of the last so many samples of x (N,), of fewer at the beginning."""
+    total = np.cumsum(np.insert(x, 0, 0.0))
+    last = np.arange(1, len(x) + 1)
+    first = np.maximum(last - samples, 0)
+    found: Array = (total[last] - total[first]) / (last - first)
+    return found

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from estimator.record import Array
 from scenarios.drawing.sheet import (
     AFTER,
     BEFORE,
@@ -18,7 +17,7 @@ from scenarios.drawing.sheet import (
     name_axes,
     sheet,
 )
-from scenarios.literature.following import Followed
+from scenarios.literature.following import Followed, moving_mean
 from scenarios.literature.row import Measured
 
 WAYS = {
@@ -41,7 +40,9 @@ def friction_figure(measured: Measured, found: Found) -> Plot:
     for ax, (case, record) in zip(axes.values(), measured, strict=False):
         for way, (colour, label) in WAYS.items():
             f = found[case.name][way]
-            mu0 = _mean(f.value["mu0"]) if way == "a" else f.value["mu0"]
+            mu0 = f.value["mu0"]
+            if way == "a":  # the published filter's estimate moves over its whole range
+                mu0 = moving_mean(np.nan_to_num(mu0), WINDOW)
             ax.plot(*envelope(f.t, mu0), color=colour, linewidth=0.8, label=label)
         b = found[case.name]["b"]
         thin = slice(None, None, 100)
@@ -52,15 +53,6 @@ def friction_figure(measured: Measured, found: Found) -> Plot:
         name_axes(ax, "time [s]", "mu0", case.name.replace("_", " ").replace("-", " to "))
     legend(figure, next(iter(axes.values())))
     return Plot("friction_ukf", figure, "Friction coefficient, estimated three ways.")
-
-
-def _mean(x: Array) -> Array:
-    """Moving mean (N,) of the last samples, as the published filter's estimate moves over its whole range."""
-    total = np.cumsum(np.insert(np.nan_to_num(x), 0, 0.0))
-    last = np.arange(1, len(x) + 1)
-    first = np.maximum(last - WINDOW, 0)
-    mean: Array = (total[last] - total[first]) / (last - first)
-    return mean
 
 
 def alignment_figure(measured: Measured, found: Found) -> Plot:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.filters.bounds import Transform, bounded
-from estimator.filters.estimator import Estimate
+from estimator.filters.estimator import Adaptation, Estimate
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Spread, Ukf
 from estimator.filters.unknown_input import Shaped
@@ -69,10 +69,13 @@ def task(case: Case, fmu: Path) -> Task:
     return Task(fmu, unknown, declared)
 
 
-def as_published(case: Case, record: Record, fmu: Path, per: float = DT) -> Followed:
+def as_published(
+    case: Case, record: Record, fmu: Path, per: float = DT, adapt: Adaptation | None = None
+) -> Followed:
     """(a): outputs only, no alignment in the filter, the source's P0, Q, R, spread and clipping.
 
     per: s, in which Q comes in; the source does not say whether its Q is that of a step or of a second.
+    adapt: of Q and R to the innovations, which the source names as its next step.
     """
     ours = task(case, fmu)
     start, q = np.sqrt(SOURCE_P0), np.sqrt(np.array(SOURCE_Q) / per)
@@ -81,7 +84,7 @@ def as_published(case: Case, record: Record, fmu: Path, per: float = DT) -> Foll
     unknown = UnknownParameter("mu0", ours.parameter.start, start[4], clipped, q[4])
     with Joint(fmu, MEASURED, states, [unknown], constants={"V": V, **ours.declared}, dt=DT) as joint:
         begun: Estimate = joint.start()
-        filter = Ukf(joint, begun, joint.noise, np.diag(SOURCE_R), DT, spread=SOURCE_SPREAD)
+        filter = Ukf(joint, begun, joint.noise, np.diag(SOURCE_R), DT, adapt=adapt, spread=SOURCE_SPREAD)
         return follow(filter, joint, record.t, record.table(()), record.table(MEASURED))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from scenarios.literature.case import Case, Record, Source
 from scenarios.literature.outcome import Outcome
+from scenarios.literature.twin import twin
 
 Tell = Callable[[str], None]
 Measured = Sequence[tuple[Case, Record]]
@@ -16,7 +17,7 @@ class Row:
     """One estimate of the literature, rebuilt. model: of the FMU that its filters use.
 
     rebuilt(cases with their records, FMU, tell) makes the outcome; tell gets a line of progress.
-    simulated: makes a record by the row's own equations, where they are not the FMU's.
+    simulated: what makes records where none are given, from the FMU or by the row's own equations.
     """
 
     name: str
@@ -25,4 +26,4 @@ class Row:
     model: str
     cases: tuple[Case, ...]
     rebuilt: Callable[[Measured, Path, Tell], Outcome]
-    simulated: Source | None = None
+    simulated: Callable[[Path], Source] = twin

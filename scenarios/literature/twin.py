@@ -24,6 +24,7 @@ BAND = (2 * np.pi / 60.0, 2 * np.pi / 3.0)  # rad/m, wavelengths of 3 to 60 m
 RUN_IN = 40.0  # m, over which irregularities grow from nothing
 LINES = 160
 AXLES = 19.0  # m between the bogie centres
+WHEELBASE = 2.56  # m of a bogie
 TORQUE = 852.0  # N.m, thesis 4.5
 REST = 5.0  # s without torque at the beginning and the end, there
 WHEEL, GEAR = 0.5, 5.0  # m, 1: rolling radius and gearbox of the driven wheelset
@@ -98,6 +99,17 @@ def _alignment(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Arra
     return {"y_irr": y, "y_irr_dot": y_dot}
 
 
+def _under_bogie(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    first = _alignment(case, t, rng)
+    later = t - WHEELBASE / case.speed  # before its begin, what was there
+    second = {name: np.interp(later, t, samples) for name, samples in first.items()}
+    return {
+        name.replace("y_irr", f"y_irr_{i}"): samples
+        for i, felt in ((1, first), (2, second))
+        for name, samples in felt.items()
+    }
+
+
 def _rails(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
     s = case.speed * t
     both = np.concatenate([s, s - AXLES])
@@ -139,12 +151,14 @@ def _synchronous(supply: float) -> dict[str, float]:
 
 INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
     "wheelset": _alignment,
+    "bogie": _under_bogie,
     "vehicle7dof": _rails,
     "testrig": _torque,
     "traction": _pulls,
 }
 STARTS: dict[str, Callable[[float], dict[str, float]]] = {
     "wheelset": lambda speed: {"V": speed},
+    "bogie": lambda speed: {"V": speed},
     "traction": _rolling,
     "testrig": _synchronous,
 }

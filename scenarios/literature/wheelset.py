@@ -1,13 +1,14 @@
 """Shared parts of the wheelset's rows: measurements, filters with and without the alignment, shaping."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from estimator.filters.bounds import bounded
+from estimator.filters.estimator import Adaptation
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Ukf
 from estimator.filters.unknown_input import Shaped
@@ -40,11 +41,16 @@ SHAPES = tuple((f, d) for f in (1.0, 1.5, 2.0, 2.5) for d in (0.7, 1.0, 1.5))  #
 
 @dataclass(frozen=True)
 class Task:
-    """The problem of a wheelset filter: one unknown parameter, the others as declared."""
+    """The problem of a wheelset filter: one unknown parameter, the others as declared.
+
+    noise: of the sensors as the filter takes it; adapt: whether it adapts the noise to its innovations.
+    """
 
     fmu: Path
     parameter: UnknownParameter
     declared: Mapping[str, float]
+    noise: Mapping[str, float] = field(default_factory=lambda: NOISE)
+    adapt: Adaptation | None = None
 
     def known(self, record: Record, more: Sequence[UnknownParameter] = ()) -> Followed:
         """With the alignment known, and more unknown parameters."""
@@ -93,7 +99,7 @@ class Task:
         return Joint(self.fmu, MEASURED, STATES, parameters, unknown, inputs, constants, DT)
 
     def _followed(self, joint: Joint, record: Record, u: np.ndarray) -> Followed:
-        filter = Ukf(joint, joint.start(), joint.noise, variances(NOISE), DT)
+        filter = Ukf(joint, joint.start(), joint.noise, variances(self.noise), DT, adapt=self.adapt)
         return follow(filter, joint, record.t, u, record.table(MEASURED))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from scenarios.literature import ROWS
 from scenarios.literature.case import TIME, Case, Record
+from tests.helpers.rows_bogie import of_bogie
 from tests.helpers.rows_charles import of_charles
 from tests.helpers.rows_mal import of_mal, piece
 from tests.helpers.rows_mal_cone import of_cone
@@ -43,6 +44,8 @@ def truth(case: Case, form: Form = SAME) -> Record:
         return of_cone(case)
     if case.model == "testrig" and case.judged:
         return of_rig_fastsim(case)
+    if case.model == "bogie":
+        return of_bogie(case)
     if case.judged:
         return of_mal(case, form)
     if case.model == "wheelset":

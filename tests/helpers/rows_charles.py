@@ -28,8 +28,11 @@ def conicity(y: np.ndarray) -> np.ndarray:
     return TREAD + (ROOT - TREAD) / (1 + np.exp(-(np.abs(y) - 3e-3) / 0.5e-3))
 
 
-def of_charles(case: Case) -> Record:
-    """A run over random irregularity, or over a step of it, by Runge-Kutta of order 4."""
+def of_charles(case: Case, rolls_over_track: bool = False) -> Record:
+    """A run over random irregularity, or over a step of it, by Runge-Kutta of order 4.
+
+    rolls_over_track: whether it rolls by its motion over the track, or by its own, as in the source.
+    """
     rng, t = np.random.default_rng(case.seed), case.times
     fine = np.arange(PARTS * (len(t) - 1) + 1) * case.dt / PARTS
     if "alignment_step" in case.true:
@@ -37,31 +40,36 @@ def of_charles(case: Case) -> Record:
     else:
         sd = case.true["alignment_sd"]
         run = random_alignment(rng, fine, case.speed, sd, LIMIT * sd)
-    true = motion(run.y_irr, case.dt / PARTS, case.speed)
+    felt = run.y_irr_dot if rolls_over_track else np.zeros_like(run.y_irr)
+    true = motion(run.y_irr, felt, case.dt / PARTS, case.speed)
     seen = {n: true[n] + rng.normal(0.0, std, len(t)) for n, std in case.noise.items()}
     given = {"y_irr": run.y_irr[:: 2 * PARTS]}
     true["conicity"] = conicity(true["y"] - given["y_irr"])
     return Record({TIME: t, **given, **seen, **{n + TRUE: true[n] for n in case.judged}})
 
 
-def motion(irregularity: np.ndarray, h: float, V: float) -> dict[str, np.ndarray]:
-    """Motion and accelerations at every PARTS-th step of h [s]; irregularity (2 n - 1,), m, by half steps."""
+def motion(irregularity: np.ndarray, felt: np.ndarray, h: float, V: float) -> dict[str, np.ndarray]:
+    """Motion and accelerations at every PARTS-th step of h [s].
+
+    irregularity (2 n - 1,), m, by half steps; felt: its rate as far as it makes the wheelset roll, m/s.
+    """
     p = TABLE_1
     start, table = -WIDE, conicity(np.arange(-WIDE, WIDE, 1e-5)).tolist()
 
-    def rates(x, d):
+    def rates(x, d, d_dot):
         y, psi, y_dot, psi_dot, y_m, y_m_dot = x
         place = min(max((y - d - start) / 1e-5, 0.0), len(table) - 1.001)
         i = int(place)
         cone = table[i] + (place - i) * (table[i + 1] - table[i])
-        slide = y_dot * (1 + p["r0"] * cone / p["l"]) - V * psi
+        over = y_dot - d_dot
+        slide = y_dot + p["r0"] * cone / p["l"] * over - V * psi
         spring = p["k_y"] * (y_m - y) + p["f_y"] * (y_m_dot - y_dot)
         F = -2 * p["f22"] / V * slide - 2 * p["f23"] / V * psi_dot - p["W"] * cone / p["l"] * (y - d) + spring
         N = -2 * p["f11"] * (p["l"] * cone / p["r0"] * (y - d) + p["l"] ** 2 / V * psi_dot)
         N += (
             2 * p["f23"] / V * slide
             - 2 * p["f33"] / V * psi_dot
-            - p["I_wy"] * V * cone / p["l"] / p["r0"] * y_dot
+            - p["I_wy"] * V * cone / p["l"] / p["r0"] * over
         )
         N += p["W"] * cone * p["l"] * psi - p["k_psi"] * psi
         return y_dot, psi_dot, F / p["m"], N / p["I"], y_m_dot, -spring / p["m_m"]
@@ -69,17 +77,17 @@ def motion(irregularity: np.ndarray, h: float, V: float) -> dict[str, np.ndarray
     def moved(x, h, k):
         return tuple(a + h * b for a, b in zip(x, k, strict=True))
 
-    d, x, rows = irregularity.tolist(), (0.0,) * 6, []
+    d, x, rows = list(zip(irregularity.tolist(), felt.tolist(), strict=True)), (0.0,) * 6, []
     last = len(d) // 2
     for i in range(last + 1):
-        k1 = rates(x, d[2 * i])
+        k1 = rates(x, *d[2 * i])
         if i % PARTS == 0:
             rows.append((*x, k1[2], k1[3], k1[5]))
         if i == last:
             break
-        k2 = rates(moved(x, h / 2, k1), d[2 * i + 1])
-        k3 = rates(moved(x, h / 2, k2), d[2 * i + 1])
-        k4 = rates(moved(x, h, k3), d[2 * i + 2])
+        k2 = rates(moved(x, h / 2, k1), *d[2 * i + 1])
+        k3 = rates(moved(x, h / 2, k2), *d[2 * i + 1])
+        k4 = rates(moved(x, h, k3), *d[2 * i + 2])
         x = tuple(a + h / 6 * (b + 2 * (c + e) + f) for a, b, c, e, f in zip(x, k1, k2, k3, k4, strict=True))
     names = ("y", "psi", "y_dot", "psi_dot", "y_m", "y_m_dot", "y_ddot", "psi_ddot", "y_m_ddot")
     return dict(zip(names, np.array(rows).T, strict=True))

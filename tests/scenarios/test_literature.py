@@ -357,11 +357,33 @@ def test_the_profile_is_found_bin_by_bin_and_gauge_blurs_it():
     for name in ("alignment", "gauge too"):
         case = case_of("profile_rls", name, duration=16.0)
         outcome = profile.rebuilt([(case, truth(case))], fmu=None, tell=print)
-        errors[name] = [f.ours for f in outcome.findings if "RMSE" in f.what]
+        alone = [f for f in outcome.findings if not f.what.startswith("gauge known")]
+        errors[name] = [f.ours for f in alone if "RMSE" in f.what]
     sums_of_radii, differences, _, angles = zip(*errors.values(), strict=True)
     for alone, blurred in (sums_of_radii, differences, angles):
         assert alone < 0.02
         assert blurred > 5 * alone
+
+
+def test_with_its_gauge_known_the_sum_of_the_radii_stays_in_the_region_and_that_of_the_angles_does_not():
+    """As Ward et al. 2010 say of their Fig. 7; without the gauge, both leave it."""
+    case = case_of("profile_rls", "gauge too", duration=30.0)
+    outcome = profile.rebuilt([(case, truth(case))], fmu=None, tell=print)
+    share = {f.what.removesuffix(": share of bins in the region"): f.ours for f in outcome.findings}
+    assert share["gauge known, r_L + r_R"] >= profile.IN_REGION
+    assert share["r_L + r_R"] < 0.7
+    assert share["gauge known, delta_L + delta_R"] < 0.5
+    assert share["gauge known, r_L - r_R"] == share["gauge known, delta_L - delta_R"] == 1.0
+
+
+def test_what_the_gauge_does_is_nothing_where_there_is_none():
+    record = truth(case_of("profile_rls", "alignment", duration=4.0))
+    X, _ = profile.regression(record, gauge_known=True)
+    of_gauge = [i for i, (power, _) in enumerate(profile.GAUGED) if power]
+    changes = X[:, :, len(profile.KNOWN_TO) :].reshape(len(X), 2, len(profile.GAUGED), 2)
+    assert not changes[:, :, of_gauge].any()
+    alone, known = (profile.identified(record, gauge_known) for gauge_known in (False, True))
+    np.testing.assert_allclose(alone.value[:, 1], known.value[:, 1], atol=1e-4)
 
 
 def test_records_of_other_equations_are_not_made_by_the_fmu():

@@ -7,7 +7,6 @@ import pytest
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
-from fmus.errors import BadInput
 from scenarios.cli.app import loaded
 from scenarios.literature import ROWS
 from scenarios.literature import conicity as cone
@@ -188,17 +187,12 @@ def test_the_last_of_a_response_is_made_of_the_slow_modes_of_the_linear_equation
 
 def test_a_row_with_equations_of_its_own_makes_its_records():
     case = case_of("conicity", "generic", duration=2.0)
-    record = cone.own_record(case)
+    record = cone.simulated(None)(case)
     assert set(record.columns) == set(case.columns)
     assert record.columns["y_irr"].std() == pytest.approx(cone.DEVIATION)
     seen, true = record.columns["y_ddot"], record.columns["conicity" + TRUE]
     assert np.isfinite(seen).all()
     np.testing.assert_allclose(true, conicity(shift_of(record)), rtol=1e-9)
-
-
-def test_a_record_of_other_equations_is_asked_for():
-    with pytest.raises(BadInput, match="give records, or choose case 'generic'"):
-        cone.own_record(case_of("conicity", "S1002 on 60E1"))
 
 
 @pytest.mark.slow
