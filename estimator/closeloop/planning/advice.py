@@ -38,7 +38,7 @@ def next_experiment(baseline: Baseline, members: Sequence[Hypothesis], twins: Tw
     """
     try:
         question = _question(baseline)
-        sets = _same(question, members, twins)
+        sets = _same(question, baseline.problem.finer, members, twins)
     except FmuError:
         return splitting(members)
     alike = [_inseparable(some) for some in sets if len(some) > 1]
@@ -70,13 +70,15 @@ def _experiment(question: Question, baseline: Baseline, members: Sequence[Hypoth
     return [*declared, *sentences(found, question.length)]
 
 
-def _same(question: Question, members: Sequence[Hypothesis], twins: Twins) -> list[list[Hypothesis]]:
+def _same(
+    question: Question, finer: int, members: Sequence[Hypothesis], twins: Twins
+) -> list[list[Hypothesis]]:
     """The members in sets that act alike under any inputs: twins in this record, and in another one too.
 
     The other record has inputs that all move on their own, so that nothing acts alike by its symmetry. All
-    outputs that the FMU has are compared.
+    outputs that the FMU has are compared. finer: parts of a step with which the members were fitted.
     """
-    shaken_ = with_run(question.problem, shaken(question.problem))
+    shaken_ = replace(with_run(question.problem, shaken(question.problem)), finer=finer)
 
     def shown(h: Hypothesis) -> Array | None:
         try:
@@ -139,7 +141,11 @@ def _class_with_advice(question: Question, baseline: Baseline, members: Sequence
 
 
 def _question(baseline: Baseline) -> Question:
-    """The question of a record that exists: its measured outputs, and all that could be measured too."""
+    """The question of a record that exists: its measured outputs, and all that could be measured too.
+
+    The steps are the usual ones, also where an effect was fitted in finer ones: the plan looks at the FMU
+    without effects, and at what these change to first order.
+    """
     problem, record = baseline.problem, baseline.problem.record
     run, outside = record.runs[0], problem.builder.outside()
     own = outside.model.variables if outside.model else outside.description.variables
@@ -150,7 +156,7 @@ def _question(baseline: Baseline) -> Question:
         record, outputs=names, noise_std=np.concatenate([record.noise_std, none]),
         runs=(replace(run, fit=every, choose=~every, test=~every),),
     )  # fmt: skip
-    whole = replace(problem, record=asked)
+    whole = replace(problem, record=asked, finer=1)
     [y] = whole.simulate(baseline.hypothesis.fit.theta)
     noise = baseline.noise.std * np.sqrt(baseline.noise.redundancy)
     std = np.concatenate([noise, _assumed_noise(y[:, len(noise) :])])
