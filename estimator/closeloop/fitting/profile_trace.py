@@ -28,10 +28,9 @@ from estimator.weighting import Weighting
 from fmus.aside import set_aside
 
 WIDTH = 1.96  # standard errors: 95 %
-MOVES = 30  # largest number of simulations for one end of an interval
+MOVES = 20  # largest number of simulations for one end of an interval
 HIGHER = 2.0  # times the width of an interval: a move to a place as far from the optimum is taken back
 DEEPER = 4.0  # reduction of the sum of squares at a place, above which the hypothesis is fitted from there
-EQUAL = 1e-9  # relative difference of two lengths, below which they are equal
 
 
 def ends(
@@ -135,7 +134,7 @@ class Trace:
         self._r, self._gram, self._gradient = start.fit.residual, start.gram, start.gradient
         self._secants: list[tuple[Array, Array]] = []  # corrections of the slopes: (m,) along a move (n,)
         self._rise = (WIDTH * self.unit) ** 2  # of the sum of squares at the end
-        self._most = np.inf  # length of the next move of the unknown
+        self._most = np.inf  # length of the next move, in scales
         self._whole = False  # whether the last move was to lead to the end
         self._left = MOVES
 
@@ -150,15 +149,15 @@ class Trace:
         d, held = np.zeros(len(self.x)), np.arange(len(self.x)) == i
         while True:
             along, reached, rest, follow = self._predicted(np.where(held, d, 0.0), held)
-            d[i] = self._side * np.clip(along, max(min(back, 0.0), -self._most), min(room, self._most))
+            d[i] = self._side * np.clip(along, min(back, 0.0), room)
             d[~held] = rest + follow * d[i]
             out = ~held & ((d < low) | (d > high))
             if not out.any():
                 break
             d[out], held = np.clip(d, low, high)[out], held | out
-        gone = self._side * float(d[i])
-        self._whole = reached and (gone >= room * (1 - EQUAL) or abs(gone - along) <= EQUAL * abs(along))
-        return d
+        length = float(np.linalg.norm(d))
+        self._whole = reached and back <= along and length <= self._most
+        return d if length <= self._most else d * (self._most / length)
 
     def _predicted(self, d: Array, held: Array) -> tuple[float, bool, Array, Array]:
         """How far the slopes let the unknown go, and how those that are not held follow.
@@ -208,5 +207,5 @@ class Trace:
 
     def _turned_back(self, d: Array) -> None:
         """Stay where the trace is; the next move is at most half as long."""
-        self._most, self.within = abs(float(d[self._i])) / 2, False
+        self._most, self.within = float(np.linalg.norm(d)) / 2, False
         self.ended = self._left == 0
