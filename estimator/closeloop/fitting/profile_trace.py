@@ -23,7 +23,7 @@ from estimator.closeloop.fitting.fit import REFUSED, in_turn
 from estimator.closeloop.hypotheses.fitted import WIDE, Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem
-from estimator.record import Array
+from estimator.record import Array, BoolArray
 from estimator.weighting import Weighting
 from fmus.aside import set_aside
 
@@ -159,7 +159,7 @@ class Trace:
         self._whole = reached and back <= along and length <= self._most
         return d if length <= self._most else d * (self._most / length)
 
-    def _predicted(self, d: Array, held: Array) -> tuple[float, bool, Array, Array]:
+    def _predicted(self, d: Array, held: BoolArray) -> tuple[float, bool, Array, Array]:
         """How far the slopes let the unknown go, and how those that are not held follow.
 
         d: moves (n,) of the held ones. If no place reaches the interval, it goes where the sum of squares is
