@@ -157,12 +157,11 @@ class Chain:
         judgement = confirmed_on_test(baseline, judgement).after(before)
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")
-            members = judgement.members
-            words = self.stages.done("next experiment", lambda: next_experiment(baseline, members))
+            members, twins = judgement.members, shown.twins
+            words = self.stages.done("next experiment", lambda: next_experiment(baseline, members, twins))
             judgement = replace(judgement, next_experiment=words)
-        found = replace(
-            found, baseline=baseline, singles=tuple(singles), pairs=tuple(pairs), judgement=judgement
-        )
+        every = tuple(shown.twins.joined(singles))
+        found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
         if judgement.verdict != "unexplained":
             return found
         self.tell("free form", "fitting a force of free form")
@@ -191,7 +190,7 @@ class Chain:
         singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis],
     ) -> tuple[Baseline, list[Hypothesis], list[Hypothesis], Judgement]:  # fmt: skip
         """The baseline with which the answer was simulated, single hypotheses and pairs, best first, and the
-        judgement with its members as they were judged.
+        judgement with its members as they were judged. Twins are members, but no hypotheses of their own.
 
         The steps of the simulation are halved if that would move a member. The standard errors of every
         member are taken from its likelihood profile, which may also move its fit. If it does, the nearest
@@ -210,12 +209,13 @@ class Chain:
                 tried = True
                 singles = self._search(shown).instead(singles)
                 continue
-            members = [h for h in judgement.members if h.key not in asked]
-            if not members:
+            members = shown.twins.reduced(judgement.members, singles)
+            new = [h for h in members if h.key not in asked]
+            if not new:
                 break
             self.tell("intervals", "computing standard errors from the likelihood profile")
             fitter = self.fitter(shown.baseline, self.jobs)
-            shown, again = _in_fine_steps(fitter, shown, members, judgement.members)
+            shown, again = _in_fine_steps(fitter, shown, new, members)
             fitter = self.fitter(shown.baseline, self.jobs)
             found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, again, singles))
             asked |= {h.key for h in again}
@@ -225,14 +225,19 @@ class Chain:
                 found = self.stages.done(f"careful {turn}", partial(_with_rivals, fitter, found, others))
             final = {h.key: h for h in found}
             singles, pairs = (form.ranked([final.get(h.key, h) for h in some]) for some in (singles, pairs))
-        return shown.baseline, list(singles), list(pairs), judgement.of([*singles, *pairs])
+        return (
+            shown.baseline,
+            list(singles),
+            list(pairs),
+            judgement.of([*shown.twins.joined(singles), *pairs]),
+        )
 
     def _judged(
         self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
         pairs: Sequence[Hypothesis], stage: str,
     ) -> tuple[Judgement, Judgement]:  # fmt: skip
         """The judgement by comparison of the fits, and the same after the test of the law's curve."""
-        leading = judge(shown.baseline, singles, pairs, shown.began)
+        leading = judge(shown.baseline, shown.twins.joined(singles), pairs, shown.began)
         return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))
 
 

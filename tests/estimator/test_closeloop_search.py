@@ -1,4 +1,4 @@
-"""How close-loop finds its way: inputs, linear answers, smoothing, moments, twins, lookalikes, onsets."""
+"""How close-loop finds its way: inputs, linear answers, smoothing, moments, lookalikes, onsets."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.hypotheses.relations import becomes, twins, with_twins
+from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.grouped import group_size, grouped
@@ -246,22 +246,6 @@ def test_what_is_always_there_has_no_moment():
     promise = Promise((c,), 1.0, {})
     steps = Steps(np.arange(3.0), nothing_calibrated(np.ones(3)))
     assert at_their_onsets(steps, steps.fit, [promise], 3) == [promise]
-
-
-# ---- twins
-
-
-def test_effects_that_act_alike_are_named_together():
-    g, h = np.arange(4.0)[:, None], np.ones((4, 1))
-    one, two, other = (candidate("coulomb_friction", at) for at in ("wheelset_yaw", "primary_yaw", "contact"))
-    viscous = candidate("viscous_damping", "primary_yaw")
-    known = twins([(one, g), (two, g.copy()), (other, h), (viscous, g)])
-    assert known == {"coulomb_friction@wheelset_yaw": ("coulomb_friction@primary_yaw",)}
-    fit = replace(nothing_calibrated(np.ones(4)), unknowns=one.unknowns, values=np.array([3.0]))
-    first, second = with_twins([Hypothesis((one,), fit, (np.ones((2, 2)),))], known)
-    assert (first.label, second.label) == ("coulomb_friction@wheelset_yaw", "coulomb_friction@primary_yaw")
-    assert second.theta == {"coulomb_friction_primary_yaw_F_0": 3.0}
-    assert second.residuals is first.residuals
 
 
 # ---- lookalikes

@@ -1,60 +1,12 @@
-"""Relations between effects that hold for every record: twins, limits of laws, and groups of parameters.
+"""Relations between effects that hold for every record: limits of laws, and groups of parameters."""
 
-Twins act on the FMU in exactly the same way, so that no record can tell them apart and only one of them is
-fitted. Effects that one particular record cannot tell apart are found in decision/equivalence.py.
-"""
-
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from itertools import combinations, permutations
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.question.problem import Unknown
-from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.effects import EFFECTS
-
-Twins = Mapping[str, tuple[str, ...]]  # labels of twins by the label of the one that is fitted
-
-
-def twins(change: Sequence[tuple[Candidate, Array]]) -> dict[str, tuple[str, ...]]:
-    """Labels of effects of one kind whose regressors are identical to the bit, by the label of the first."""
-    changes: dict[str, list[bytes]] = {}
-    kinds: dict[str, str] = {}
-    for c, g in change:
-        if not c.is_fault:
-            changes.setdefault(c.label, []).append(g.tobytes())
-            kinds[c.label] = c.kind
-    alike: dict[int, list[str]] = {}
-    for label, parts in changes.items():
-        alike.setdefault(hash((kinds[label], *parts)), []).append(label)
-    return {first: tuple(others) for first, *others in alike.values() if others}
-
-
-def with_twins(found: Sequence[Hypothesis], known: Twins) -> list[Hypothesis]:
-    """Hypotheses of one candidate, each followed by the same hypothesis for every twin."""
-    every = []
-    for h in found:
-        others = known.get(h.label, ())
-        every += [h, *(_moved(h, label.partition("@")[2]) for label in others)]
-    return every
-
-
-def _moved(h: Hypothesis, location: str) -> Hypothesis:
-    """The same hypothesis with its candidate at another location."""
-    (c,) = h.candidates
-    here, there = (f"{c.kind}_{at}_" for at in (c.location, location))
-
-    def named(name: str) -> str:
-        return there + name.removeprefix(here) if name.startswith(here) else name
-
-    def moved(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
-        return tuple(replace(u, name=named(u.name)) for u in unknowns)
-
-    fixed = {named(n): v for n, v in c.fixed.items()}
-    twin = replace(c, location=location, amplitudes=moved(c.amplitudes), shape=moved(c.shape), fixed=fixed)
-    return replace(h, candidates=(twin,), fit=replace(h.fit, unknowns=moved(h.fit.unknowns)))
 
 
 def limits(kind: str) -> tuple[str, ...]:

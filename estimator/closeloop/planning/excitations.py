@@ -14,6 +14,7 @@ LEVEL = 0.2  # share of an input's mean by which its level is changed, if it doe
 STEPS = 4  # levels of an input with steps
 RAMP = 0.02  # share of the record over which a step is rounded, so that its rate exists
 SLOWEST, SAMPLES_PER_PERIOD = 2.0, 20.0  # periods of a sweep in the record at its start; its end
+GOLDEN = (5**0.5 - 1) / 2  # share of a period between the phases of two inputs; no two come together
 RANGE_LEFT = 10.0  # times the planned largest value, beyond which the FMU has left the planned motion
 
 
@@ -34,11 +35,16 @@ def _amplitude(u: Array, nominal: float) -> float:
     return max(float(np.std(u)), LEVEL * abs(float(np.mean(u)))) or LEVEL * nominal
 
 
+def _sweep(s: Array, samples: int, phase: float = 0.0) -> Array:
+    """A sine (N,) of growing frequency over times from 0 to 1 (N,); phase in periods."""
+    last = samples / SAMPLES_PER_PERIOD
+    return np.asarray(np.sin(2 * np.pi * (phase + SLOWEST * s + (last - SLOWEST) * s**2 / 2)))
+
+
 def changes(u: Array, s: Array, samples: int, nominal: float) -> dict[str, Array]:
     """The changed inputs (N,) by the change in words; s: (N,) time over the record, from 0 to 1."""
     a, mean = _amplitude(u, nominal), float(np.mean(u))
-    last = samples / SAMPLES_PER_PERIOD
-    sweep = np.sin(2 * np.pi * (SLOWEST * s + (last - SLOWEST) * s**2 / 2))
+    sweep = _sweep(s, samples)
     levels = np.sign(np.sin(2 * np.pi * (STEPS / 2) * (s + 1e-9)))
     width = max(1, round(RAMP * samples))
     smooth = np.convolve(np.pad(levels, (width, width), "edge"), np.ones(width) / width, "same")[width:-width]
@@ -74,12 +80,33 @@ def excitations(problem: Problem, inputs: Sequence[str]) -> tuple[list[Excitatio
                 refused[f"{name} {words}"] = f"outside of the FMU's limits {low:g} to {high:g}"
                 continue
             given = run.u.copy()
-            given[:, j] = u
-            if f"{name}_dot" in names:
-                rate = names.index(f"{name}_dot")
-                given[:, rate] += np.gradient(u - run.u[:, j], run.t)
+            _put(given, names, j, u, run)
             found.append(Excitation(name, words, replace(run, u=given)))
     return found, refused
+
+
+def _put(given: Array, names: Sequence[str], j: int, u: Array, run: Run) -> None:
+    """Write an input u (N,) into those of a run (N, n_u), and its rate if that is an input too."""
+    given[:, j] = u
+    if f"{names[j]}_dot" in names:
+        given[:, names.index(f"{names[j]}_dot")] += np.gradient(u - run.u[:, j], run.t)
+
+
+def shaken(problem: Problem) -> Run:
+    """The run with a sweep added to every input, each with a phase of its own, within the FMU's limits.
+
+    No two inputs move alike then, so that only what acts alike under any inputs acts alike under these.
+    """
+    run, names = problem.record.runs[0], problem.record.inputs
+    known = problem.plant.fmu.description.variables
+    s, given = (run.t - run.t[0]) / (run.t[-1] - run.t[0]), run.u.copy()
+    for i, name in enumerate(changeable(problem)):
+        j, v = names.index(name), known[name]
+        sweep = _sweep(s, len(s), GOLDEN * i)
+        moved = run.u[:, j] + _amplitude(run.u[:, j], v.nominal or 1.0) * sweep
+        low, high = (end if end is not None else side * np.inf for end, side in ((v.min, -1), (v.max, 1)))
+        _put(given, names, j, np.clip(moved, low, high), run)
+    return replace(run, u=given)
 
 
 def bearable(problem: Problem, theta: Mapping[str, float], planned: Array) -> bool:

@@ -202,4 +202,4 @@ def _kept(n: int) -> tuple[NDArray[np.intp], float]:
 
 def _thinned(columns: Array, n_y: int, kept: NDArray[np.intp]) -> Array:
     """Columns (N n_y, k) at the kept samples, (n, n_y, k)."""
-    return columns.reshape(-1, n_y, columns.shape[1])[kept]
+    return columns.reshape(len(columns) // n_y, n_y, columns.shape[1])[kept]

@@ -13,6 +13,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.hypotheses.twins import Twins
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
@@ -50,6 +51,11 @@ class Screened:
     def problem(self) -> Problem:
         """The problem that is solved."""
         return self.baseline.problem
+
+    @cached_property
+    def twins(self) -> Twins:
+        """The candidates that change the outputs exactly as another one."""
+        return Twins.among(self.change)
 
     @property
     def open_to_form(self) -> bool:

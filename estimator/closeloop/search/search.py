@@ -1,6 +1,6 @@
 """Searches for the effects that explain a residual: brief fits, long fits, pairs, and similar laws."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,7 +9,6 @@ from estimator.closeloop.fitting.fitter import BRIEF, Fitter
 from estimator.closeloop.fitting.refined import evenly
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
 from estimator.closeloop.hypotheses.promise import Promise, distinct
-from estimator.closeloop.hypotheses.relations import twins, with_twins
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
@@ -34,7 +33,7 @@ class Search:
     tell: Progress
 
     def run(self) -> tuple[list[Hypothesis], list[Hypothesis]]:
-        """Single hypotheses and pairs, best first."""
+        """Single hypotheses, one for each set of twins, and pairs, best first."""
         s = self.screened
         brief, sudden = self._brief()
         singles, pairs = self._finished(brief, sudden)
@@ -43,7 +42,7 @@ class Search:
         if s.explained(ones[:1]):
             pairs = [*pairs, *self._beside(ones[0])]
         twos = s.stages.done("simpler pairs", lambda: self._replaced(pairs))
-        return self._form.ranked(with_twins(ones, self._alike)), twos
+        return ones, twos
 
     def instead(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
         """The single hypotheses, best first, fitted once more from the values of the best one.
@@ -62,23 +61,17 @@ class Search:
         again = fitter.fitted(from_its_values(found, s.problem.policy.search), BRIEF)
         similar = over_the_same(s.screening, Calibration.of(s.fit), found[0], s.change)
         again = [*fitter.to_the_end(again), *fitter.finished(similar)]
-        more = with_twins(again, self._alike)
-        return evenly(fitter, self._form.ranked(best_by_label([*more, *found])))
+        return evenly(fitter, self._form.ranked(best_by_label([*again, *found])))
 
     @property
     def _form(self) -> ModelForm:
         return form_of(self.screened.baseline)
 
     @cached_property
-    def _alike(self) -> Mapping[str, tuple[str, ...]]:
-        """Labels of candidates that change the outputs exactly as another one, by the label of that."""
-        return twins(self.screened.change)
-
-    @cached_property
     def _single(self) -> Changes:
-        """The changes by each candidate, with one candidate for each set of exact twins."""
-        doubled = {label for others in self._alike.values() for label in others}
-        return [(c, g) for c, g in self.screened.change if c.label not in doubled]
+        """The changes by each candidate, with one candidate for each set of twins."""
+        left_out = self.screened.twins.left_out
+        return [(c, g) for c, g in self.screened.change if c.label not in left_out]
 
     @cached_property
     def _promises(self) -> list[Promise]:
@@ -190,7 +183,7 @@ class Search:
         found = self._form.ranked(best_by_label(found))
         if not found:
             return found
-        every = [c for c, _ in s.change]
+        every = [c for c, _ in self._single]
         if whole := self.fitter.finished(in_groups(found, every)):
             found = self._form.ranked(best_by_label([*found, *whole]))
         if s.baseline.noise.known and not s.explained(found[:1]):
