@@ -23,7 +23,7 @@ from numpy.testing import assert_array_equal
 
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
-from fmus.host.instance import CallFailed
+from fmus.host.status import CallFailed
 from fmus.models import MODELS
 from fmus.variables import (
     Input,
