@@ -87,7 +87,16 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     compiler = shutil.which("cc")
     if not compiler:
         pytest.skip("no C compiler 'cc' here to make FMUs with")
-    return {fmi: build_kinds(compiler, tmp_path_factory.mktemp("kinds"), fmi) for fmi in (2, 3)}
+    return {fmi: build_kinds(compiler, tmp_path_factory.mktemp("kinds"), f"kinds_fmi{fmi}") for fmi in (2, 3)}
+
+
+@pytest.fixture(scope="session")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The path of an FMU for model exchange alone, with events of state and time."""
+    compiler = shutil.which("cc")
+    if not compiler:
+        pytest.skip("no C compiler 'cc' here to make an FMU for model exchange with")
+    return build_kinds(compiler, tmp_path_factory.mktemp("ball"), "events_fmi3")
 
 
 @pytest.fixture(scope="session")

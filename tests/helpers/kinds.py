@@ -1,4 +1,4 @@
-"""FMUs in C with arrays, whole numbers and truths, for FMI 3.0 and 2.0; see the equations in their files."""
+"""FMUs in C with arrays, whole numbers, truths and events; see the equations in their files."""
 
 import subprocess
 import zipfile
@@ -78,18 +78,48 @@ DESCRIPTION_2 = """<?xml version="1.0" encoding="UTF-8"?>
   </ModelStructure>
 </fmiModelDescription>
 """
+EVENTS = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Ball" instantiationToken="{ball}">
+  <ModelExchange modelIdentifier="events_fmi3" canGetAndSetFMUState="true"/>
+  <DefaultExperiment startTime="0" stopTime="3" stepSize="0.01"/>
+  <ModelVariables>
+    <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+    <Float64 name="h" valueReference="1" causality="output" initial="exact" start="1" reinit="true"/>
+    <Float64 name="v" valueReference="2" causality="output" initial="exact" start="0" reinit="true"/>
+    <Float64 name="h_dot" valueReference="3" causality="local" derivative="1"/>
+    <Float64 name="v_dot" valueReference="4" causality="local" derivative="2"/>
+    <Float64 name="g" valueReference="5" causality="parameter" variability="tunable" start="9.81"/>
+    <Float64 name="e" valueReference="6" causality="parameter" variability="fixed" start="0.7"/>
+    <Float64 name="floor" valueReference="7" causality="parameter" variability="fixed" start="-1e9"/>
+    <Int32 name="kick" valueReference="8" causality="input" start="0"/>
+    <Int32 name="bounces" valueReference="9" causality="output"/>
+    <Int32 name="quarters" valueReference="10" causality="output"/>
+    <Int32 name="last" valueReference="11" causality="parameter" variability="fixed" start="1000000"/>
+    <Float64 name="z" valueReference="12" causality="local"/>
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="1"/><Output valueReference="2"/><Output valueReference="9"/>
+    <Output valueReference="10"/>
+    <ContinuousStateDerivative valueReference="3"/><ContinuousStateDerivative valueReference="4"/>
+    <InitialUnknown valueReference="3"/><InitialUnknown valueReference="4"/>
+    <InitialUnknown valueReference="9"/><InitialUnknown valueReference="10"/>
+    <EventIndicator valueReference="12"/>
+  </ModelStructure>
+</fmiModelDescription>
+"""
+DESCRIPTIONS = {"kinds_fmi3": DESCRIPTION_3, "kinds_fmi2": DESCRIPTION_2, "events_fmi3": EVENTS}
+NAMES = {"kinds_fmi3": "Kinds.fmu", "kinds_fmi2": "Counted.fmu", "events_fmi3": "Ball.fmu"}
 
 
-def build_kinds(compiler, folder, fmi):
-    """Compile and pack the FMU of a version of FMI; its path."""
-    name = f"kinds_fmi{fmi}"
+def build_kinds(compiler, folder, name):
+    """Compile and pack the FMU of the C file of that name; its path."""
     library = folder / f"{name}{fmpy.sharedLibraryExtension}"
     headers = Path(fmpy.__file__).parent / "c-code"
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC", "-I", headers]
-    subprocess.run([compiler, *strict, FOLDER / f"{name}.c", "-o", library], check=True)
-    path = folder / ("Kinds.fmu" if fmi == 3 else "Counted.fmu")
-    place = fmpy.platform_tuple if fmi == 3 else fmpy.platform
+    subprocess.run([compiler, *strict, FOLDER / f"{name}.c", "-o", library, "-lm"], check=True)
+    path = folder / NAMES[name]
+    place = fmpy.platform_tuple if name.endswith("3") else fmpy.platform
     with zipfile.ZipFile(path, "w") as packed:
-        packed.writestr("modelDescription.xml", DESCRIPTION_3 if fmi == 3 else DESCRIPTION_2)
+        packed.writestr("modelDescription.xml", DESCRIPTIONS[name])
         packed.write(library, f"binaries/{place}/{library.name}")
     return path
