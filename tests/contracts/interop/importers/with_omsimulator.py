@@ -2,11 +2,8 @@
 
 import subprocess
 from pathlib import Path
-from types import MappingProxyType
 
 from tests.contracts.interop.importer import SOLVED, Case, Importer, table, told
-
-ZERO = "takes a dependency on the variable with the value reference 0 for an error"
 
 
 class OMSimulator(Importer):
@@ -17,7 +14,6 @@ class OMSimulator(Importer):
     solver = "cvode"
     sets_start = False
     tolerance = SOLVED
-    fails = MappingProxyType({("native", "CS", 3): ZERO})
     remark = "reads FMI 3.0 for co-simulation only"
 
     @classmethod
