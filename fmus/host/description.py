@@ -121,4 +121,5 @@ class FmuDescription:
     @property
     def states(self) -> list[str]:
         """Names of the outputs whose start value sets a state (`initial="exact"`)."""
-        return [v.name for v in self.variables.values() if v.causality == "output" and v.initial == "exact"]
+        outputs = [v for v in self.variables.values() if v.causality == "output"]
+        return [v.name for v in outputs if v.initial == "exact" and v.variability != "constant"]

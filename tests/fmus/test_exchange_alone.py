@@ -11,11 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from estimator.access.exchange import Exchange, continuous_states
+from estimator.access.probe import probe
+from estimator.access.recipe import Way
 from fmus.drive.model import Drive
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.export.builders.native.build import build_native
-from fmus.host.archive import describe, problems
+from fmus.host.archive import Archive, describe, problems
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu, FmuError, SimulationEnds
 from fmus.host.grading.check import grade
@@ -159,6 +162,9 @@ def test_the_grade_says_what_it_is_fit_for(ball):
     found = grade(ball)
     outcomes = {c.title: c for c in found.checks}
     assert [t for t, c in outcomes.items() if c.passed is False] == ["restart"]  # `quarters` begins anew
+    fit = {f.use: (f.answer, f.sentence) for f in found.fit}
+    assert fit["simulation"][0] == "yes"
+    assert fit["close-loop"][0] == "no"
     assert "'quarters' by" in outcomes["restart"].sentence or "'bounces' by" in outcomes["restart"].sentence
 
 
@@ -170,6 +176,21 @@ def test_our_own_builds_run_alike_by_model_exchange_alone(tmp_path, fmi):
     with Fmu(whole) as one, Fmu(alone(whole, tmp_path / "alone.fmu")) as other:
         assert (one.description.exchange, other.description.exchange) == (None, (2, 0))
         assert_allclose(other.simulate(t, *given), one.simulate(t, *given), rtol=1e-6, atol=1e-7)
+
+
+def test_states_are_estimated_from_one_by_its_derivatives(tmp_path):
+    whole = build_native(Drive(), tmp_path)
+    put, get, start = ["q", "q_dot", "F"], ["q", "q_dot", "q_ddot"], {"q": 0.1, "q_dot": 0.2, "F": 50.0}
+    with Archive(alone(whole, tmp_path / "alone.fmu")) as archive:
+        found = probe(archive, put, get, {}, start, 0.0, 0.01)
+        assert (found.way, continuous_states(archive)) == (Way.EXCHANGE, ("q", "q_dot"))
+        exchange = Exchange(archive, put, get, {}, parts=found.parts)
+        row = exchange.advance(np.array([[0.1, 0.2, 50.0]]), 0.0, 0.01)[0]
+        exchange.close()
+    with Fmu(whole) as fmu:
+        fmu.restart(**start)
+        fmu.step(0.01)
+        assert_allclose(row, fmu.read(get), rtol=1e-7)
 
 
 def test_effects_are_put_around_co_simulation_only(ball, tmp_path):

@@ -6,15 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from estimator.access.exchange import continuous_states
 from fmus.errors import BadInput
 from fmus.host import loop
 from fmus.host.apart.isolation import Isolation
-from fmus.host.archive import describe, problems
+from fmus.host.archive import Archive, describe, problems
 from fmus.host.fmu import Fmu, FmuError, SimulationEnds
 from fmus.host.grading.check import grade
 from fmus.host.master.connections import Connection
 from fmus.host.master.master import Master
 from fmus.host.places import LIMITS
+from tests.helpers.packed import with_description
 
 A = np.arange(1.0, 7.0).reshape(2, 3)
 X = [f"x[{i}]" for i in (1, 2, 3)]
@@ -156,8 +158,6 @@ def test_a_coupled_run_of_whole_numbers_truths_and_elements(kinds, apart):
     ]
     files = {"three": kinds[3], "two": kinds[2]}
     if apart:
-        from fmus.host.archive import Archive
-
         files = {name: Archive(path, Isolation()) for name, path in files.items()}
     inputs = {"three.n": ([0.0, 1.0], [1.0, 2.0]), "three.u[1]": "sin(t)"}
     with Master(files, wires, step=0.125, inputs=inputs, initial={"three.x[2]": 0.0}) as master:
@@ -213,8 +213,21 @@ def test_the_grade_is_clean(kinds, fmi):
 
 
 def test_an_fmu_that_ends_early_is_graded_on_what_it_does(kinds, tmp_path):
-    from tests.helpers.packed import with_description
-
     path = with_description(kinds[3], tmp_path / "short.fmu", b'start="1e9"', b'start="2"')
     found = grade(path)
     assert [c.title for c in found.checks if c.passed is False] == []
+
+
+def test_states_in_arrays_are_no_states_to_estimate(kinds, tmp_path):
+    array = b'<Float64 name="x_dot" valueReference="20" derivative="3"><Dimension start="3"/></Float64>'
+    end, unknown = b'<Float64 name="end"', b'<InitialUnknown valueReference="4"/>'
+    changes = {
+        b"<CoSimulation": b'<ModelExchange modelIdentifier="kinds_fmi3"/><CoSimulation',
+        end: array + end,
+        unknown: b'<ContinuousStateDerivative valueReference="20"/>' + unknown,
+    }
+    path = kinds[3]
+    for i, (old, new) in enumerate(changes.items()):
+        path = with_description(path, tmp_path / f"{i}.fmu", old, new)
+    with Archive(path) as archive, pytest.raises(BadInput, match="its state 'x' is no scalar real"):
+        continuous_states(archive)
