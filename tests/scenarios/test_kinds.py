@@ -13,7 +13,7 @@ from fmus.errors import BadInput
 from fmus.host.archive import describe
 from fmus.host.master.recording import read_recording
 from scenarios.cli.app import run_safely
-from scenarios.comparing import compare
+from scenarios.comparing.comparing import compare
 from scenarios.exchange import export_ssp, import_ssp
 from scenarios.experiment.experiment import check_names, load_experiment
 from scenarios.simulating import run
@@ -52,8 +52,8 @@ fmu = "{}"
 data = "data.csv"
 time = "time"
 [split]
-identify = [0.0, 6.0]
-test = [6.0, 12.0]
+identify = [0.0, 7.0]
+test = [7.0, 14.0]
 [parameters]
 {}
 [inputs]
@@ -139,8 +139,8 @@ def test_a_run_that_an_fmu_ends_says_so(kinds, tmp_path, capsys):
 
 
 def experiment(kinds, folder, output, parameters=""):
-    t = 0.125 * np.arange(97)
-    pd.DataFrame({"time": t, "n": np.arange(97) % 5, "y": t}).to_csv(folder / "data.csv", index=False)
+    t = 0.125 * np.arange(113)
+    pd.DataFrame({"time": t, "n": np.arange(113) % 5, "y": t}).to_csv(folder / "data.csv", index=False)
     file = folder / "experiment.toml"
     file.write_text(EXPERIMENT.format(kinds[2], parameters, output))
     return file
