@@ -18,7 +18,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from fmus.host.instance import Instance, heard
+from fmus.host.instance import PART, Instance, heard
 from fmus.host.status import DISCARD, WARNING
 from fmus.host.watch import PAGE
 
@@ -104,7 +104,10 @@ class Fmi2Instance(Instance):
         return step
 
     def stopped(self, t: float, dt: float, status: int) -> int:
-        """A step that is discarded may be the end that the FMU asks for; then its last time is whole."""
+        """A step that is discarded may be the end that the FMU asks for.
+
+        PythonFMU and others say so of every step that they cannot make; one that made none of it failed.
+        """
         if status != DISCARD:
             return status
         said, ends, reached = list(self.messages), c_int(0), c_double(t)
@@ -113,7 +116,8 @@ class Fmi2Instance(Instance):
             self.messages.extend(said)  # the FMU may complain of the question
             return status
         self._function("fmi2GetRealStatus")(LAST_SUCCESSFUL_TIME, byref(reached))
-        return self._ends(t, dt, reached.value)
+        made = reached.value - t > PART * abs(dt)
+        return self._ends(t, dt, reached.value) if made else status
 
 
 def _log(_environment: int, instance: bytes, status: int, _category: bytes, message: bytes) -> None:

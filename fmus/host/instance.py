@@ -129,12 +129,15 @@ class Instance(ABC):
     def set(self, references: Sequence[int], values: Sequence[float]) -> None:
         """Set variables."""
         further = [i for i, r in enumerate(references) if r >= BEYOND]
-        plain = [i for i, r in enumerate(references) if r < BEYOND] if further else range(len(references))
+        if not further:
+            self._set_reals(references, values)
+            return
+        plain = [i for i, r in enumerate(references) if r < BEYOND]
+        self._refuse_after_fatal()
         self._set_reals([references[i] for i in plain], [values[i] for i in plain])
-        if further:
-            held = [float(values[i]) for i in further]
-            status = self._transfer.setter([references[i] for i in further], held)()
-            self._succeeded(status, self._transfer.call)
+        held = [float(values[i]) for i in further]
+        status = self._transfer.setter([references[i] for i in further], held)()
+        self._succeeded(status, self._transfer.call)
 
     def get(self, references: Sequence[int]) -> list[float]:
         """Read variables."""
@@ -143,6 +146,7 @@ class Instance(ABC):
         if not further:
             return self._get_reals(references)
         plain = [i for i, r in enumerate(references) if r < BEYOND]
+        self._refuse_after_fatal()
         held = [0.0] * len(further)
         status = self._transfer.getter([references[i] for i in further], held)()
         self._succeeded(status, self._transfer.call)
