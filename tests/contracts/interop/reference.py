@@ -142,7 +142,7 @@ def _compare(folder: Path, name: str, results: Path, work: Path) -> str:
     units = [_outputs(fmu) for fmu in both]
     names = [n for n in units[0] if n in units[1] and n in wanted]
     if not names:
-        return "no output in both"
+        return "no results of its authors"
     stop = float(wanted["time"].iloc[-1])
     times = np.linspace(0.0, stop, ROWS)
     rows = {n: np.interp(times, wanted["time"], wanted[n]) for n in names}
