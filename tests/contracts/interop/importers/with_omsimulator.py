@@ -2,8 +2,11 @@
 
 import subprocess
 from pathlib import Path
+from types import MappingProxyType
 
 from tests.contracts.interop.importer import SOLVED, Case, Importer, table, told
+
+ZERO = "took value reference 0 of builds until then for an error; not run as a whole since"
 
 
 class OMSimulator(Importer):
@@ -14,6 +17,7 @@ class OMSimulator(Importer):
     solver = "cvode"
     sets_start = False
     tolerance = SOLVED
+    fails = MappingProxyType({("native", "CS", 3): ZERO})
     remark = "reads FMI 3.0 for co-simulation only"
 
     @classmethod
