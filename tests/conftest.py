@@ -16,6 +16,7 @@ from scenarios.cli import voice
 from scenarios.closing.result import Result
 from tests.helpers.everything import fitting
 from tests.helpers.foreign import foreign_builder
+from tests.helpers.kinds import build_kinds
 from tests.helpers.paths import SHIPPED
 from tests.helpers.vdp import build_vdp
 
@@ -78,6 +79,24 @@ def vdp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not compiler:
         pytest.skip("no C compiler 'cc' here to make an FMI 3.0 FMU with")
     return build_vdp(compiler, tmp_path_factory.mktemp("vdp"))
+
+
+@pytest.fixture(scope="session")
+def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """Paths of FMUs with whole numbers, truths and, by FMI 3.0, arrays, by the version of FMI."""
+    compiler = shutil.which("cc")
+    if not compiler:
+        pytest.skip("no C compiler 'cc' here to make FMUs with")
+    return {fmi: build_kinds(compiler, tmp_path_factory.mktemp("kinds"), f"kinds_fmi{fmi}") for fmi in (2, 3)}
+
+
+@pytest.fixture(scope="session")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The path of an FMU for model exchange alone, with events of state and time."""
+    compiler = shutil.which("cc")
+    if not compiler:
+        pytest.skip("no C compiler 'cc' here to make an FMU for model exchange with")
+    return build_kinds(compiler, tmp_path_factory.mktemp("ball"), "events_fmi3")
 
 
 @pytest.fixture(scope="session")

@@ -43,9 +43,8 @@ class Exchange:
         if told.modelExchange is None:
             raise BadInput(f"{archive.path}: is not for model exchange")
         variables = archive.description.variables
-        names = {v.reference: n for n, v in reversed(variables.items())}
         pairs = [(d.variable.valueReference, d.variable.derivative.valueReference) for d in told.derivatives]
-        self.states = tuple(names[state] for _, state in pairs)
+        self.states = continuous_states(archive)
         missing = [n for n in self.states if n not in put]
         if missing:
             raise BadInput(f"{archive.path}: its state '{missing[0]}' is not among the variables to set")
@@ -133,11 +132,19 @@ class Exchange:
 
 
 def continuous_states(archive: Archive) -> tuple[str, ...]:
-    """Names of the continuous states of an FMU for model exchange; none for other FMUs."""
+    """Names of the continuous states of an FMU for model exchange; none for other FMUs.
+
+    Raises BadInput if one is no scalar real variable.
+    """
     told = read_model_description(str(archive.folder), validate=False)
     names = {v.reference: n for n, v in reversed(archive.description.variables.items())}
     found = [d.variable.derivative for d in told.derivatives] if told.modelExchange else []
-    return tuple(names[state.valueReference] for state in found if state is not None)
+    states = [state for state in found if state is not None]
+    for state in (s for s in states if s.valueReference not in names):
+        raise BadInput(
+            f"{archive.path}: its state '{state.name}' is no scalar real; export it with scalar states"
+        )
+    return tuple(names[state.valueReference] for state in states)
 
 
 class _Model(ABC):

@@ -16,8 +16,8 @@ from estimator.access.pointers import (
 from estimator.access.recipe import Recipe, Way
 from estimator.record import Array
 from fmus.host.fmu import Fmu
-from fmus.host.instance import WARNING
 from fmus.host.rows import Rows, base_of
+from fmus.host.status import WARNING
 from fmus.host.watch import PAGE, TOLD
 
 STILL = np.zeros(1)  # s: no step

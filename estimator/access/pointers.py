@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.host.fmu import Fmu, FmuError
-from fmus.host.instance import CallFailed, address_of
+from fmus.host.instance import address_of
+from fmus.host.status import CallFailed
 
 ROLES = ("set", "get", "step", "reset", "setup", "enter", "exit", "restore")
 NAMES = {

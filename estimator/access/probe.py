@@ -76,8 +76,14 @@ def probe(
     """Test all ways and choose one.
 
     put: variables to set for a step, among them the states; start: their values; get: variables to read.
-    Model exchange is tried last, as its steps are not those of the FMU. Raises BadInput if no way is correct.
+    Model exchange is tried last, as its steps are not those of the FMU, unless the FMU offers nothing else.
+    Raises BadInput if no way is correct.
     """
+    if archive.description.exchange is not None:
+        try:
+            return by_exchange(archive, put, get, constants, start, t0, dt)
+        except (Refused, Dishonest) as error:
+            raise BadInput(f"{archive.path}: {error}") from error
     try:
         return _by_co_simulation(archive, put, get, constants, start, t0, dt, compiled)
     except BadInput as error:

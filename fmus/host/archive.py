@@ -4,7 +4,6 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Callable
-from math import inf
 from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 from types import TracebackType
@@ -18,7 +17,8 @@ from fmpy.validation import validate_fmu
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import Isolation
 from fmus.host.apart.room import Room, room_of
-from fmus.host.description import FmuDescription, FmuVariable
+from fmus.host.description import FmuDescription
+from fmus.host.reduced import reduced
 from fmus.taken import check_packed
 
 Made = TypeVar("Made")
@@ -139,38 +139,14 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         raise BadInput(f"{path}: its modelDescription.xml cannot be read ({line[:200]})") from error
     if model.fmiVersion not in FMI_VERSIONS:
         raise BadInput(f"{path}: is FMI {model.fmiVersion}; FMI {' and '.join(FMI_VERSIONS)} are read here")
-    if model.coSimulation is None:
-        raise BadInput(f"{path}: is not for co-simulation; export it again as a co-simulation FMU")
+    if model.coSimulation is None and model.modelExchange is None:
+        raise BadInput(
+            f"{path}: is neither for co-simulation nor for model exchange; export it again for one of them"
+        )
     try:
-        return _reduced(model)
+        return reduced(model)
     except ValueError as error:
         raise BadInput(f"{path}: its modelDescription.xml cannot be read ({error})") from error
-
-
-def _reduced(model: Any) -> FmuDescription:
-    """What is used of FMPy's description; ValueError for a number that is none."""
-    unused = {v.name: kind for v in model.modelVariables if (kind := _unused(v))}
-    variables = {v.name: _variable(v) for v in model.modelVariables if v.name not in unused}
-    kind, usual = model.coSimulation, model.defaultExperiment
-    step = _number(usual.stepSize) if usual else None
-    return FmuDescription(
-        name=model.modelName,
-        fmi_version=model.fmiVersion,
-        identifier=kind.modelIdentifier,
-        guid=model.guid or model.instantiationToken,
-        variables=variables,
-        step_size=step if step is not None and 0 < step < inf else None,
-        saves_state=kind.canGetAndSetFMUstate,
-        serialises_state=kind.canSerializeFMUstate,
-        once_per_process=kind.canBeInstantiatedOnlyOncePerProcess,
-        variable_step=kind.canHandleVariableCommunicationStepSize,
-        dependencies={
-            u.variable.name: tuple(v.name for v in u.dependencies if v.causality == "input")
-            for u in model.outputs
-            if u.dependencies is not None
-        },
-        unused=unused,
-    )
 
 
 def _mended(file: Path) -> bool:
@@ -189,41 +165,6 @@ def _mended(file: Path) -> bool:
     if silent:
         tree.write(file, encoding="UTF-8", xml_declaration=True)
     return bool(silent)
-
-
-def _unused(v: Any) -> str:
-    """What a variable is that cannot be used here; empty for one that can."""
-    if v.dimensions:
-        return "an array"
-    if v.causality == "structuralParameter":
-        return "a structural parameter"
-    if v.clocks:
-        return "a clocked variable"
-    return "" if v.type in ("Real", "Float64") else f"of type {v.type}"
-
-
-def _variable(v: Any) -> FmuVariable:
-    def said(attribute: str) -> Any:
-        own = getattr(v, attribute)
-        return getattr(v.declaredType, attribute) if own is None and v.declaredType else own
-
-    return FmuVariable(
-        name=v.name,
-        reference=int(v.valueReference),
-        causality="local" if v.alias else v.causality or "local",  # one state or input, whatever its names
-        variability=v.variability or "continuous",
-        initial=v.initial,
-        unit=said("unit"),
-        start=_number(v.start),
-        min=_number(said("min")),
-        max=_number(said("max")),
-        nominal=_number(said("nominal")),
-        description=v.description or "",
-    )
-
-
-def _number(text: Any) -> float | None:
-    return None if text in (None, "") else float(text)
 
 
 def _check_platform(path: Path, description: FmuDescription, names: list[str]) -> None:

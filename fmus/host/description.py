@@ -1,14 +1,23 @@
 """What an FMU says of itself, reduced to what its users here need."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
+
+from fmus.errors import did_you_mean
+from fmus.host.places import REAL, Place
 
 Causality = Literal["parameter", "calculatedParameter", "input", "output", "local", "independent"]
 
 
 @dataclass(frozen=True)
 class FmuVariable:
-    """One Real or scalar Float64 variable; numbers are in `unit`, None where the FMU says nothing."""
+    """One variable with a single value; numbers are in `unit`, None where the FMU says nothing.
+
+    reference: its value reference, or from BEYOND on the number of its place, see fmus.host.places.
+    type: of FMI; a truth is 0 or 1 here, an enumeration the number of its item. array: of which it is an
+    element, by name.
+    """
 
     name: str
     reference: int
@@ -21,6 +30,13 @@ class FmuVariable:
     max: float | None
     nominal: float | None
     description: str
+    type: str = "Real"
+    array: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether its values are whole numbers."""
+        return self.type not in REAL
 
 
 @dataclass(frozen=True)
@@ -45,7 +61,12 @@ class PortNames:
 
 @dataclass(frozen=True)
 class FmuDescription:
-    """Name, FMI version and variables of an FMU, in the order of its model description."""
+    """Name, FMI version and variables of an FMU, in the order of its model description.
+
+    variables: the Real and scalar Float64 ones, from which estimates can be made. unused: the other ones,
+    with what each is. further: those among them that can be set and read all the same, arrays by their
+    elements.
+    """
 
     name: str
     fmi_version: str
@@ -58,7 +79,25 @@ class FmuDescription:
     once_per_process: bool = False  # no second instance
     variable_step: bool = False  # takes communication steps of any length
     dependencies: dict[str, tuple[str, ...]] = field(default_factory=dict)  # inputs in an output, where said
-    unused: dict[str, str] = field(default_factory=dict)  # other variables: what each is
+    unused: dict[str, str] = field(default_factory=dict)
+    exchange: tuple[int, int] | None = None  # states, event indicators where it is for model exchange alone
+    further: dict[str, FmuVariable] = field(default_factory=dict)
+    places: tuple[Place, ...] = ()  # of the further ones
+
+    @cached_property
+    def widened(self) -> "FmuDescription":
+        """The same with the further variables among the others, for those that only set and read."""
+        variables = {**self.variables, **self.further}
+        unused = {name: what for name, what in self.unused.items() if name not in variables}
+        return replace(self, variables=variables, unused=unused, further={})
+
+    def missing(self, name: str) -> str:
+        """Why there is no variable of a name here, and the way out."""
+        if name not in self.unused:
+            return f"has no variable '{name}'; {did_you_mean(name, self.variables)}"
+        element = next((n for n in (*self.variables, *self.further) if n.startswith(f"{name}[")), None)
+        way = f"its elements, such as '{element}'" if element else "a scalar Real or Float64 one"
+        return f"'{name}' is {self.unused[name]}; use {way}"
 
     def of(self, *causalities: Causality) -> list[str]:
         """Names of the variables of the given causalities."""
@@ -82,4 +121,5 @@ class FmuDescription:
     @property
     def states(self) -> list[str]:
         """Names of the outputs whose start value sets a state (`initial="exact"`)."""
-        return [v.name for v in self.variables.values() if v.causality == "output" and v.initial == "exact"]
+        outputs = [v for v in self.variables.values() if v.causality == "output"]
+        return [v.name for v in outputs if v.initial == "exact" and v.variability != "constant"]

@@ -1,10 +1,10 @@
-"""The calls of one FMI 2.0 co-simulation instance, through FMPy's low-level interface."""
+"""The calls of one FMI 2.0 instance, through FMPy's low-level interface."""
 
 import atexit
 from collections.abc import Callable, Sequence
-from ctypes import CDLL, byref
+from ctypes import CDLL, byref, c_double, c_int
 from functools import cache, partial
-from typing import Any
+from typing import Any, ClassVar
 
 import pythonfmu  # noqa: F401  the installed one first: FMUs bring copies of it that cannot build
 from fmpy.fmi2 import (
@@ -18,8 +18,11 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from fmus.host.instance import Instance, heard
+from fmus.host.instance import PART, Instance, heard
+from fmus.host.status import DISCARD, WARNING
 from fmus.host.watch import PAGE
+
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of status that FMI 2.0 has of a discarded step
 
 
 @cache
@@ -31,13 +34,14 @@ def _let_go_in_time(binary: str) -> None:
 
 
 class Fmi2Instance(Instance):
-    """An instance by FMI 2.0; its variables are Real ones."""
+    """An instance by FMI 2.0."""
 
     FMI3 = False
+    SLAVE: ClassVar[Any] = FMU2Slave
     CALLS = ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")
 
     def _started(self, **identity: str) -> Any:
-        slave = FMU2Slave(**identity)
+        slave = self.SLAVE(**identity)
         _let_go_in_time(slave.dll._name)
         PAGE.calling(self.who, "fmi2Instantiate")
         slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
@@ -47,21 +51,13 @@ class Fmi2Instance(Instance):
         self._call(self._slave.setupExperiment, startTime=t0)
         self._call(self._slave.enterInitializationMode)
 
-    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        """Set Real variables."""
+    def _set_reals(self, references: Sequence[int], values: Sequence[float]) -> None:
         if len(references):
             self._call(self._slave.setReal, list(references), [float(v) for v in values])
 
-    def get(self, references: Sequence[int]) -> list[float]:
-        """Read Real variables."""
-        self._initialised()
+    def _get_reals(self, references: Sequence[int]) -> list[float]:
         values: list[float] = self._call(self._slave.getReal, list(references))
         return values
-
-    def step(self, t: float, dt: float) -> None:
-        """Advance from t by dt, s."""
-        self._initialised()
-        self._call(self._slave.doStep, t, dt, int(self.final))
 
     def state(self) -> Any:
         """A saved FMU state."""
@@ -100,10 +96,28 @@ class Fmi2Instance(Instance):
         raw, component = self._slave.dll.fmi2DoStep, self._slave.component
 
         def step(t: float, dt: float) -> int:
+            if self._asked:
+                self.ready()
             status: int = raw(component, t, dt, self.final)
-            return status
+            return self.stopped(t, dt, status) if status > WARNING else status
 
         return step
+
+    def stopped(self, t: float, dt: float, status: int) -> int:
+        """A step that is discarded may be the end that the FMU asks for.
+
+        PythonFMU and others say so of every step that they cannot make; one that made none of it failed.
+        """
+        if status != DISCARD:
+            return status
+        said, ends, reached = list(self.messages), c_int(0), c_double(t)
+        if self._function("fmi2GetBooleanStatus")(TERMINATED, byref(ends)) > WARNING or not ends.value:
+            self.messages.clear()
+            self.messages.extend(said)  # the FMU may complain of the question
+            return status
+        self._function("fmi2GetRealStatus")(LAST_SUCCESSFUL_TIME, byref(reached))
+        made = reached.value - t > PART * abs(dt)
+        return self._ends(t, dt, reached.value) if made else status
 
 
 def _log(_environment: int, instance: bytes, status: int, _category: bytes, message: bytes) -> None:

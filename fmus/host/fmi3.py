@@ -1,6 +1,6 @@
-"""The calls of one FMI 3.0 co-simulation instance, through FMPy's low-level interface.
+"""The calls of one FMI 3.0 instance, through FMPy's low-level interface.
 
-Without event mode and early return: a step is all of its length or an error.
+Co-simulation without event mode and early return: a step is all of its length or an error.
 """
 
 from collections.abc import Callable, Sequence
@@ -8,14 +8,16 @@ from ctypes import byref, c_bool, c_double
 from functools import partial
 from typing import Any
 
+import numpy as np
 from fmpy.fmi3 import FMU3Slave
 
-from fmus.host.instance import WARNING, Instance, heard
+from fmus.host.instance import Instance, heard
+from fmus.host.status import OK, WARNING, CallFailed
 from fmus.host.watch import PAGE
 
 
 class Fmi3Instance(Instance):
-    """An instance by FMI 3.0; its variables are scalar Float64 ones."""
+    """An instance by FMI 3.0."""
 
     FMI3 = True
     CALLS = ("fmi3SetFloat64", "fmi3DoStep", "fmi3GetFloat64")
@@ -26,6 +28,9 @@ class Fmi3Instance(Instance):
         def log(_environment: int, status: int, _category: bytes, message: bytes) -> None:
             heard(name, status, message)
 
+        return self._instantiated(identity, log)
+
+    def _instantiated(self, identity: dict[str, str], log: Any) -> Any:
         slave = FMU3Slave(**identity)
         PAGE.calling(self.who, "fmi3InstantiateCoSimulation")
         slave.instantiate(loggingOn=True, eventModeUsed=False, earlyReturnAllowed=False, logMessage=log)
@@ -34,22 +39,13 @@ class Fmi3Instance(Instance):
     def _enter_initialisation(self, t0: float) -> None:
         self._call(self._slave.enterInitializationMode, startTime=t0)
 
-    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        """Set Float64 variables."""
+    def _set_reals(self, references: Sequence[int], values: Sequence[float]) -> None:
         if len(references):
             self._call(self._slave.setFloat64, list(references), [float(v) for v in values])
 
-    def get(self, references: Sequence[int]) -> list[float]:
-        """Read Float64 variables."""
-        self._initialised()
+    def _get_reals(self, references: Sequence[int]) -> list[float]:
         values: list[float] = self._call(self._slave.getFloat64, list(references))
         return values
-
-    def step(self, t: float, dt: float) -> None:
-        """Advance from t by dt, s; CallFailed also where the FMU wants to stop."""
-        self._initialised()
-        _, ends, early, reached = self._call(self._slave.doStep, t, dt, self.final)
-        self._refuse_to_stop(t, ends, early, reached)
 
     def state(self) -> Any:
         """A saved FMU state."""
@@ -90,9 +86,24 @@ class Fmi3Instance(Instance):
         told = [byref(value) for value in (event, ends, early, reached)]
 
         def step(t: float, dt: float) -> int:
+            if self._asked:
+                self.ready()
             status: int = raw(component, t, dt, self.final, *told)
-            if status <= WARNING:
-                self._refuse_to_stop(t, ends.value, early.value, reached.value)
+            if status <= WARNING and (ends.value or early.value):
+                return self._judged(t, dt, status, ends.value, reached.value)
             return status
 
         return step
+
+    def stopped(self, t: float, dt: float, status: int) -> int:
+        """What it answered is on the page, where the compiled loop has put it."""
+        if status > WARNING:
+            return status
+        reached = float(PAGE.told[3:4].view(np.float64)[0])
+        return self._judged(t, dt, OK, bool(PAGE.told[1]), reached)
+
+    def _judged(self, t: float, dt: float, status: int, ends: bool, reached: float) -> int:
+        """A step after which the FMU wants no other one, or that is not done."""
+        if ends:
+            return max(status, self._ends(t, dt, reached))
+        raise CallFailed(self._reason(f"step at t = {t:g} s: it returned early, at t = {reached:g} s"))

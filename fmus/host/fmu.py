@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from fmus.errors import BadInput, did_you_mean
+from fmus.errors import BadInput
 from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
 from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
-from fmus.host.instance import Array, CallFailed, Instance
+from fmus.host.instance import Instance
+from fmus.host.loop import Array
 from fmus.host.rows import Inputs, Rows, base_of, offers_rows, rows_at_once
+from fmus.host.status import AskedToEnd, CallFailed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,10 +31,15 @@ class FmuError(RuntimeError):
     so_far: Any = None
 
 
-class Fmu:
-    """An instance of a co-simulation FMU.
+class SimulationEnds(FmuError):
+    """An FMU asked to end the simulation, and would make no further step."""
 
-    source: an FMU file, or an Archive that stays open while its instances live.
+
+class Fmu:
+    """An instance of an FMU for co-simulation, or for model exchange alone, which is integrated here.
+
+    Variables are scalars by their names, arrays by their elements (`y[1]`, `A[2,1]`, counted from 1); truths
+    are 0 and 1. source: an FMU file, or an Archive that stays open while its instances live.
     isolation: for a file, limits of the process in which it runs; None: it runs in this process.
     BadInput where the file cannot be used, FmuError where the running FMU refuses a call, FmuEnded where it
     ends the process in which it runs.
@@ -48,7 +55,7 @@ class Fmu:
         self.time = 0.0
         self._sent: tuple[Array, Array] | None = None  # times and inputs that an instance apart has
         try:
-            kind = Fmi3Instance if self.description.fmi_version == "3.0" else Fmi2Instance
+            kind = _kind(self.description)
             self._instance: Instance = self._safely(archive.made, kind, self.description.name)
         except BaseException:
             if self._own:
@@ -133,10 +140,10 @@ class Fmu:
         for name, x in samples.items():
             if len(x) not in (len(t), len(t) - 1):
                 raise BadInput(f"{self.name}: input '{name}' has {len(x)} samples for {len(t)} times")
-        names = list(self.description.outputs if outputs is None else outputs)
+        names = list(self.description.widened.outputs if outputs is None else outputs)
         y = self.simulate(t, samples, names, start or {})
         table = pd.DataFrame(y, columns=names, index=pd.Index(t, name="time"))
-        variables = self.description.variables
+        variables = self.description.widened.variables
         table.attrs["units"] = {n: variables[n].unit for n in names if variables[n].unit is not None}
         return table
 
@@ -207,12 +214,12 @@ class Fmu:
 
     def references(self, names: Sequence[str] | Mapping[str, Any]) -> list[int]:
         """Value references of names; BadInput with the nearest name where one is not in the FMU."""
-        variables, unused = self.description.variables, self.description.unused
+        variables = self.description.variables
+        if not all(name in variables for name in names):
+            variables = self.description.widened.variables
         for name in names:
-            if name in unused:
-                raise BadInput(f"{self.name}: '{name}' is {unused[name]}; use a scalar Real or Float64 one")
             if name not in variables:
-                raise BadInput(f"{self.name}: has no variable '{name}'; {did_you_mean(name, variables)}")
+                raise BadInput(f"{self.name}: {self.description.widened.missing(name)}")
         return [variables[name].reference for name in names]
 
     def close(self) -> None:
@@ -232,8 +239,20 @@ class Fmu:
     def _safely(self, call: Any, *args: Any) -> Any:
         try:
             return call(*args)
+        except AskedToEnd as error:
+            raise SimulationEnds(f"{self.name}: {error}") from error
         except CallFailed as error:
             raise FmuError(f"{self.name}: {error}") from error
+
+
+def _kind(about: FmuDescription) -> type[Instance]:
+    """The class of its instances."""
+    fmi3 = about.fmi_version == "3.0"
+    if about.exchange is None:
+        return Fmi3Instance if fmi3 else Fmi2Instance
+    from fmus.host.exchange import Fmi2Exchange, Fmi3Exchange  # loads a solver
+
+    return Fmi3Exchange if fmi3 else Fmi2Exchange
 
 
 def _means(u: Array) -> Array:

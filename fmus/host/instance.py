@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 from collections import defaultdict, deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from ctypes import c_double, c_uint, c_void_p, cast
-from functools import cache
+from ctypes import c_double, c_uint
+from functools import partial
 from itertools import count
 from math import nan
 from pathlib import Path
@@ -16,22 +16,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from numpy.typing import NDArray
 
-from fmus.aside import blocks
+from fmus.host import loop
 from fmus.host.archive import Archive
-from fmus.host.watch import GETTING, LOOPING, PAGE, SETTING, WHAT
+from fmus.host.loop import Array
+from fmus.host.places import BEYOND, REAL, Transfer
+from fmus.host.status import ERROR, FATAL, OK, WARNING, AskedToEnd, CallFailed, failure
+from fmus.host.watch import PAGE
 
-Array = NDArray[np.float64]
-LONG = 500  # steps, from which a compiled loop is worth its start
-OK, WARNING, DISCARD, FATAL = 0, 1, 2, 4
+PART = 1e-9  # of a step, by which its end may be missed by rounding
 NUMBERS = count()
 STARTING = Lock()  # the folder and the path that a start changes belong to all threads
 MESSAGES: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=20))  # by instance name
-
-
-class CallFailed(Exception):
-    """An FMI call that did not succeed, with what the FMU logged about it."""
 
 
 class Instance(ABC):
@@ -39,19 +35,24 @@ class Instance(ABC):
 
     It calls what FMI's state machine allows at each place: a new instance is not reset, nothing is read and
     no step is made before initialisation, and a running one is terminated before it is freed. Once a state
-    was saved, steps no longer promise that no earlier state comes back.
+    was saved, steps no longer promise that no earlier state comes back. An FMU that asks to end the
+    simulation with a whole step has made it; the next one is refused.
     """
 
     FMI3: ClassVar[bool]
     CALLS: ClassVar[tuple[str, str, str]]  # names of the functions that set, step and get
+    COMPILED: ClassVar[bool] = True  # whether its steps are one function, which a compiled loop can call
 
     def __init__(self, archive: Archive, name: str) -> None:
         unique = f"{name}_{next(NUMBERS)}"
         self._name, self.messages = unique, MESSAGES[unique]
         self._fatal = ""  # why no call may be made any more, not even to free it
+        self._asked = ""  # how it asked to end the simulation
         self._new, self._running = True, False  # instantiated and nothing else; initialised and not failed
         self.final = True  # no state before the end of a step will come back
         self._given: tuple[Array, Array] = (np.zeros(1), np.empty((0, 0)))  # of the last simulation
+        self._sizes = archive.description.exchange or (0, 0)
+        self._whole = {BEYOND + i for i, p in enumerate(archive.description.places) if p.type not in REAL}
         self.who = PAGE.enrolled(archive.path.name, self.FMI3)
         PAGE.calling(self.who, "loading its library")
         with STARTING:
@@ -69,6 +70,9 @@ class Instance(ABC):
             finally:
                 sys.path[:] = path  # an FMU in Python puts its own folder in front
                 os.chdir(here)  # FMPy stays in the library's folder where it cannot load it
+        self._transfer = Transfer(
+            archive.description.places, self.FMI3, self.who, self._function, self.messages.append
+        )
 
     @abstractmethod
     def _started(self, **identity: str) -> Any:
@@ -79,16 +83,12 @@ class Instance(ABC):
         """Begin initialisation at t0, s."""
 
     @abstractmethod
-    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
-        """Set variables."""
+    def _set_reals(self, references: Sequence[int], values: Sequence[float]) -> None:
+        """Set scalar real variables."""
 
     @abstractmethod
-    def get(self, references: Sequence[int]) -> list[float]:
-        """Read variables."""
-
-    @abstractmethod
-    def step(self, t: float, dt: float) -> None:
-        """Advance from t by dt, s."""
+    def _get_reals(self, references: Sequence[int]) -> list[float]:
+        """Read scalar real variables."""
 
     @abstractmethod
     def state(self) -> Any:
@@ -120,7 +120,46 @@ class Instance(ABC):
 
     @abstractmethod
     def _stepper(self) -> Callable[[float, float], int]:
-        """A raw step from t by dt that returns its status."""
+        """A raw step from t by dt that returns its status; AskedToEnd where it does not come to its end."""
+
+    @abstractmethod
+    def stopped(self, t: float, dt: float, status: int) -> int:
+        """The status of a step of the compiled loop, which was stopped by it; AskedToEnd as with others."""
+
+    def set(self, references: Sequence[int], values: Sequence[float]) -> None:
+        """Set variables."""
+        further = [i for i, r in enumerate(references) if r >= BEYOND]
+        if not further:
+            self._set_reals(references, values)
+            return
+        plain = [i for i, r in enumerate(references) if r < BEYOND]
+        self._refuse_after_fatal()
+        self._set_reals([references[i] for i in plain], [values[i] for i in plain])
+        held = [float(values[i]) for i in further]
+        status = self._transfer.setter([references[i] for i in further], held)()
+        self._succeeded(status, self._transfer.call)
+
+    def get(self, references: Sequence[int]) -> list[float]:
+        """Read variables."""
+        self._initialised()
+        further = [i for i, r in enumerate(references) if r >= BEYOND]
+        if not further:
+            return self._get_reals(references)
+        plain = [i for i, r in enumerate(references) if r < BEYOND]
+        self._refuse_after_fatal()
+        held = [0.0] * len(further)
+        status = self._transfer.getter([references[i] for i in further], held)()
+        self._succeeded(status, self._transfer.call)
+        found = dict(zip(further, held, strict=True))
+        if plain:
+            found |= dict(zip(plain, self._get_reals([references[i] for i in plain]), strict=True))
+        return [found[i] for i in range(len(references))]
+
+    def step(self, t: float, dt: float) -> None:
+        """Advance from t by dt, s; AskedToEnd where the FMU wants no further step."""
+        self.ready()
+        PAGE.stepping(self.who, t)
+        self._succeeded(self._stepper()(t, dt), self._named("doStep"))
 
     def initialise(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
         """Reset, set the values, go through initialisation at t0."""
@@ -130,9 +169,10 @@ class Instance(ABC):
     def enter(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
         """Reset, set the values, begin initialisation at t0: inputs can be set and outputs read."""
         self.messages.clear()
-        self._running = False
+        self._running, self._asked = False, ""
         if not self._new:
             self._call(self._slave.reset)
+            self._transfer.begin()
         self.set(references, values)
         self._new = False
         self._enter_initialisation(t0)
@@ -145,16 +185,45 @@ class Instance(ABC):
     def pusher(self, references: Sequence[int]) -> tuple[Any, Callable[[], int]]:
         """A C array, and a raw call that sets variables to what it holds and returns its status."""
         values = (c_double * len(references))()
-        return values, self._setter((c_uint * len(references))(*references), values)
+        plain = [i for i, r in enumerate(references) if r < BEYOND]
+        if len(plain) == len(references):
+            return values, self._setter((c_uint * len(references))(*references), values)
+        reals = (c_double * len(plain))()
+        set_reals = self._setter((c_uint * len(plain))(*(references[i] for i in plain)), reals)
+        set_others = self._transfer.setter(references, values)
+
+        def push() -> int:
+            reals[:] = [values[i] for i in plain]
+            status = set_reals() if plain else OK
+            return status if status > WARNING else max(status, set_others())
+
+        return values, push
 
     def puller(self, references: Sequence[int]) -> tuple[Any, Callable[[], int]]:
         """A C array, and a raw call that reads variables into it and returns its status."""
         values = (c_double * len(references))()
-        return values, self._getter((c_uint * len(references))(*references), values)
+        plain = [i for i, r in enumerate(references) if r < BEYOND]
+        if len(plain) == len(references):
+            return values, self._getter((c_uint * len(references))(*references), values)
+        reals = (c_double * len(plain))()
+        get_reals = self._getter((c_uint * len(plain))(*(references[i] for i in plain)), reals)
+        get_others = self._transfer.getter(references, values)
+
+        def pull() -> int:
+            status = get_reals() if plain else OK
+            for place, i in enumerate(plain):
+                values[i] = reals[place]
+            return status if status > WARNING else max(status, get_others())
+
+        return values, pull
 
     def stepper(self) -> Callable[[float, float], int]:
         """A raw step from t by dt, s, that returns its status."""
         return self._stepper()
+
+    def whole(self, references: Sequence[int]) -> list[int]:
+        """Which of them take whole numbers only."""
+        return [i for i, r in enumerate(references) if r in self._whole]
 
     @property
     def dead(self) -> bool:
@@ -185,94 +254,11 @@ class Instance(ABC):
         """
         t, u = self._given = self._given if t is None or u is None else (t, u)
         self.initialise(start_refs, start, float(t[0]))
-        found = np.empty(((len(t) - 1) // every + 1, len(get_refs)))
-        found[0] = self.get(get_refs)
-        more = len(u) - len(t) + 1
-        for rows in blocks(len(t) - 1, 8 * (len(get_refs) + u.shape[1]), every):
-            given = t[rows.start : rows.stop + 1], u[rows.start : rows.stop + more]
-            y = self.run(*given, set_refs, get_refs)[every - 1 :: every]
-            found[rows.start // every + 1 :][: len(y)] = y
-        return found
+        return loop.simulate(self, t, u, set_refs, get_refs, every)
 
     def run(self, t: Array, u: Array, set_refs: Sequence[int], get_refs: Sequence[int]) -> Array:
-        """Step from t[0] through t (N,); outputs (N-1, n_y).
-
-        u: (N-1, n_u), held over each step; or (N, n_u) samples, of which the mean of both ends acts over a
-        step, and the last is set before the outputs are read: what depends on an input directly is then that
-        of this very time. The loop of every simulation: raw calls on arrays made once.
-        """
-        self._refuse_after_fatal()
-        self._initialised()
-        n_u, n_y = len(set_refs), len(get_refs)
-        y = np.empty((len(t) - 1, n_y))
-        rows, last = ((u[1:] + u[:-1]) / 2, u[1:]) if n_u and len(u) == len(t) else (u, None)
-        march = _march() if len(t) > LONG else None
-        if march is not None:
-            self._compiled(march, t, rows, last, set_refs, get_refs, y)
-            return y
-        (u_now, push), (y_now, pull), step = self.pusher(set_refs), self.puller(get_refs), self._stepper()
-        times, steps = t.tolist(), np.diff(t).tolist()
-        into, out = np.ctypeslib.as_array(u_now), np.ctypeslib.as_array(y_now)
-        cells, setting, getting = PAGE.cells, self.who + SETTING, self.who + GETTING
-        for k, dt in enumerate(steps):
-            into[:] = rows[k]
-            cells[WHAT] = setting
-            status = push() if n_u else OK
-            if status <= WARNING:
-                PAGE.stepping(self.who, times[k])
-                status = step(times[k], dt)
-            if status <= WARNING and last is not None:
-                into[:] = last[k]
-                cells[WHAT] = setting
-                status = push()
-            if status <= WARNING:
-                cells[WHAT] = getting
-                status = pull()
-            if status > WARNING:
-                raise CallFailed(self._failed(f"step at t = {times[k]:g} s", status))
-            y[k] = out
-        return y
-
-    def _compiled(
-        self,
-        march: Callable[..., tuple[int, int]],
-        t: Array,
-        u: Array,
-        ends: Array | None,
-        set_refs: Sequence[int],
-        get_refs: Sequence[int],
-        y: Array,
-    ) -> None:
-        """The same loop compiled, into y."""
-        told = PAGE.told
-        told[:] = 0
-        PAGE.cells[WHAT] = self.who + LOOPING
-        k, status = march(
-            self.FMI3,
-            tuple(cast(getattr(self.library, name), c_void_p).value for name in self.CALLS),
-            self.component,
-            np.ascontiguousarray(t, dtype=float),
-            np.ascontiguousarray(u, dtype=float),
-            np.ascontiguousarray(u[:0] if ends is None else ends, dtype=float),
-            np.array(set_refs, dtype=np.uint32),
-            np.array(get_refs, dtype=np.uint32),
-            y,
-            told,
-            PAGE.now,
-            self.final,
-        )
-        if k >= 0:
-            if status <= WARNING:
-                reached = float(told[3:4].view(np.float64)[0])
-                self._refuse_to_stop(float(t[k]), bool(told[1]), bool(told[2]), reached)
-            raise CallFailed(self._failed(f"step at t = {t[k]:g} s", status))
-
-    def _refuse_to_stop(self, t: float, ends: bool, early: bool, reached: float) -> None:
-        """A step that is not done, or after which no other may follow, is no step here."""
-        if ends:
-            raise CallFailed(self._reason(f"step at t = {t:g} s: it asks to end the simulation"))
-        if early:
-            raise CallFailed(self._reason(f"step at t = {t:g} s: it returned early, at t = {reached:g} s"))
+        """Step from t[0] through t (N,); outputs (N-1, n_y): see fmus.host.loop."""
+        return loop.run(self, t, u, set_refs, get_refs)
 
     def close(self) -> None:
         """Free the instance and unload the library; one that failed fatally stays where it is."""
@@ -283,6 +269,32 @@ class Instance(ABC):
             PAGE.calling(self.who, self._named("freeInstance"))
             self._slave.freeInstance()
         MESSAGES.pop(self._name, None)
+
+    def ready(self) -> None:
+        """CallFailed where no step can be made; AskedToEnd where the FMU wants none."""
+        self._refuse_after_fatal()
+        self._initialised()
+        if self._asked:
+            raise AskedToEnd(self._asked)
+
+    def _ends(self, t: float, dt: float, reached: float) -> int:
+        """The status of a step from t by dt with which the FMU asks to end; AskedToEnd if it is not whole."""
+        self._asked = self._reason(f"it asks to end the simulation at t = {reached:.9g} s")
+        if reached < t + (1 - PART) * dt:
+            raise AskedToEnd(self._asked)
+        return OK
+
+    def _succeeded(self, status: int, call: str) -> None:
+        if status > WARNING:
+            raise CallFailed(self._failed(failure(call, status), status))
+
+    def _function(self, name: str) -> Callable[..., int]:
+        """A raw function of its library on this instance."""
+        found = getattr(self._slave.dll, name, None)
+        if found is None:
+            self.messages.append(f"its library has no function {name}")
+            return lambda *_: ERROR
+        return partial(found, self._slave.component)
 
     def _call(self, function: Any, *args: Any, **kwargs: Any) -> Any:
         self._refuse_after_fatal()
@@ -311,7 +323,8 @@ class Instance(ABC):
 
     def _initialised_by_restoring(self) -> None:
         """States are saved after initialisation, and an FMU goes on in the mode of the restored one."""
-        self._new, self._running = False, True
+        self._new, self._running, self._asked = False, True, ""
+        self._transfer.forget()
 
     def _failed(self, what: str, status: int) -> str:
         self._new = self._running = False
@@ -323,16 +336,6 @@ class Instance(ABC):
     def _reason(self, what: str) -> str:
         said = f": {self.messages[-1]}" if self.messages else ""
         return what + said
-
-
-@cache
-def _march() -> Callable[..., tuple[int, int]] | None:
-    """The compiled loop, or None where numba is not installed."""
-    try:
-        from fmus.host.jitted import march
-    except ImportError:
-        return None
-    return march()
 
 
 def address_of(pointer: Any) -> int:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.host.description import FmuDescription
-from fmus.host.instance import Array, Instance
+from fmus.host.instance import Instance
+from fmus.host.loop import Array
 
 NAME = "railfmi_rows"
 FOUR = 4  # rows at once of an FMU that does not say how many

@@ -41,6 +41,10 @@ def run_scenarios(
         else:
             took = f"{result.wall_seconds:.1f} s"
             echo(f"{result.id}: {held} of {len(result.expectations)} expectations met ({took})")
+        for name, ran in result.runs.items():
+            if ran.ended:
+                which = f" of variant '{name}'" if len(result.runs) > 1 else ""
+                echo(f"  the run{which} ended early: {ran.ended}")
         for finding in result.failed:
             echo(f"  not met: {finding.sentence}; {finding.because}")
 

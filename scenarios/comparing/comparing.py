@@ -57,7 +57,7 @@ def compare(
     declared = load_experiment(path / "experiment.toml" if path.is_dir() else path, data_dir)
     folder = None if out is None else writable(Path(out))
     tell("reading the record")
-    about = describe(a), describe(b)
+    about = describe(a).widened, describe(b).widened
     record = load_record(declared, about[0])
     _check_second(declared, about[1])
     names, unfit = _common(*about, f"{a} and {b}")

@@ -1,7 +1,7 @@
 """Write a scenario as an SSP 1.0 package that other tools can simulate."""
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
@@ -18,11 +18,13 @@ from fmus.export.ssp import (
     System,
     write_package,
 )
+from fmus.export.ssp.metadata import metadata
 from fmus.export.ssp.source import signal_source
 from fmus.export.ssp.system import RESOURCES
 from fmus.host.archive import Archive
-from fmus.host.description import FmuDescription
+from fmus.host.description import FmuDescription, FmuVariable
 from fmus.host.master.connections import Connection, Directory, links
+from fmus.host.master.connections import Link as Connected
 from scenarios.exchange.form import (
     Form,
     Kind,
@@ -98,13 +100,18 @@ def _content(read: Scenario, name: str, label: str, form: Form, tell: Tell) -> _
         tell(f"{label}: building its FMUs and checking all names in it")
         prepared(d, read.file, wanted(asked(read), name, read), packer, stack)
         archives = {n: stack.enter_context(Archive(path)) for n, path in packer.paths.items()}
-        fmus = {n: archive.description for n, archive in archives.items()}
+        fmus = {n: archive.description.widened for n, archive in archives.items()}
         given = sources(d, fmus, read.file.parent)
         content = _members(d, packer.paths, fmus, constants(given))
         for fed, signals in sampled(d, fmus, given).items():
+            _refuse_moving(fed, fmus[fed], signals.values)
             tell(f"{label}: writing the signals of '{fed}' as data and as an FMU")
             _feed(content, fed, signals, form, work / "sources")
-        content.files |= {PLACE: settings(read, name), PROVENANCE: _record(label, d, packer, content)}
+        content.files[PLACE] = settings(read, name)
+        records = _records(d, packer, content)
+        about = [("scenario", label), ("question", read.declared.question)]
+        content.files |= metadata(label, about, records, content.files)
+        content.files[PROVENANCE] = _sealed(label, records, content)
     return content
 
 
@@ -129,16 +136,50 @@ def _members(
         values = {k.partition(".")[2]: v for k, v in fixed.items() if k.partition(".")[0] == name}
         start = {v: (value, known[v].unit) for v, value in {**own[name], **values}.items()}
         connected = {link.target.variable for link in found if link.target.fmu == name}
+        _refuse_elements(name, fmus[name], {*start, *connected, *(_sources(found, name))})
         connectors = _connectors(fmus[name], connected)
-        content.components.append(Component(name, places[paths[name]], connectors, start, member.step))
+        types = {n: _type(v) for n, v in known.items() if v.whole}
+        content.components.append(
+            Component(name, places[paths[name]], connectors, start, member.step, types=types)
+        )
     return content
+
+
+def _sources(found: Sequence[Connected], name: str) -> set[str]:
+    return {link.source.variable for link in found if link.source.fmu == name}
+
+
+def _refuse_elements(name: str, fmu: FmuDescription, used: Iterable[str]) -> None:
+    """BadInput for an element of an array, as SSP 1.0 has no arrays."""
+    for variable in used:
+        if array := fmu.variables[variable].array:
+            raise BadInput(
+                f"'{name}.{variable}' is an element of the array '{array}', and SSP 1.0 has no arrays; give "
+                "the FMU scalars in their place"
+            )
+
+
+def _refuse_moving(name: str, fmu: FmuDescription, inputs: Iterable[str]) -> None:
+    """BadInput for inputs that change over time where the source of signals cannot give their values."""
+    _refuse_elements(name, fmu, inputs)
+    for whole in (n for n in inputs if fmu.variables[n].whole):
+        raise BadInput(
+            f"input '{name}.{whole}' takes whole numbers and changes over time, and the source of signals in "
+            "a package gives real ones; keep it constant or connect it"
+        )
+
+
+def _type(v: FmuVariable) -> str:
+    """The type of a variable of whole numbers in SSP 1.0."""
+    return v.type if v.type in ("Boolean", "Enumeration") else "Integer"
 
 
 def _connectors(fmu: FmuDescription, connected: set[str]) -> tuple[Connector, ...]:
     """Connected inputs, outputs and parameters; FMPy fails on inputs without a connection."""
-    inputs = [Connector(n, "input", fmu.variables[n].unit) for n in fmu.inputs if n in connected]
-    outputs = [Connector(n, "output", fmu.variables[n].unit) for n in fmu.outputs]
-    parameters = [Connector(n, "parameter", fmu.variables[n].unit) for n in fmu.parameters]
+    known = {n: v.unit for n, v in fmu.variables.items() if not v.array}
+    inputs = [Connector(n, "input", known[n]) for n in fmu.inputs if n in connected]
+    outputs = [Connector(n, "output", known[n]) for n in fmu.outputs if n in known]
+    parameters = [Connector(n, "parameter", known[n]) for n in fmu.parameters if n in known]
     return (*inputs, *outputs, *parameters)
 
 
@@ -162,10 +203,14 @@ def _feed(content: _Content, fed: str, signals: Fed, form: Form, folder: Path) -
     content.links += [Link((name, n), (fed, n)) for n in signals.even]
 
 
-def _record(label: str, d: Declaration, packer: Packer, content: _Content) -> bytes:
-    """Where each FMU comes from, and the SHA-256 of FMUs and data."""
+def _records(d: Declaration, packer: Packer, content: _Content) -> dict[str, dict[str, Any] | None]:
+    """Where each FMU comes from, by its path in the package."""
     known = {component.name: component.source for component in content.components}
-    records = {known[name]: _known_of(packer.paths[name]) for name in d.fmus}
+    return {known[name]: _known_of(packer.paths[name]) for name in d.fmus}
+
+
+def _sealed(label: str, records: Mapping[str, dict[str, Any] | None], content: _Content) -> bytes:
+    """Where each FMU comes from, and the SHA-256 of FMUs, data and settings."""
     about = {"tool": "railfmi", "version": version("railfmi"), "scenario": label, "fmus": records}
     return sealed(about, content.files)
 

@@ -67,7 +67,7 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
     members = [c for c in system.components if c.name not in sources]
     if not members:
         raise BadInput("holds no FMU that could be simulated; export it with its components")
-    fmus = {c.name: describe(folder / c.source) for c in members}
+    fmus = {c.name: describe(folder / c.source).widened for c in members}
     names = _names(members)
     inputs: dict[str, Any] = {}
     table: dict[str, Any] = {

@@ -81,6 +81,9 @@ def _wrong_names(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
             if name in fmu.variables and name not in known:
                 causality = fmu.variables[name].causality
                 yield f"{where} '{name}' of {fmu.name} is not {part} (it is of causality {causality})"
+            elif name in fmu.unused or name in fmu.further:
+                what = fmu.unused.get(name, "an element of an array")
+                yield f"{where} '{name}' of {fmu.name} is {what}; only scalar real variables can be used here"
             elif name not in known:
                 yield f"{where} '{name}' is not {part} of {fmu.name}; {did_you_mean(name, known)}"
 

@@ -15,6 +15,7 @@ from scenarios.output import writable, written_at_once
 from scenarios.preparing.survey import Raster, survey
 
 MOST_POWER = 0.99  # of a channel's variance lies below the frequency that is told
+KINDS = ("input", "output", "parameter")  # of the variables that are listed
 PANELS = 6  # channels on a sheet
 
 
@@ -100,11 +101,13 @@ def _plots(r: Raster, ending: str) -> Iterator[Plot]:
 
 
 def _of_fmu(path: Path) -> Iterator[str]:
-    d = describe(path)
-    yield f"{path.name}: {d.name}, FMI {d.fmi_version} for co-simulation"
+    about = describe(path)
+    d = about.widened
+    way = "co-simulation" if d.exchange is None else "model exchange, integrated by railfmi"
+    yield f"{path.name}: {d.name}, FMI {d.fmi_version} for {way}"
     rows = [("variable", "kind", "unit", "start", "limits", "description")]
     for v in d.variables.values():
-        if v.causality in ("input", "output", "parameter"):
+        if v.causality in KINDS:
             limits = f"{'' if v.min is None else f'{v.min:g}'} to {'' if v.max is None else f'{v.max:g}'}"
             rows.append(
                 (
@@ -118,8 +121,10 @@ def _of_fmu(path: Path) -> Iterator[str]:
             )
     yield from aligned(rows)
     if d.unused:
-        yield f"not used, because railfmi takes scalar real variables only: {', '.join(d.unused)}"
-    yield from _access(d)
+        yield f"not used, or by their elements only: {', '.join(d.unused)}"
+    if whole := [v.name for v in d.variables.values() if v.whole and v.causality in KINDS]:
+        yield f"whole numbers and truths, which are set and read but not estimated: {', '.join(whole)}"
+    yield from _access(about)
     found = problems(path)
     if found:
         yield f"against the letter of the standard: {found[0]}" + (

@@ -121,7 +121,7 @@ class _MotionCase:
             name: stack.enter_context(_archive(member, builder.path(member, f"fmus.{name}", file), isolation))
             for name, member in d.fmus.items()
         }
-        fmus = {name: archive.description for name, archive in archives.items()}
+        fmus = {name: archive.description.widened for name, archive in archives.items()}
         self._sensors: dict[str, Sensor] = read_sensors(d.sensors)
         known = {f"{name}.{v}" for name, fmu in fmus.items() for v in fmu.variables}
         readings = {f"{SENSORS}.{name}" for name in self._sensors}

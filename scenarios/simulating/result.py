@@ -44,6 +44,7 @@ class RunSummary:
     simulated_seconds: float | None
     wall_seconds: float
     interrupted_at: float | None
+    ended: str = ""  # which FMU asked for the end before the scenario's own, and when
 
     @property
     def speed(self) -> float | None:

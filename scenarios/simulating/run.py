@@ -11,7 +11,7 @@ from fmus.errors import BadInput
 from fmus.host.apart.isolation import ISOLATED, FmuEnded, Isolation
 from fmus.host.apart.room import closing_rooms
 from fmus.host.fmu import FmuError
-from fmus.host.master.recording import Recording
+from fmus.host.master.recording import TIME, Recording
 from scenarios.experiment.validation import of_file
 from scenarios.output import writable, written_at_once
 from scenarios.simulating.asking import (
@@ -196,8 +196,11 @@ def _written(run: Run, name: str, case: Case, scenario: Scenario, folder: Path, 
         if run.measured is not None and measured is not None:
             (run.measured.to_csv if ending == "csv" else run.measured.to_parquet)(part / measured)
     stopped = recording.interrupted_at
-    simulated = case.duration if stopped is None else stopped
-    return RunSummary(file, measured, simulated, took, stopped)
+    if recording.ended:
+        simulated: float | None = float(recording.data[TIME].iloc[-1])
+    else:
+        simulated = case.duration if stopped is None else stopped
+    return RunSummary(file, measured, simulated, took, stopped, recording.ended)
 
 
 def _judged(

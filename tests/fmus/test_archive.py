@@ -133,10 +133,11 @@ def test_binaries_for_another_platform(drive, tmp_path):
         Fmu(path)
 
 
-def test_model_exchange_only(drive, tmp_path):
-    kind = b'<ModelExchange modelIdentifier="Drive"/>'
-    path = with_description(drive, tmp_path / "x.fmu", rb"<CoSimulation[^>]*/>", kind)
-    with pytest.raises(BadInput, match=r"x\.fmu: is not for co-simulation; export it again"):
+def test_neither_co_simulation_nor_model_exchange(drive, tmp_path):
+    path = with_description(drive, tmp_path / "x.fmu", rb"<CoSimulation[^>]*/>", b"")
+    with pytest.raises(
+        BadInput, match=r"x\.fmu: is neither for co-simulation nor for model exchange; export"
+    ):
         Fmu(path)
 
 

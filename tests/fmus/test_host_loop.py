@@ -6,11 +6,11 @@ import pytest
 from fmus import aside
 from fmus.drive.model import Drive
 from fmus.export.builders.native.build import build_native
-from fmus.host import instance
+from fmus.host import loop
 from fmus.host.fmu import Fmu, FmuError
 from tests.helpers.vdp import OUTPUTS
 
-T = np.cumsum(np.tile([1e-3, 2e-3], instance.LONG))  # s, more steps than the loop in Python makes
+T = np.cumsum(np.tile([1e-3, 2e-3], loop.LONG))  # s, more steps than the loop in Python makes
 FORCE = 100 * np.sin(2 * T)
 INPUTS = {
     "none": {},
@@ -27,10 +27,10 @@ def drive(request, tmp_path_factory):
 
 @pytest.mark.parametrize("kind", INPUTS)
 def test_both_loops_give_the_same_to_the_bit(drive, kind, monkeypatch):
-    assert instance._march() is not None
+    assert loop._march() is not None
     with Fmu(drive) as fmu:
         compiled = fmu.simulate(T, INPUTS[kind], NAMES, {"q_dot": 0.5})
-        monkeypatch.setattr(instance, "_march", lambda: None)
+        monkeypatch.setattr(loop, "_march", lambda: None)
         plain = fmu.simulate(T, INPUTS[kind], NAMES, {"q_dot": 0.5})
     assert np.array_equal(compiled, plain)
     assert np.ptp(plain[:, 0]) > 0.01
@@ -52,8 +52,8 @@ def test_both_loops_say_where_an_input_was_refused(drive, monkeypatch):
     force[800] = np.nan
     said = []
     with Fmu(drive) as fmu:
-        for march in (instance._march, lambda: None):
-            monkeypatch.setattr(instance, "_march", march)
+        for march in (loop._march, lambda: None):
+            monkeypatch.setattr(loop, "_march", march)
             with pytest.raises(FmuError, match=rf"step at t = {T[799]:g} s.*F = nan") as refused:
                 fmu.simulate(T, {"F": force}, NAMES, {})
             said.append(str(refused.value))
@@ -63,8 +63,8 @@ def test_both_loops_say_where_an_input_was_refused(drive, monkeypatch):
 @pytest.mark.parametrize("fault", [1.0, 2.0, 3.0])
 def test_both_loops_refuse_a_step_of_fmi_3_that_is_not_all_of_a_step(vdp, fault, monkeypatch):
     said = []
-    for march in (instance._march, lambda: None):
-        monkeypatch.setattr(instance, "_march", march)
+    for march in (loop._march, lambda: None):
+        monkeypatch.setattr(loop, "_march", march)
         with Fmu(vdp) as fmu:
             with pytest.raises(FmuError) as refused:
                 fmu.simulate(T, {}, OUTPUTS, {"fault": fault})

@@ -62,13 +62,17 @@ def variables(path, fmi):
 
 
 def unknowns(path, fmi, kind):
-    """Reference -> (references depended on, kinds) of a part of the model structure, in order."""
+    """Place -> (places depended on, kinds) of a part of the model structure, in order.
+
+    By FMI 2.0 it numbers the variables from 1; by FMI 3.0 it names references, which begin at 1 here, because
+    OMSimulator takes 0 for an error.
+    """
     root = description(path).find("ModelStructure")
-    offset, attribute = (1, "index") if fmi == 2 else (0, "valueReference")
+    attribute = "index" if fmi == 2 else "valueReference"
     nodes = root.findall(f"{kind}s/Unknown") if fmi == 2 else root.findall(kind)
     return {
-        int(n.get(attribute)) - offset: (
-            [int(i) - offset for i in n.get("dependencies").split()],
+        int(n.get(attribute)) - 1: (
+            [int(i) - 1 for i in n.get("dependencies").split()],
             n.get("dependenciesKind", "").split(),
         )
         for n in nodes
@@ -104,7 +108,8 @@ def test_description_says_all_that_the_model_declares(name, fmi):
     model, found = MODELS[name](), variables(native(name, fmi=fmi), fmi)
     declared = [v for k in (State, Input, Parameter, Output) for v in model.of(k)]
     assert list(found)[: len(declared)] == [v.name for v in declared]
-    assert [int(v["valueReference"]) for v in found.values()] == list(range(len(found)))
+    first = 0 if fmi == 2 else 1
+    assert [int(v["valueReference"]) for v in found.values()] == list(range(first, first + len(found)))
     for v in declared:
         shown = found[v.name]
         assert (shown["causality"], shown["unit"], shown["description"]) == (v.causality, v.unit, v.doc)
@@ -124,8 +129,7 @@ def test_description_says_all_that_the_model_declares(name, fmi):
 def test_every_state_has_its_derivative(name, fmi):
     model, path = MODELS[name](), native(name, fmi=fmi)
     found = variables(path, fmi)
-    offset = 1 if fmi == 2 else 0
-    of = {n: int(v["derivative"]) - offset for n, v in found.items() if "derivative" in v}
+    of = {n: int(v["derivative"]) - 1 for n, v in found.items() if "derivative" in v}
     states, order = names(model, State), list(found)
     assert sorted(of.values()) == list(range(len(states)))
     assert {r.name: r.of.name for r in model.of(Rate)}.items() <= {n: order[i] for n, i in of.items()}.items()

@@ -15,7 +15,7 @@ from estimator.access.copies import Copies
 from estimator.access.recipe import Way
 from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
-from fmus.host import instance
+from fmus.host import loop
 from fmus.host.archive import Archive
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu, FmuError
@@ -107,7 +107,7 @@ def test_one_fmu_from_its_start_to_its_end(strict, breaches, monkeypatch):
         runs = [fmu.simulate(T, {"u": np.sin(T)}, ["x", "y"], {"x": 1.0})]
         with pytest.raises(FmuError):
             fmu.step(0.1, u=np.nan)
-        monkeypatch.setattr(instance, "LONG", 3)
+        monkeypatch.setattr(loop, "LONG", 3)
         runs.append(fmu.simulate(T, {"u": np.sin(T)}, ["x", "y"], {"x": 1.0}))
         assert_array_equal(*runs)
         fmu.instance.enter(fmu.references(["x"]), [3.0], 0.0)  # and closed in the midst of initialisation

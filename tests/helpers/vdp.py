@@ -35,7 +35,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
     <Float64 name="u" valueReference="5" causality="input" start="0"/>
     <Float64 name="fault" valueReference="6" causality="parameter" variability="fixed" start="0"/>
     <UInt64 name="n" valueReference="7" causality="structuralParameter" start="3"/>
-    <Float64 name="table" valueReference="8" causality="parameter" variability="tunable" start="1 2 3">
+    <Float64 name="table" valueReference="8" causality="local">
       <Dimension valueReference="7"/>
     </Float64>
     <Float64 name="scale" valueReference="9" causality="structuralParameter" start="1"/>

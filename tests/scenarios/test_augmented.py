@@ -2,9 +2,10 @@
 
 import json
 import zipfile
-from hashlib import sha256
+from hashlib import sha3_256, sha256
 from pathlib import Path
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -167,6 +168,40 @@ def test_both_say_where_their_values_come_from(foreign):
         page = packed.read("documentation/index.html").decode()
     for word in ("pull", "not known", about["base"]["sha256"], "Sledge.fmu", *FOUND[name]):
         assert word in page
+
+
+def test_the_package_carries_its_credibility_as_traceable_meta_data(foreign):
+    """By SSP Traceability 1.0: a file on the whole, and one beside the FMU with its checksum."""
+    name, (container, package) = foreign
+    origin = provenance(container)["origin"]
+    with zipfile.ZipFile(package) as packed:
+        files = {n: packed.read(n) for n in packed.namelist()}
+    (whole,) = (data for n, data in files.items() if n.endswith("traceability.srmd/resourceMetaData.srmd"))
+    whole, beside = (ElementTree.fromstring(data) for data in (whole, files["resources/effects.srmd"]))
+    common = "{http://ssp-standard.org/SSPTraceability1/SSPTraceabilityCommon}"
+    assert whole.tag == "{http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData}" + (
+        "SimulationResourceMetaData"
+    )
+    assert (whole.get("version"), whole.get("data")) == ("1.0.0", None)
+    assert beside.get("data") == "effects.fmu"
+    assert beside.get("checksum") == sha3_256(files["resources/effects.fmu"]).hexdigest()
+    for root in (whole, beside):
+        (classification,) = root
+        assert (classification.tag, classification.get("type")) == (
+            f"{common}Classification", "org.railfmi.credibility"
+        )  # fmt: skip
+        said = [(e.get("keyword"), e.text) for e in classification]
+        values = dict(said)
+        assert (values["experiment"], values["verdict"]) == ("pull", "traced")
+        assert [v for k, v in said if k == "effect"] == [f"{k} at {at}" for k, at in EFFECTS[name]]
+        assert values["data.data.csv.sha256"] == origin["data"]["data.csv"]
+        for n, (value, error) in origin["estimates"].items():
+            assert float(values[f"estimate.{n}"]) == value
+            low, high = map(float, values.get(f"estimate.{n}.interval_95", "nan nan").split())
+            if error is None:
+                assert f"estimate.{n}.standard_error" not in values
+            else:
+                assert (low, high) == pytest.approx((value - 1.96 * error, value + 1.96 * error), rel=1e-4)
 
 
 def test_one_of_our_models_comes_as_two_builds_that_agree(tmp_path):

@@ -119,6 +119,13 @@ class ForeignBuilder:
     form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
     form_error: ClassVar[float] = 0.0
 
+    def __post_init__(self) -> None:
+        if _described(self.fmu).exchange is not None:
+            raise BadInput(
+                f"{self.fmu}: is for model exchange alone; it can be run and compared, but effects are put "
+                "around FMUs for co-simulation; export it for co-simulation too"
+            )
+
     @property
     def offers(self) -> Effects:
         """Every force law at every port, for only its owner knows what makes sense there; and what can

@@ -14,6 +14,8 @@ NAMESPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
     "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
     "ssm": "http://ssp-standard.org/SSP1/SystemStructureParameterMapping",
+    "stc": "http://ssp-standard.org/SSPTraceability1/SSPTraceabilityCommon",
+    "srmd": "http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData",
     "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
     "railfmi": "https://railfmi.org/ssp",  # a name, not an address
 }
@@ -34,6 +36,7 @@ class Component:
     """An FMU in a system.
 
     source: its path in the package. start: values before the start by variable, each with its unit or None.
+    types: of variables that are not real: Integer, Boolean or Enumeration.
     step: s, where it has one of its own. feeds, data: of a source of signals, which component it feeds and
     the path of the same signals as CSV.
     """
@@ -45,6 +48,7 @@ class Component:
     step: float | None = None
     feeds: str | None = None
     data: str | None = None
+    types: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,16 @@ from fmus.export.ssp.system import (
 from fmus.export.table import unit_table
 from fmus.export.zipped import entry
 
+REAL = "Real"
+
 for _prefix, _address in NAMESPACES.items():
     ElementTree.register_namespace(_prefix, _address)
 
 
 def write_package(system: System, files: Mapping[str, bytes], out: Path) -> Path:
     """Write a package with further files by their path in it; the same content gives the same bytes."""
-    content = {STRUCTURE: _xml(_structure(system)), **files}
-    content |= {_values_of(c): _xml(_values(c)) for c in system.components if c.start}
+    content = {STRUCTURE: xml(_structure(system)), **files}
+    content |= {_values_of(c): xml(_values(c)) for c in system.components if c.start}
     part = out.with_name(f".{out.name}.{os.getpid()}")
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as packed:
@@ -56,52 +58,56 @@ def _values_of(component: Component) -> str:
 
 def _structure(system: System) -> Element:
     tool = f"railfmi {version('railfmi')}"
-    root = _node(None, "ssd:SystemStructureDescription", version="1.0", name=system.name, generationTool=tool)
+    root = element(
+        None, "ssd:SystemStructureDescription", version="1.0", name=system.name, generationTool=tool
+    )
     if system.description:
         root.set("description", system.description)
-    whole = _node(root, "ssd:System", name=system.name)
-    elements = _node(whole, "ssd:Elements")
+    whole = element(root, "ssd:System", name=system.name)
+    elements = element(whole, "ssd:Elements")
     for component in system.components:
         _component(elements, component)
     if system.links:
-        connections = _node(whole, "ssd:Connections")
+        connections = element(whole, "ssd:Connections")
         for link in system.links:
             _connection(connections, link)
     _units(root, (c.unit for component in system.components for c in component.connectors))
     times = {"startTime": system.start, "stopTime": system.stop}
     given = {name: repr(time) for name, time in times.items() if time is not None}
-    experiment = _node(root, "ssd:DefaultExperiment", **given)
+    experiment = element(root, "ssd:DefaultExperiment", **given)
     if system.step is not None:
-        algorithm = _node(_annotation(experiment, OSP), "osp:Algorithm")
-        _node(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(system.step))
+        algorithm = element(_annotation(experiment, OSP), "osp:Algorithm")
+        element(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(system.step))
     return root
 
 
 def _component(elements: Element, c: Component) -> None:
-    node = _node(elements, "ssd:Component", name=c.name, source=c.source)
+    node = element(elements, "ssd:Component", name=c.name, source=c.source)
     if c.connectors:
-        connectors = _node(node, "ssd:Connectors")
+        connectors = element(node, "ssd:Connectors")
         for connector in c.connectors:
-            _connector(connectors, connector)
+            _connector(connectors, connector, c.types.get(connector.name, REAL))
     if c.start:
-        _node(_node(node, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=_values_of(c))
+        element(element(node, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=_values_of(c))
     if c.step is not None or c.feeds is not None:
-        notes = _node(node, "ssd:Annotations")
+        notes = element(node, "ssd:Annotations")
         if c.step is not None:
-            _node(_node(notes, "ssc:Annotation", type=OSP), "osp:StepSizeHint", value=repr(c.step))
+            element(element(notes, "ssc:Annotation", type=OSP), "osp:StepSizeHint", value=repr(c.step))
         if c.feeds is not None and c.data is not None:
-            note = _node(notes, "ssc:Annotation", type=VENDOR)
-            _node(note, "railfmi:SignalSource", feeds=c.feeds, data=c.data)
+            note = element(notes, "ssc:Annotation", type=VENDOR)
+            element(note, "railfmi:SignalSource", feeds=c.feeds, data=c.data)
 
 
-def _connector(connectors: Element, c: Connector) -> None:
-    real = _node(_node(connectors, "ssd:Connector", name=c.name, kind=c.kind), "ssc:Real")
-    if c.unit is not None and known_unit(c.unit):
-        real.set("unit", c.unit)
+def _connector(connectors: Element, c: Connector, kind: str) -> None:
+    """A connector; the type of an enumeration is that of the FMU, whose items are not repeated."""
+    made = element(connectors, "ssd:Connector", name=c.name, kind=c.kind)
+    typed = None if kind == "Enumeration" else element(made, f"ssc:{kind}")
+    if typed is not None and kind == REAL and c.unit is not None and known_unit(c.unit):
+        typed.set("unit", c.unit)
 
 
 def _connection(connections: Element, link: Link) -> None:
-    node = _node(
+    node = element(
         connections,
         "ssd:Connection",
         startElement=link.source[0],
@@ -112,32 +118,39 @@ def _connection(connections: Element, link: Link) -> None:
     if link.plain:
         node.set("suppressUnitConversion", "true")
     if (link.gain, link.offset) != (1.0, 0.0):
-        _node(node, "ssc:LinearTransformation", factor=repr(link.gain), offset=repr(link.offset))
+        element(node, "ssc:LinearTransformation", factor=repr(link.gain), offset=repr(link.offset))
 
 
 def _units(parent: Element, units: Iterable[str | None]) -> None:
     found = unit_table({u for u in units if u is not None and known_unit(u)})
     if found:
         prefix = "ssv" if parent.tag == _tag("ssv:ParameterSet") else "ssd"
-        whole = _node(parent, f"{prefix}:Units")
+        whole = element(parent, f"{prefix}:Units")
         for name, base in found.items():
-            _node(_node(whole, "ssc:Unit", name=name), "ssc:BaseUnit", **base)
+            element(element(whole, "ssc:Unit", name=name), "ssc:BaseUnit", **base)
 
 
 def _values(component: Component) -> Element:
     """Values of a component before the start; libraries look for the name 'initialValues'."""
-    root = _node(None, "ssv:ParameterSet", version="1.0", name="initialValues")
-    parameters = _node(root, "ssv:Parameters")
+    root = element(None, "ssv:ParameterSet", version="1.0", name="initialValues")
+    parameters = element(root, "ssv:Parameters")
     for name, (value, unit) in component.start.items():
-        real = _node(_node(parameters, "ssv:Parameter", name=name), "ssv:Real", value=repr(float(value)))
-        if unit is not None and known_unit(unit):
-            real.set("unit", unit)
+        kind = component.types.get(name, REAL)
+        parameter = element(parameters, "ssv:Parameter", name=name)
+        if kind == "Boolean":
+            element(parameter, "ssv:Boolean", value="true" if value else "false")
+        elif kind != REAL:
+            element(parameter, "ssv:Integer", value=str(round(value)))
+        else:
+            real = element(parameter, "ssv:Real", value=repr(float(value)))
+            if unit is not None and known_unit(unit):
+                real.set("unit", unit)
     _units(root, (unit for _, unit in component.start.values()))
     return root
 
 
 def _annotation(parent: Element, kind: str) -> Element:
-    return _node(_node(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
+    return element(element(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
 
 
 def _tag(name: str) -> str:
@@ -145,13 +158,15 @@ def _tag(name: str) -> str:
     return f"{{{NAMESPACES[prefix]}}}{local}"
 
 
-def _node(parent: Element | None, tag: str, /, **attributes: str) -> Element:
+def element(parent: Element | None, tag: str, /, **attributes: str) -> Element:
+    """A new element by its prefix and name, within its parent unless that is None."""
     if parent is None:
         return Element(_tag(tag), attributes)
     return ElementTree.SubElement(parent, _tag(tag), attributes)
 
 
-def _xml(root: Element) -> bytes:
+def xml(root: Element) -> bytes:
+    """The file of an XML document."""
     ElementTree.indent(root)
     text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"

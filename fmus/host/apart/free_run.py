@@ -10,7 +10,7 @@ from pathlib import Path
 from fmus.host.apart.isolation import Isolation
 from fmus.host.apart.room import Room
 from fmus.host.fmu import Fmu
-from fmus.host.instance import Array
+from fmus.host.loop import Array
 
 
 @dataclass(frozen=True)

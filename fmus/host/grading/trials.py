@@ -22,11 +22,9 @@ from fmus.limits import MEMORY
 
 Outcome: TypeAlias = tuple[bool | None, str]
 RESTART = 1e-9  # relative; a restart may round where an uninterrupted run does not
-HALF, END = 50, 100  # steps
 CHANGES = "A run from the same start values does not repeat"
 HIDDEN = "It has a hidden state"
 SHARED = "Instances influence each other"
-SHORT = 20  # steps, of the runs of which there are many
 
 
 def is_valid(b: Bench) -> Outcome:
@@ -41,9 +39,9 @@ def is_valid(b: Bench) -> Outcome:
 def repeats(b: Bench) -> Outcome:
     """Reset, set states and parameters, initialise, run: twice the same to the last bit."""
     if not b.outputs:
-        return False, "It has no real output, so that nothing of it can be compared."
+        return False, "It has no output that is a number, so that nothing of it can be compared."
     with b.instance() as fmu:
-        first, again = (b.from_start(fmu, HALF) for _ in range(2))
+        first, again = (b.from_start(fmu, b.half) for _ in range(2))
     gap = difference(b.outputs, first, again)
     if gap:
         return (
@@ -58,11 +56,11 @@ def repeats(b: Bench) -> Outcome:
 def restarts_anywhere(b: Bench, tolerance: float = RESTART) -> Outcome:
     """Restart from the states read in the middle of a run: it goes on as if never interrupted."""
     with b.instance() as fmu:
-        b.from_start(fmu, HALF)
+        b.from_start(fmu, b.half)
         t, states = fmu.time, dict(zip(b.states, fmu.read(b.states), strict=True))
-        straight = b.run(fmu, HALF, END)
-        fmu.restart(t, **{**b.start, **b.inputs(HALF), **states})
-        restarted = b.run(fmu, HALF, END)
+        straight = b.run(fmu, b.half, 2 * b.half)
+        fmu.restart(t, **{**b.start, **b.inputs(b.half), **states})
+        restarted = b.run(fmu, b.half, 2 * b.half)
     gap = difference(b.outputs, straight, restarted, tolerance)
     shown = ", ".join(b.states)
     if not b.states and not gap:
@@ -83,12 +81,12 @@ def instances_keep_apart(b: Bench) -> Outcome:
         return None, "It allows one instance in a process, and says so."
     scales = (1.0, 0.5, -0.5)
     with b.instance() as fmu:
-        alone = [b.from_start(fmu, HALF, scale) for scale in scales]
+        alone = [b.from_start(fmu, b.half, scale) for scale in scales]
     with b.instance() as one, b.instance() as two, b.instance() as three:
         several = list(zip((one, two, three), scales, strict=True))
         for fmu, scale in several:
             b.restart(fmu, scale)
-        rows = [[b.run(fmu, k, k + 1, scale)[0] for fmu, scale in several] for k in range(HALF)]
+        rows = [[b.run(fmu, k, k + 1, scale)[0] for fmu, scale in several] for k in range(b.half)]
     together = np.swapaxes(np.array(rows), 0, 1)
     for number, (expected, found) in enumerate(zip(alone, together, strict=True), 1):
         gap = difference(b.outputs, expected, found)
@@ -102,18 +100,18 @@ def saves_its_state(b: Bench) -> Outcome:
     if not b.archive.description.saves_state:
         return None, "It does not offer to save and restore its state; a restart does that here."
     with b.instance() as fmu:
-        b.from_start(fmu, SHORT)
+        b.from_start(fmu, b.short)
         t, state = fmu.time, fmu.save()
-        straight = b.run(fmu, SHORT, HALF)
+        straight = b.run(fmu, b.short, b.half)
         ways = {"going back to a saved state": state}
         if b.archive.description.serialises_state:
             ways["going back to a state saved as bytes"] = fmu.deserialised(fmu.serialised(state))
         for way, saved in ways.items():
             b.restart(fmu, -0.5)
-            b.run(fmu, 0, SHORT, -0.5)
+            b.run(fmu, 0, b.short, -0.5)
             fmu.restore(saved)
             fmu.time = t
-            gap = difference(b.outputs, straight, b.run(fmu, SHORT, HALF))
+            gap = difference(b.outputs, straight, b.run(fmu, b.short, b.half))
             if gap:
                 return False, f"What it saves is not all of its state: after {way} it differs, {gap}."
         for saved in ways.values():
@@ -129,13 +127,13 @@ def takes_tunable_parameters(b: Bench) -> Outcome:
         return None, "It has no tunable parameter."
     idle = []
     with b.instance() as fmu:
-        base = b.from_start(fmu, SHORT)
-        late = base[SHORT // 2 :]
+        base = b.from_start(fmu, b.short)
+        late = base[b.short // 2 :]
         for name, value in tunable.items():
-            b.from_start(fmu, SHORT // 2)
+            b.from_start(fmu, b.short // 2)
             try:
                 fmu.set(**{name: value})
-                changed = b.run(fmu, SHORT // 2, SHORT)
+                changed = b.run(fmu, b.short // 2, b.short)
             except FmuError as error:
                 return (
                     False,
@@ -145,7 +143,7 @@ def takes_tunable_parameters(b: Bench) -> Outcome:
                 idle.append(name)
         for name in idle:
             b.restart(fmu, 1.0, {name: tunable[name]})
-            if difference(b.outputs, base, b.run(fmu, 0, SHORT)):
+            if difference(b.outputs, base, b.run(fmu, 0, b.short)):
                 return False, f"It ignores a change of the tunable parameter '{name}' while running."
     acting = f"{len(tunable) - len(idle)} of {len(tunable)} change this short run"
     return True, f"It takes changes of its tunable parameters while running ({acting})."
@@ -153,15 +151,15 @@ def takes_tunable_parameters(b: Bench) -> Outcome:
 
 def refuses_politely(b: Bench) -> Outcome:
     """NaN and a step back in time: refused with a reason, and a reset mends it."""
-    name = next(iter([*b.tunable(), *b.archive.description.inputs]), None)
+    name = next(iter([*b.tunable(), *b.description.inputs]), None)
     wrong: dict[str, tuple[dict[str, float], float]] = {"a step back in time": ({}, -b.dt)}
     if name:
         wrong[f"NaN in '{name}'"] = ({name: math.nan}, b.dt)
     taken, reasons = [], []
     with b.instance() as fmu:
-        expected = b.from_start(fmu, SHORT)
+        expected = b.from_start(fmu, b.short)
         for what, (values, dt) in wrong.items():
-            b.from_start(fmu, SHORT)
+            b.from_start(fmu, b.short)
             try:
                 fmu.set(**values)
                 fmu.step(dt)
@@ -169,7 +167,7 @@ def refuses_politely(b: Bench) -> Outcome:
             except FmuError as error:
                 reasons.append(_said(error))
             try:
-                again = b.from_start(fmu, SHORT)
+                again = b.from_start(fmu, b.short)
             except FmuError as error:
                 return False, f"After {what} no reset helps: {_said(error)}."
             gap = difference(b.outputs, expected, again)

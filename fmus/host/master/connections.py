@@ -62,12 +62,10 @@ class Directory:
             known = did_you_mean(fmu, self.descriptions)
             raise BadInput(f"{where}: there is no FMU '{fmu}'; {known} (names are 'fmu.variable')")
         description = self.descriptions[fmu]
-        if variable in description.unused:
-            kind = description.unused[variable]
-            raise BadInput(f"{where}: '{name}' is {kind}; use a scalar Real or Float64 one")
         if variable not in description.variables:
-            near = did_you_mean(variable, description.variables)
-            raise BadInput(f"{where}: FMU '{fmu}' ({description.name}) has no variable '{variable}'; {near}")
+            is_there = ":" if variable in description.unused else ""
+            why = description.missing(variable)
+            raise BadInput(f"{where}: FMU '{fmu}' ({description.name}){is_there} {why}")
         return Address(fmu, variable), description.variables[variable]
 
     def settable(self, name: str, where: str, causality: Causality) -> Address:
@@ -91,6 +89,11 @@ def link(connection: Connection, directory: Directory) -> Link:
     if taken.causality != "input":
         near = did_you_mean(target.variable, directory.descriptions[target.fmu].inputs)
         raise BadInput(f"{where}: '{target}' is no input but of causality '{taken.causality}'; {near}")
+    if taken.whole and not given.whole:
+        raise BadInput(
+            f"{where}: '{source}' is real, and '{target}' takes whole numbers ({taken.type}); connect an "
+            "output of whole numbers or truths"
+        )
     factor, shift = _converted(connection, given.unit, taken.unit)
     gain, offset = connection.gain * factor, connection.gain * shift + connection.offset
     return Link(source, target, gain, offset, connection.delayed)

@@ -8,9 +8,9 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
 from fmus.host.master.interrupt import stopped_by_ctrl_c
 from fmus.host.master.march import Tell
-from fmus.host.master.recording import Recorder, SharedCells
+from fmus.host.master.recording import Recorder, SharedCells, Stop
 
-Marched = Callable[..., float | None]  # made there: a run into cells by their name, see Master
+Marched = Callable[..., Stop | None]  # made there: a run into cells by their name, see Master
 
 
 class Stopping:
@@ -39,8 +39,8 @@ def run_elsewhere(
     recorder: Recorder,
     cells: SharedCells,
     tell: Tell | None,
-) -> float | None:
-    """Run there; the time, s, at which it was stopped. FmuEnded if an FMU ends that process.
+) -> Stop | None:
+    """Run there; how it was stopped. FmuEnded if an FMU ends that process.
 
     Functions of this process that give inputs are called from there.
     """

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fmus.errors import BadInput, did_you_mean
-from fmus.host.instance import Array
+from fmus.host.loop import Array
 
 Evaluation = Callable[[Array], Any]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from fmus.host.fmu import FmuError
 from fmus.host.master.clock import Plan
-from fmus.host.master.member import Member, StepRefused
-from fmus.host.master.recording import Recorder
+from fmus.host.master.member import Member, RunEnds, StepRefused
+from fmus.host.master.recording import Recorder, Stop
 from fmus.host.master.samples import Values
 from fmus.host.watch import PAGE, STOP
 
@@ -39,11 +39,15 @@ class Crew:
 
 
 class March:
-    """One run of a crew by a plan; `time` is how far it has come, `stopped` ends it there."""
+    """One run of a crew by a plan; `time` is how far it has come, `stopped` ends it there.
+
+    asked: by which FMU and how its end was asked for.
+    """
 
     def __init__(self, crew: Crew, plan: Plan, recorder: Recorder) -> None:
         self.crew, self.plan, self.recorder = crew, plan, recorder
         self.time, self.stopped, self._stiff = 0.0, False, crew.stiff
+        self.asked = ""
         self._saved: Saved = []
         self._saved_at, self._saved_rows, self._next_save, self._careful_until = -1, 0, 0, -1
         self._began = self._told = perf_counter()
@@ -81,7 +85,12 @@ class March:
                 break
             if not self._stiff and n >= self._next_save:
                 self._save(n)
-            if self._stepped(n):
+            try:
+                stepped = self._stepped(n)
+            except RunEnds as ends:
+                self.stopped, self.asked = True, str(ends)
+                break
+            if stepped:
                 n += 1
                 for m in self._due(n):
                     m.arrive(self.plan.times[n], True)
@@ -90,6 +99,12 @@ class March:
                 n = self._go_back(n)
             if tell:
                 self._tell(tell)
+
+    @property
+    def stop(self) -> Stop | None:
+        """How it came to an end before that of the plan."""
+        early = self.stopped and self.time < self.plan.times[-1]
+        return Stop(self.time, self.asked) if early else None
 
     def free(self) -> None:
         """Free saved states and the FMUs for other use."""

@@ -22,7 +22,7 @@ from fmus.host.master.connections import (
 from fmus.host.master.elsewhere import run_elsewhere
 from fmus.host.master.interrupt import stopped_by_ctrl_c
 from fmus.host.master.march import March, Tell
-from fmus.host.master.recording import Recorder, Recording, SharedCells
+from fmus.host.master.recording import Recorder, Recording, SharedCells, Stop
 from fmus.host.master.samples import EXTRAPOLATIONS
 from fmus.host.master.signals import Signal, Source, signal
 from fmus.host.master.wiring import Scheme, Wiring
@@ -80,7 +80,7 @@ class Master:
         }  # fmt: skip
         try:
             self._sources = _opened(fmus, self._own)
-            self._descriptions = {name: source.description for name, source in self._sources.items()}
+            self._descriptions = {n: source.description.widened for n, source in self._sources.items()}
             self._directory = Directory(self._descriptions)
             self._clock = clock(self._descriptions, step, steps or {}, record_step)
             found = links(connections, self._directory)
@@ -99,7 +99,8 @@ class Master:
         """Run from the start for `duration`, s, on new instances; the same again gives the same bits.
 
         tell(time, speed): called now and then with the simulated time, s, and how many times faster than
-        that time passes. Ctrl-C ends the run and keeps what was recorded.
+        that time passes. Ctrl-C ends the run and keeps what was recorded, and so does an FMU that asks for
+        the end; the recording says which.
         Raises FmuError where an FMU refuses a call, with its name, the time and its reason; FmuEnded where
         one ends the process in which it runs. What was recorded until then is their `so_far`.
         """
@@ -113,21 +114,21 @@ class Master:
         recorder = Recorder(names, units, cells)
         try:
             if room is None or cells is None:
-                stopped_at = self._march(plan, recorder, tell)
+                stop = self._march(plan, recorder, tell)
             else:
-                stopped_at = run_elsewhere(
+                stop = run_elsewhere(
                     room, marched, self._sources, self._options, duration, recorder, cells, tell
                 )
         except (FmuError, FmuEnded) as error:
-            error.so_far = recorder.recording(recorder.last)
+            error.so_far = recorder.recording(Stop(recorder.last))
             raise
-        return recorder.recording(stopped_at)
+        return recorder.recording(stop)
 
-    def run_into(self, cells: SharedCells, duration: float, tell: Tell | None) -> float | None:
-        """Run as `run` does, in this process, with the rows into cells; the time of a stop, s."""
+    def run_into(self, cells: SharedCells, duration: float, tell: Tell | None) -> Stop | None:
+        """Run as `run` does, in this process, with the rows into cells."""
         return self._march(self._clock.plan(duration, self._events), Recorder(self._record, (), cells), tell)
 
-    def _march(self, plan: Plan, recorder: Recorder, tell: Tell | None) -> float | None:
+    def _march(self, plan: Plan, recorder: Recorder, tell: Tell | None) -> Stop | None:
         with ExitStack() as stack:
             fmus = {
                 name: source if isinstance(source, Fmu) else stack.enter_context(Fmu(source))
@@ -138,7 +139,7 @@ class Master:
             with stopped_by_ctrl_c(march):
                 march.initialise(self._start)
                 march.run(tell)
-        return march.time if march.stopped and march.time < plan.times[-1] else None
+        return march.stop
 
     def close(self) -> None:
         """Delete unpacked files; Fmus and Archives that were given stay open."""
@@ -207,6 +208,8 @@ class Master:
         if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
             raise BadInput(f"{where}: {value!r} is no finite number; give one")
         v = self._descriptions[address.fmu].variables[address.variable]
+        if v.whole and value != round(value):
+            raise BadInput(f"{where}: {value:g} is no whole number, and the variable is of type {v.type}")
         low, high = -inf if v.min is None else v.min, inf if v.max is None else v.max
         if not low <= value <= high:
             raise BadInput(
@@ -217,7 +220,7 @@ class Master:
 
 def marched(
     fmus: Mapping[str, Archive], options: Mapping[str, Any], duration: float, cells: str, tell: Tell | None
-) -> float | None:
+) -> Stop | None:
     """A Master's run in the process of the FMUs: its rows into the cells of that name."""
     with Master(fmus, **options) as master:
         return master.run_into(SharedCells.named(cells), duration, tell)

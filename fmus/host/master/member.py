@@ -7,14 +7,10 @@ from typing import Any
 import numpy as np
 
 from fmus.host.fmu import Fmu, FmuError
-from fmus.host.instance import (
-    DISCARD,
-    WARNING,
-    Array,
-    CallFailed,
-)
+from fmus.host.loop import Array
 from fmus.host.master.samples import Extrapolation, Samples, Values
 from fmus.host.master.signals import Signal
+from fmus.host.status import DISCARD, WARNING, AskedToEnd, CallFailed
 from fmus.host.watch import GETTING, PAGE, SETTING, WHAT
 
 Wire = tuple[int, int, float, float]  # input number i = gain * output number j + offset
@@ -22,6 +18,10 @@ Wire = tuple[int, int, float, float]  # input number i = gain * output number j 
 
 class StepRefused(Exception):
     """An FMU discarded a step; a shorter one may do."""
+
+
+class RunEnds(Exception):
+    """An FMU asked to end the simulation; the sentence says which and when."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +114,12 @@ class Member:
             raise self._error("setting inputs", status)
 
     def step(self, t: float, dt: float) -> None:
-        """Advance from t by dt, s; StepRefused where a shorter step may do."""
+        """Advance from t by dt, s; StepRefused where a shorter step may do, RunEnds where none is wanted."""
         PAGE.stepping(self._instance.who, t)
         try:
             status = self._step(t, dt)
+        except AskedToEnd as error:
+            raise RunEnds(f"'{self.name}' ({self._fmu.name}): {error}") from error
         except CallFailed as error:
             raise self._refused(str(error)) from error
         if status > WARNING:

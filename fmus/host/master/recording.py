@@ -20,16 +20,29 @@ TIME = "time"
 UNIT = b"unit"  # key of a Parquet column's metadata
 
 
+@dataclass(frozen=True)
+class Stop:
+    """How a run came to an end before its time: when, s, and which FMU asked for it in what words.
+
+    asked: empty where the run was interrupted.
+    """
+
+    at: float
+    asked: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Values over time: `data` with the column 'time' (s) and one column per recorded variable.
 
     units: by column, None where the FMU states none. interrupted_at: s, where the run was broken off.
+    ended: which FMU asked for the end before the run's own, and when; empty where none did.
     """
 
     data: "pd.DataFrame"
     units: Mapping[str, str | None]
     interrupted_at: float | None = None
+    ended: str = ""
 
     def to_csv(self, path: str | Path) -> Path:
         """Write names in line 1 and numbers below; the units go beside it, in NAME.csv.units.json."""
@@ -146,14 +159,17 @@ class Recorder:
         """Forget all rows but the first ones."""
         del self._cells[rows * len(self._columns) :]
 
-    def recording(self, interrupted_at: float | None) -> Recording:
+    def recording(self, stop: Stop | None) -> Recording:
         """All of it."""
         import pandas as pd
 
         self.keep(self.rows)
         cells: Any = np.array(self._cells).reshape(-1, len(self._columns))
         data = pd.DataFrame(cells, columns=list(self._columns))
-        return Recording(data, dict(zip(self._columns, self._units, strict=True)), interrupted_at)
+        units = dict(zip(self._columns, self._units, strict=True))
+        if stop is None or stop.asked:
+            return Recording(data, units, ended=stop.asked if stop else "")
+        return Recording(data, units, stop.at)
 
 
 def _beside(path: Path) -> Path:

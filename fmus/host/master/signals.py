@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fmus.errors import BadInput
-from fmus.host.instance import Array
+from fmus.host.loop import Array
 from fmus.host.master.expression import parsed
 
 Source: TypeAlias = float | str | Callable[[Array], ArrayLike] | tuple[ArrayLike, ArrayLike]

@@ -30,6 +30,7 @@ CO_SIMULATION = {
     "hasEventMode": "false",
 }
 OPTIONS = "-ffp-contract=off -fvisibility=hidden"  # round as the bundled libraries do
+FIRST = 1  # value reference of the first variable, for tools that take 0 for none
 ICON = (-100.0, -100.0, 100.0, 100.0)  # lower left and upper right corner of the sheet and of the icon on it
 
 
@@ -56,13 +57,13 @@ def description3(table: Table, token: str) -> dict[str, bytes]:
 def _add_variable(parent: Element, entry: Entry) -> None:
     about = {
         "name": entry.name,
-        "valueReference": str(entry.reference),
+        "valueReference": str(FIRST + entry.reference),
         "causality": entry.causality,
         "variability": entry.variability,
         **({"initial": entry.initial} if entry.initial else {}),
         "description": entry.description,
     }
-    derivative = {} if entry.derivative_of is None else {"derivative": str(entry.derivative_of)}
+    derivative = {} if entry.derivative_of is None else {"derivative": str(FIRST + entry.derivative_of)}
     SubElement(parent, "Float64", about | numbers(entry) | derivative)
 
 
@@ -70,7 +71,7 @@ def _time(table: Table) -> dict[str, str]:
     """The independent variable, under a name that the model leaves free."""
     return {
         "name": free_name(("time",), {e.name for e in table.entries}),
-        "valueReference": str(len(table.entries)),
+        "valueReference": str(FIRST + len(table.entries)),
         "causality": "independent",
         "variability": "continuous",
         "description": "time of the simulation",
@@ -86,7 +87,8 @@ def _add_structure(parent: Element, table: Table) -> None:
         ("InitialUnknown", table.initial),
     ):
         for unknown in unknowns:
-            SubElement(structure, name, {"valueReference": str(unknown.reference), **needs(unknown, 0)})
+            about = {"valueReference": str(FIRST + unknown.reference), **needs(unknown, FIRST)}
+            SubElement(structure, name, about)
 
 
 def _build(table: Table) -> bytes:

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from tests.contracts.interop.importer import SOLVED, Case, Importer, table, told
 
-ZERO = "takes a dependency on the variable with the value reference 0 for an error"
+ZERO = "took value reference 0 of builds until then for an error; not run as a whole since"
 
 
 class OMSimulator(Importer):

@@ -3,7 +3,7 @@
 
 static Status knowns_fit(const Instance *m, const char *call, const unsigned *references, size_t n) {
     for (size_t k = 0; k < n; k++)
-        if (references[k] >= N_SET)
+        if (index_of(references[k]) >= N_SET)
             return refuse(m, ERROR, "%s: the variable with reference %u is no state, input or parameter", call,
                           references[k]);
     return OK;
@@ -11,9 +11,10 @@ static Status knowns_fit(const Instance *m, const char *call, const unsigned *re
 
 /* An unknown's place in the tangent; -1 for a state, -2 for what is not an unknown. */
 static int place_of(unsigned reference) {
-    if (reference < N_STATES) return -1;
-    if (reference < N_SET || reference >= N_VARIABLES) return -2;
-    return reference < FIRST_LOCAL ? (int)(N_STATES + reference - N_SET) : (int)LOCALS[reference - FIRST_LOCAL];
+    unsigned i = index_of(reference);
+    if (i < N_STATES) return -1;
+    if (i < N_SET || i >= N_VARIABLES) return -2;
+    return i < FIRST_LOCAL ? (int)(N_STATES + i - N_SET) : (int)LOCALS[i - FIRST_LOCAL];
 }
 
 static Status unknowns_fit(const Instance *m, const char *call, const unsigned *references, size_t n) {
@@ -39,14 +40,14 @@ static Status forward_derivative(Instance *m, const char *call, const unsigned *
                                  const unsigned *knowns, size_t n_known, const double *in, double *out) {
     if (derivative_call_fits(m, call, unknowns, n_unknown, knowns, n_known, in, out) != OK) return ERROR;
     memset(m->seed, 0, sizeof m->seed);
-    for (size_t k = 0; k < n_known; k++) m->seed[knowns[k]] += in[k];
+    for (size_t k = 0; k < n_known; k++) m->seed[index_of(knowns[k])] += in[k];
     bind(m, m->now.values);
     m->arg[3] = m->seed;
     m->res[0] = m->tangent;
     if (forward(m->arg, m->res, m->iw, m->w, 0)) return refuse(m, ERROR, "%s: cannot be computed here", call);
     for (size_t k = 0; k < n_unknown; k++) {
         int place = place_of(unknowns[k]);
-        out[k] = place < 0 ? m->seed[unknowns[k]] : m->tangent[place];
+        out[k] = place < 0 ? m->seed[index_of(unknowns[k])] : m->tangent[place];
     }
     return OK;
 }
@@ -66,8 +67,8 @@ static Status adjoint_derivative(Instance *m, const char *call, const unsigned *
     m->res[0] = m->seed;
     if (reverse(m->arg, m->res, m->iw, m->w, 0)) return refuse(m, ERROR, "%s: cannot be computed here", call);
     for (size_t k = 0; k < n_unknown; k++)
-        if (place_of(unknowns[k]) == -1) m->seed[unknowns[k]] += in[k];
-    for (size_t k = 0; k < n_known; k++) out[k] = m->seed[knowns[k]];
+        if (place_of(unknowns[k]) == -1) m->seed[index_of(unknowns[k])] += in[k];
+    for (size_t k = 0; k < n_known; k++) out[k] = m->seed[index_of(knowns[k])];
     return OK;
 }
 #endif

@@ -84,14 +84,14 @@ LANES_EXPORTED long long LANES_NAMED(railfmi_rows)(Rows *asked) {
     for (size_t k = 0; k < N_SET; k++)
         if (!within((unsigned)k, asked->base[k])) return 0;
     for (size_t k = 0; k < asked->n_put; k++)
-        if (asked->put[k] >= N_SET) return 0;
+        if (index_of(asked->put[k]) >= N_SET) return 0;
     for (size_t k = 0; k < asked->n_inputs; k++)
-        if (asked->inputs[k] >= N_SET) return 0;
+        if (index_of(asked->inputs[k]) >= N_SET) return 0;
     for (size_t k = 0; k < asked->n_get; k++)
-        if (asked->get[k] >= N_VARIABLES) return 0;
+        if (index_of(asked->get[k]) >= N_VARIABLES) return 0;
     for (size_t i = 0; i < asked->n_rows; i++)
         for (size_t k = 0; k < asked->n_put; k++)
-            if (!within(asked->put[k], asked->rows[i * asked->n_put + k])) return (long long)i;
+            if (!within(index_of(asked->put[k]), asked->rows[i * asked->n_put + k])) return (long long)i;
     long long failed = -1;
     for (size_t row = 0; row < asked->n_rows && failed < 0; row += WIDTH) failed = group_of_rows(asked, row);
     return failed;

@@ -48,13 +48,14 @@ VECTORS static bool advance_group(Group *m, double duration, int active) {
 VECTORS static void read_group(Group *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
     bool outputs = false, slopes = false;
     for (size_t k = 0; k < asked->n_get; k++) {
-        outputs = outputs || (asked->get[k] >= N_SET && asked->get[k] < FIRST_LOCAL);
-        slopes = slopes || asked->get[k] >= FIRST_LOCAL;
+        unsigned from = index_of(asked->get[k]);
+        outputs = outputs || (from >= N_SET && from < FIRST_LOCAL);
+        slopes = slopes || from >= FIRST_LOCAL;
     }
     if (outputs) lanes_h(m->values, m->outputs);
     if (slopes) lanes_f(m->values, m->slopes);
     for (size_t k = 0; k < asked->n_get; k++) {
-        unsigned from = asked->get[k];
+        unsigned from = index_of(asked->get[k]);
         const Lanes *value = from < N_SET         ? &m->values[from]
                              : from < FIRST_LOCAL ? &m->outputs[from - N_SET]
                                                   : &m->slopes[LOCALS[from - FIRST_LOCAL]];
@@ -66,8 +67,9 @@ VECTORS static void read_group(Group *m, const Rows *asked, size_t row, size_t s
 VECTORS static bool set_inputs(Group *m, const Rows *asked, const double *samples, size_t k) {
     for (size_t j = 0; j < asked->n_inputs; j++) {
         double x = samples[k * asked->n_inputs + j];
-        if (!within(asked->inputs[j], x)) return false;
-        m->values[asked->inputs[j]] = ALL(x);
+        unsigned into = index_of(asked->inputs[j]);
+        if (!within(into, x)) return false;
+        m->values[into] = ALL(x);
     }
     return true;
 }
@@ -81,7 +83,7 @@ VECTORS static long long group_of_rows(const Rows *asked, size_t row) {
     for (size_t k = 0; k < asked->n_put; k++)
         EACH(i) {
             size_t from = row + (size_t)(i < active ? i : 0); /* lanes without a row do as the first one */
-            m.values[asked->put[k]][i] = asked->rows[from * asked->n_put + k];
+            m.values[index_of(asked->put[k])][i] = asked->rows[from * asked->n_put + k];
         }
     if (first) read_group(&m, asked, row, 0, n_found, active);
     for (size_t k = 0; k + 1 < asked->n_samples; k++) {

@@ -1,5 +1,8 @@
 /* Values of variables by reference: what may be set when, and what follows from it. */
 
+/* The place of a variable in the order of the model description; beyond all of them for what is no reference. */
+static unsigned index_of(unsigned reference) { return reference - FIRST_REFERENCE; }
+
 static void bind(Instance *m, const double *x) {
     m->arg[0] = x;
     m->arg[1] = m->now.values + FIRST_INPUT;
@@ -39,9 +42,9 @@ static Status get_values(Instance *m, const char *call, const unsigned *referenc
     if (!allowed(m, call, ANY_MODE)) return ERROR;
     if (n && !(given(m, call, references) && given(m, call, values))) return ERROR;
     for (size_t k = 0; k < n; k++)
-        if (references[k] >= N_VARIABLES + HAS_TIME)
+        if (index_of(references[k]) >= N_VARIABLES + HAS_TIME)
             return refuse(m, ERROR, "%s: no variable has the reference %u", call, references[k]);
-    for (size_t k = 0; k < n; k++) values[k] = value(m, references[k]);
+    for (size_t k = 0; k < n; k++) values[k] = value(m, index_of(references[k]));
     return OK;
 }
 
@@ -49,9 +52,10 @@ static Status get_values(Instance *m, const char *call, const unsigned *referenc
 static Status settable(const Instance *m, const char *call, unsigned i) {
     bool running = (m->now.mode & RUNNING) != 0;
     if (i >= N_VARIABLES + HAS_TIME)
-        return refuse(m, ERROR, "%s: no variable has the reference %u", call, i);
+        return refuse(m, ERROR, "%s: no variable has the reference %u", call, i + FIRST_REFERENCE);
     if (i >= N_SET)
-        return refuse(m, ERROR, "%s: the variable with reference %u is computed and cannot be set", call, i);
+        return refuse(m, ERROR, "%s: the variable with reference %u is computed and cannot be set", call,
+                      i + FIRST_REFERENCE);
     if (running && i < FIRST_INPUT)
         return refuse(m, ERROR, "%s: state %s cannot be set while running; reset, set it, initialise",
                       call, VARIABLES[i].name);
@@ -77,10 +81,11 @@ static Status acceptable(const Instance *m, const char *call, unsigned i, double
 static Status set_values(Instance *m, const char *call, const unsigned *references, size_t n, const double *values) {
     if (!allowed(m, call, ANY_MODE & ~TERMINATED)) return ERROR;
     if (n && !(given(m, call, references) && given(m, call, values))) return ERROR;
-    for (size_t k = 0; k < n; k++)
-        if (settable(m, call, references[k]) != OK || acceptable(m, call, references[k], values[k]) != OK)
-            return ERROR;
-    for (size_t k = 0; k < n; k++) m->now.values[references[k]] = values[k];
+    for (size_t k = 0; k < n; k++) {
+        unsigned i = index_of(references[k]);
+        if (settable(m, call, i) != OK || acceptable(m, call, i, values[k]) != OK) return ERROR;
+    }
+    for (size_t k = 0; k < n; k++) m->now.values[index_of(references[k])] = values[k];
     forget_results(m);
     return OK;
 }
