@@ -21,7 +21,7 @@ class StatedUnits:
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
         self._file = sheet.file
-        self.notes: list[Note] = []
+        self.notes = [Note("file", "", remark) for remark in sheet.remarks]
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
         """Raise BadInput if the file contradicts the unit declared at `where` for a measured output.
