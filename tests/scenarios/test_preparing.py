@@ -14,12 +14,13 @@ from scenarios.cli.app import run_safely
 from scenarios.cli.console import interrupted, say_notices, will_write
 from scenarios.experiment.experiment import load_experiment
 from scenarios.output import WRITING, replaced
-from scenarios.preparing.draft import draft, toml_of, with_column
+from scenarios.preparing.draft import draft, with_column
 from scenarios.preparing.initialising import init
 from scenarios.preparing.inspecting import bandwidth, inspect
 from scenarios.preparing.matching import SURE, likeness, matches
 from scenarios.preparing.ports import port_remarks
 from scenarios.preparing.survey import Channel, survey
+from scenarios.preparing.text import toml_of
 from scenarios.preparing.trial import dry_run, duration, factor_of
 from tests.helpers.foreign import GOOD, foreign_builder
 from tests.helpers.paths import SHIPPED
@@ -149,7 +150,7 @@ def test_the_order_of_the_columns_does_not_matter(names):
 
 def drafted(folder, description=MOTOR, **record):
     [raster] = survey(log(folder, **record))
-    return draft(folder / "Motor.fmu", description, raster)
+    return draft(folder / "Motor.fmu", description, [raster])
 
 
 def test_a_draft_guesses_units_ports_split_and_bounds(tmp_path):
@@ -295,7 +296,7 @@ def test_durations(seconds, words):
 
 
 def test_inspecting_an_fmu_tells_what_is_missing(tmp_path):
-    said = "\n".join(inspect(foreign_builder(tmp_path)()))
+    said = repr(inspect(foreign_builder(tmp_path)()))
     assert "whether it can be used: railfmi check" in said
     assert "state" in said
 
