@@ -117,7 +117,7 @@ class Draft:
     @property
     def late(self) -> bool:
         """Whether the part that identifies begins when the FMU has forgotten its start values."""
-        return not self.description.states and self.settling < LATEST * np.ptp(self.raster.t)
+        return not self.description.states and self.settling < LATEST * float(np.ptp(self.raster.t))
 
     @property
     def split(self) -> tuple[float, float, float]:

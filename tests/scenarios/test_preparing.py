@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimator.record import Record, Run
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.cli.app import run_safely
@@ -21,7 +22,7 @@ from scenarios.preparing.matching import SURE, likeness, matches
 from scenarios.preparing.ports import port_remarks
 from scenarios.preparing.survey import Channel, survey
 from scenarios.preparing.text import toml_of
-from scenarios.preparing.trial import dry_run, duration, factor_of
+from scenarios.preparing.trial import Trial, dry_run, duration, factor_of
 from tests.helpers.foreign import GOOD, foreign_builder
 from tests.helpers.paths import SHIPPED
 
@@ -279,6 +280,18 @@ def test_a_trial_notices_a_wrong_unit(tmp_path):
     assert sum("look at unit, model_unit" in line for line in trial.lines()) == 2
     assert not any("look at unit" in line for line in dry_run(DEMO).lines())
     assert trial.candidates == dry_run(DEMO).candidates > 20
+
+
+def test_a_trial_judges_the_parts_of_the_record_alone():
+    """What lies before them may show how the FMU starts."""
+    part = T >= 1.0
+    y = np.sin(T)[:, None]
+    run = Run(T, np.empty((T.size, 0)), y, part & (T < 7), part & False, part & (T >= 7))
+    simulated = y + 0.01 * np.cos(40 * T)[:, None] + np.where(part, 0.0, 50.0)[:, None]
+    problem = SimpleNamespace(record=Record((run,), (), ("y",), np.array([np.nan])))
+    told = Trial(problem, simulated, 1.0, 1, 1).to_frame().loc["y"]
+    assert told["error"] == pytest.approx(0.01 / np.sqrt(2), rel=0.02)
+    assert told["factor"] == pytest.approx(1.0, rel=0.01)
 
 
 @given(st.floats(0.01, 100))
