@@ -51,7 +51,7 @@ class Initialised(Shown):
         for r in d.others:
             clock = d.clock(r)
             said = (
-                f"offset = {clock.offset:g} s, {clock.found}" if clock.found else "offset not found; say it"
+                f"offset = {clock.offset!r} s, {clock.found}" if clock.found else "offset not found; say it"
             )
             lines.append(
                 f"clock of {d.name(r)} ({1 / r.step:.4g} Hz; record {1 / d.raster.step:.4g} Hz): {said}"
@@ -61,10 +61,9 @@ class Initialised(Shown):
             lines.append(f"port '{port.name}': force {port.force}, velocity {port.velocity}{far}")
         for v in d.free_inputs:
             lines.append(f"input '{v.name}' has no column; it is constant at {v.start or 0.0:g}")
-        for left in {*self.records} - {s.raster.file for s in d.signals}:
-            lines.append(
-                f"{left.name} is not used: none of its columns looks like a further variable of the FMU"
-            )
+        used = {s.raster.file for s in d.signals}
+        for file in (f for f in self.records if f not in used):
+            lines.append(f"{file.name} is not used: none of its columns looks like a further variable")
         if d.unused:
             lines.append(f"columns that are not used: {', '.join(d.unused)}")
         return lines
@@ -114,7 +113,7 @@ def init(
     if file.exists() and not force:
         raise BadInput(f"{file}: exists already; give another --out, or --force to replace it")
     description = describe(model)
-    rasters = [r for i, file in enumerate(records) for r in survey(file, None if i else time)]
+    rasters = [r for i, record in enumerate(records) for r in survey(record, None if i else time)]
     made = draft(model, description, rasters)
     if ask is not None:
         made = _asked(made, ask)

@@ -157,7 +157,7 @@ WRONG = {
         ["[derived.a]", "both sides"],
     ),
     "a record that is thinned": (
-        edited("experiment.toml", 'id = "', 'rate = 10\nid = "'), ["key 'rate'", "leave the key out"]
+        edited("experiment.toml", 'id = "', 'rate = 50\nid = "'), ["key 'rate'", "leave the key out"]
     ),
     "another clock": (
         edited("experiment.toml", "[estimate]", '[files.tacho]\ntime = "t"\n[estimate]'),
