@@ -43,7 +43,8 @@ class FmuVariable:
 class PortNames:
     """A location by an FMU's variables: its name, force input, and the outputs conjugate to it.
 
-    displacement: None if no output gives it; then no law over a displacement can act there.
+    displacement: None if no output gives it; then no law over a displacement can act there, unless it is
+    integrated, from the velocity and from 0 at the start of a simulation.
     velocity_unit: said where the FMU states none; it tells whether the port turns.
     """
 
@@ -52,6 +53,12 @@ class PortNames:
     velocity: str
     displacement: str | None
     velocity_unit: str | None = None
+    integrated: bool = False
+
+    @property
+    def has_displacement(self) -> bool:
+        """Whether laws over a displacement can act there."""
+        return self.displacement is not None or self.integrated
 
     @property
     def motion(self) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.experiment.declaration import Number, Positive, Table
+from scenarios.experiment.table import Number, Positive, Table
 from scenarios.simulating.declaration import FileName, Name, Whole
 
 

@@ -19,6 +19,6 @@ def inspect(
     from scenarios.preparing.inspecting import inspect as looked_at
 
     with progress("reading the file"):
-        lines = looked_at(file, out, time)
-    for line in lines:
+        found = looked_at(file, out, time)
+    for line in found.lines():
         echo(line)

@@ -119,7 +119,7 @@ def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> St
     """
     if folder is None:
         return Stages()
-    files = [*([e.file] if e.file.is_file() else []), *e.data_files, *([e.fmu_path] if e.fmu_path else [])]
+    files = [*([e.file] if e.file.is_file() else []), *e.every_file, *([e.fmu_path] if e.fmu_path else [])]
     said = [] if e.file.is_file() else [sha256(repr(dict(e)).encode()).hexdigest()]
     key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files), *said]
     stages = Stages(folder / STAGES, " ".join(key))
@@ -176,7 +176,8 @@ def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATE
         raise BadInput(f"{e.file}: names neither a model nor an FMU; add one of the keys 'model' and 'fmu'")
     units = {name: output.model_unit for name, output in e.outputs.items()}
     ports = tuple(
-        PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity)) for p in e.ports
+        PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity), p.integrate)
+        for p in e.ports
     )
     return ForeignBuilder(e.fmu_path, ports, work, isolation_of(e.fmu_path, isolation))
 
@@ -256,6 +257,6 @@ def origin_of(e: Experiment, best: Hypothesis, verdict: str) -> Origin:
     return Origin(
         experiment=e.id,
         estimates={n: (best.fit.theta[n], s) for n, s in errors.items()},
-        data={file.name: checksum(file) for file in e.data_files},
+        data={file.name: checksum(file) for file in e.every_file},
         verdict=verdict,
     )

@@ -39,7 +39,7 @@ from scenarios.estimating.result import (
 )
 from scenarios.estimating.setup import set_up
 from scenarios.experiment.conversions import Show, conversion_lines
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.estimated import Options
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record

@@ -30,7 +30,7 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.form import LEARNT, Form, begun_again, consistent, leading, widened
 from scenarios.estimating.setup import Setup, finely
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.estimated import Options
 
 Tell = Callable[[str], None]
 MOVED = 0.1  # of its first deviation must an unknown move to be elsewhere than it was believed

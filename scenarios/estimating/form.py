@@ -14,7 +14,7 @@ from estimator.filters.history import History
 from estimator.filters.system import Joint, UnknownParameter
 from fmus.host.description import FmuDescription
 from fmus.models import model_class
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.estimated import Options
 from scenarios.experiment.experiment import Experiment
 
 LEARNT = 30.0  # s of the record from which a second run of the filter takes its start values

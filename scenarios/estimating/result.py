@@ -24,7 +24,7 @@ from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.aside import blocks, let_go
 from scenarios.drawing.typography import quantity, with_error
-from scenarios.experiment.declaration import Alarm, Options
+from scenarios.experiment.estimated import Alarm, Options
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:

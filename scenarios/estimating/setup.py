@@ -29,7 +29,7 @@ from scenarios.estimating.unknowns import (
     states_of,
     usual,
 )
-from scenarios.experiment.declaration import Alarm, Options
+from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
 MIN_SAMPLES = 10

@@ -17,7 +17,7 @@ from estimator.filters.unknown_input import (
 from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription, FmuVariable
-from scenarios.experiment.declaration import EstimatedParameter, Options
+from scenarios.experiment.estimated import EstimatedParameter, Options
 from scenarios.experiment.experiment import Experiment
 
 FIRST = 10.0  # start deviation of a measured state, in standard deviations of its noise

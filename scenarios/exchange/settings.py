@@ -7,7 +7,7 @@ from fmus.contact.forces.conditions import CONDITIONS
 from fmus.errors import BadInput, did_you_mean
 from fmus.export.provenance import FOLDER
 from scenarios.exchange.toml_text import toml_text
-from scenarios.experiment.declaration import Table
+from scenarios.experiment.table import Table
 from scenarios.simulating.asking import asked
 from scenarios.simulating.declaration import Declaration, Moment
 from scenarios.simulating.reading import Scenario

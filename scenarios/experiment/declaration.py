@@ -2,52 +2,37 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
+from pydantic import ConfigDict, Field, PlainValidator, model_validator
 
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
-
-
-def _interval(value: object) -> tuple[float, float]:
-    if not (isinstance(value, list | tuple) and len(value) == 2 and all(map(_is_number, value))):
-        raise ValueError(f"must be two numbers [lower, upper], not {value!r}")
-    if not value[0] < value[1]:
-        raise ValueError(f"must increase, [lower, upper], not {list(value)}")
-    return float(value[0]), float(value[1])
+from scenarios.experiment.estimated import Estimate
+from scenarios.experiment.table import Interval, Number, Positive, Share, Table, is_number
 
 
-def _filter(value: object) -> str:
-    from estimator.filters import filters  # they take a second to load, and few files name one
-
-    if not (isinstance(value, str) and value in filters()):
-        raise ValueError(f"must be one of {', '.join(filters())}, not {str(value)[:60]!r}")
-    return value
+def key_of(column: str, file: str | None) -> str:
+    """How a column is called within an experiment: with its file, if it is one of [files]."""
+    return f"{file}: {column}" if file else column
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
-Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
-Interval = Annotated[tuple[float, float], PlainValidator(_interval)]
-Filter = Annotated[str, PlainValidator(_filter)]
+class Measured(Table):
+    """A column of the record, or of one of [files]."""
+
+    column: str
+    file: str | None = None
+
+    @property
+    def key(self) -> str:
+        """See key_of."""
+        return key_of(self.column, self.file)
 
 
-class Table(BaseModel):
-    """A table of the file: its keys are the fields, no others."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class InputColumn(Table):
+class InputColumn(Measured):
     """A measured input: its column, the column's unit, and the FMU's where the FMU states none.
 
     Without `unit` the column has the unit that the file states, else that of the FMU.
     """
 
-    column: str
     unit: str | None = None
     model_unit: str | None = None
 
@@ -55,12 +40,13 @@ class InputColumn(Table):
 def _column_or_number(value: object) -> str | float | InputColumn:
     if isinstance(value, str):
         return value
-    if isinstance(value, int | float) and _is_number(value):
+    if isinstance(value, int | float) and is_number(value):
         return float(value)
     if isinstance(value, dict):
         return InputColumn.model_validate(value)
     raise ValueError(
-        f"must be a column name in quotes or a number, or a table {{column, unit, model_unit}}, not {value!r}"
+        "must be a column name in quotes or a number, or a table {column, unit, model_unit, file}, "
+        f"not {value!r}"
     )
 
 
@@ -109,13 +95,12 @@ class Split(Table):
         return {part: file for part, file in given.items() if file}
 
 
-class Output(Table):
+class Output(Measured):
     """A measured output: its column, the column's unit, and the standard deviation of its noise in it.
 
     model_unit: the FMU's unit, to be said where the FMU states none; the column is converted to it.
     """
 
-    column: str
     unit: str
     model_unit: str | None = None
     noise_std: Positive | None = None
@@ -125,92 +110,32 @@ class Derived(Table):
     """A column made from another one: its time derivative by central differences."""
 
     derivative: str
+    file: str | None = None
+
+    @property
+    def key(self) -> str:
+        """The column that it is made from, see key_of."""
+        return key_of(self.derivative, self.file)
 
 
 class Port(Table):
     """A location on a foreign FMU: a force input and the outputs conjugate to it.
 
-    Without a displacement, only laws over velocity and time are tried there.
+    Without a displacement, only laws over velocity and time are tried there. integrate: whether it is
+    integrated from the velocity, from 0 at the start of a simulation, since no output gives it.
     """
 
     name: str
     force: str
     velocity: str
     displacement: str | None = None
-
-
-class EstimatedParameter(Table):
-    """A parameter the filter estimates; start and bounds default to the declared and the FMU's."""
-
-    start: Number | None = None
-    std: Positive | None = None
-    bounds: Interval | None = None
+    integrate: bool = False
 
     @model_validator(mode="after")
-    def _start_within_bounds(self) -> Self:
-        if self.start is not None and self.bounds and not self.bounds[0] <= self.start <= self.bounds[1]:
-            raise ValueError(f"start {self.start:g} is outside its bounds {list(self.bounds)}")
+    def _integrated_or_given(self) -> Self:
+        if self.integrate and self.displacement is not None:
+            raise ValueError("has a displacement, so 'integrate' is not needed; leave one of the two out")
         return self
-
-
-class EstimatedInput(Table):
-    """An unknown input: a random process of that standard deviation about that frequency [Hz]."""
-
-    std: Positive
-    frequency: Positive
-    rate_input: str | None = None
-
-
-class Alarm(Table):
-    """Tell when a quantity is below or above a limit with at least that probability, for `hold` s on end."""
-
-    below: Number | None = None
-    above: Number | None = None
-    probability: Share = 0.95
-    hold: NotNegative = 1.0
-
-    @model_validator(mode="after")
-    def _has_a_limit(self) -> Self:
-        if self.below is None and self.above is None:
-            raise ValueError("needs 'below' or 'above', the limit in the quantity's unit")
-        return self
-
-
-class Options(Table):
-    """How an estimate is made: filter, noise, gating, smoothing, alarms; the rest is derived from the data.
-
-    process_std: noise that drives a state, its unit/sqrt(s). walk: how far a parameter wanders in a second,
-    its unit/sqrt(s). initial_std: what is known of a state's start. damping: of an unknown input's process.
-    input_parts: in how many parts inputs act between two samples. alarms: in place of those that the model
-    declares. form: whether what the form of the model leaves open is estimated too.
-    """
-
-    filter: Filter = "ukf"
-    smooth: bool = False
-    process_std: dict[str, NotNegative] = {}
-    walk: dict[str, Positive] = {}
-    initial_std: dict[str, Positive] = {}
-    damping: dict[str, Positive] = {}
-    random_walk: tuple[str, ...] = ()
-    clip: tuple[str, ...] = ()
-    gate: Positive | None = None
-    adapt: tuple[Literal["measurement", "process"], ...] = ()
-    input_parts: Annotated[int, Field(strict=True, ge=1)] | None = None
-    form: bool = True
-    alpha: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0
-    beta: Number = 2.0
-    kappa: Number = 0.0
-    alarms: dict[str, Alarm] = {}
-
-
-class Estimate(Table):
-    """What the filter estimates beside the states it needs anyway, and how; `rate` in Hz."""
-
-    parameters: dict[str, EstimatedParameter] = {}
-    states: tuple[str, ...] = ()
-    rate: Positive | None = None
-    inputs: dict[str, EstimatedInput] = {}
-    options: Options = Options()
 
 
 class DataFile(Table):
@@ -228,6 +153,25 @@ def _data(value: object) -> str | DataFile:
     raise ValueError(f"must be a file name in quotes, or a table {{file = ..., option = ...}}, not {value!r}")
 
 
+class OtherClock(Table):
+    """`[files.NAME]`: channels of the same run with times of their own; options as in [data].
+
+    file: by default that of the record itself, in which they have another time column. offset: s, is added
+    to their times, which then are those of the record.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    file: str | None = None
+    time: str
+    time_unit: str | None = None
+    offset: Number = 0.0
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of the library that reads the file, by name."""
+        return dict(self.model_extra or {})
+
+
 class Plan(Table):
     """What `plan` assumes of a record that is not taken yet.
 
@@ -240,12 +184,15 @@ class Plan(Table):
     ratio: Positive = 1.0
     power: Share = 0.8
     noise_share: Positive = 0.01
-    sensors: dict[str, Positive] = {}
+    sensors: dict[str, Positive] = Field(default_factory=dict)
     inputs: tuple[str, ...] | None = None
 
 
 class Declaration(Table):
-    """The keys of experiment.toml."""
+    """The keys of experiment.toml.
+
+    rate: Hz, to which a record is thinned, behind a low-pass filter; by default all its rows are used.
+    """
 
     id: str
     model: str | None = None
@@ -253,13 +200,15 @@ class Declaration(Table):
     data: Annotated[str | DataFile, PlainValidator(_data)] | None = None
     time: str
     time_unit: str | None = None
+    rate: Positive | None = None
+    files: dict[str, OtherClock] = Field(default_factory=dict)
     split: Split | None = None
-    parameters: dict[str, Number] = {}
-    calibrate: dict[str, Interval] = {}
-    initial: dict[str, Number] = {}
-    inputs: dict[str, Channel] = {}
+    parameters: dict[str, Number] = Field(default_factory=dict)
+    calibrate: dict[str, Interval] = Field(default_factory=dict)
+    initial: dict[str, Number] = Field(default_factory=dict)
+    inputs: dict[str, Channel] = Field(default_factory=dict)
     outputs: Annotated[dict[str, Output], Field(min_length=1)]
-    derived: dict[str, Derived] = {}
+    derived: dict[str, Derived] = Field(default_factory=dict)
     ports: tuple[Port, ...] = ()
     estimate: Estimate | None = None
     plan: Plan = Plan()
@@ -303,6 +252,7 @@ def _contradictions(d: Declaration) -> Iterator[str]:
         yield "key 'data' is missing" if d.data is None else "[data] has no key 'file'; name the data file"
     if files and d.data_file is not None and d.data_file not in files:
         yield "key 'data' beside [split] identify_data and test_data; leave one of the two out"
+    yield from _wrong_files(d)
     made: set[str] = set()
     for name, derived in d.derived.items():
         if derived.derivative in d.derived and derived.derivative not in made:
@@ -314,3 +264,20 @@ def _contradictions(d: Declaration) -> Iterator[str]:
     unknown = d.estimate.inputs if d.estimate else {}
     for name in sorted(unknown.keys() & d.inputs.keys()):
         yield f"input '{name}' stands in [inputs] and in [estimate.inputs]; it is either known or estimated"
+
+
+def _wrong_files(d: Declaration) -> Iterator[str]:
+    """Channels of files that are not declared, and files that cannot go with the split."""
+    named = {f"[inputs] {name}": c.file for name, c in d.input_columns.items()}
+    named |= {f"[outputs.{name}]": o.file for name, o in d.outputs.items()}
+    named |= {f"[derived.{name}]": c.file for name, c in d.derived.items()}
+    for where, file in named.items():
+        if file is not None and file not in d.files:
+            known = f"they are {', '.join(d.files)}" if d.files else "add [files.NAME] with its file and time"
+            yield f"{where} file = '{file}' is none of [files]; {known}"
+    for name, other in d.files.items():
+        if other.file is not None and d.split and d.split.files:
+            yield (
+                f"[files.{name}] file = '{other.file}' beside [split] with files of its own; give the parts "
+                "as windows of one record in seconds"
+            )

@@ -37,6 +37,14 @@ class Experiment(Declaration):
             return tuple(self.data_dir / file for file in self.split.files.values())
         return (self.data_dir / (self.data_file or ""),)
 
+    @property
+    def every_file(self) -> tuple[Path, ...]:
+        """All files that data are read from: those of the record, and those with clocks of their own."""
+        named = {channel.file for channel in (*self.input_columns.values(), *self.outputs.values())}
+        named |= {made.file for made in self.derived.values()}
+        more = [f.file for name, f in self.files.items() if f.file is not None and name in named]
+        return tuple(dict.fromkeys((*self.data_files, *(self.data_dir / file for file in more))))
+
 
 def load_experiment(path: str | Path, data_dir: str | Path | None = None) -> Experiment:
     """Read the experiment in a file; its data are in `data_dir`, by default the folder of the file.

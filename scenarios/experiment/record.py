@@ -14,20 +14,19 @@ from estimator.record import (
     Record,
     Run,
 )
-from fmus.errors import BadInput, did_you_mean
+from fmus.errors import BadInput
 from fmus.host.description import FmuDescription
 from fmus.units import column_conversion, model_unit
 from scenarios.experiment.checks import (
     check_cells,
     check_gaps,
-    check_time,
     output_notes,
     time_notes,
 )
 from scenarios.experiment.experiment import Experiment, check_names
 from scenarios.experiment.parts import MIN_SAMPLES, masks
-from scenarios.experiment.readers import read_sheet
-from scenarios.experiment.readers.units import SAME, StatedUnits
+from scenarios.experiment.readers.units import SAME
+from scenarios.experiment.reading import Channels, base_of, read_channels
 
 LARGEST = 1e100  # of a measured number
 MIN_MEASURED = 2  # samples of an output in each file; fewer show no motion
@@ -68,10 +67,10 @@ def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
     """
     check_names(experiment, description)
     conversions, _ = _conversions(experiment, description)
-    needed = {c.column for c in experiment.input_columns.values()}
+    needed = {c.key for c in experiment.input_columns.values()}
     for name, made in reversed(experiment.derived.items()):
         if name in needed:
-            needed.add(made.derivative)
+            needed.add(made.key)
     derived = {name: made for name, made in experiment.derived.items() if name in needed}
     inputs_alone = experiment.model_copy(update={"outputs": {}, "derived": derived})
     record = load_record(inputs_alone, description)
@@ -94,10 +93,10 @@ def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[list[Conversion], 
         where, variable = f"{e.file}: [outputs.{name}]", f"'{name}' of {fmu.name}"
         unit = model_unit(fmu.variables[name].unit, output.model_unit, variable, where)
         scale = column_conversion(output.unit, unit, variable, where)
-        found.append(Conversion(name, output.column, output.unit, unit, *scale))
+        found.append(Conversion(name, output.key, output.unit, unit, *scale))
         if scale != SAME:
-            said = f"column '{output.column}' is converted from {output.unit} to {unit}"
-            notes.append(Note("unit", output.column, said))
+            said = f"column '{output.key}' is converted from {output.unit} to {unit}"
+            notes.append(Note("unit", output.key, said))
     return found, notes
 
 
@@ -108,63 +107,54 @@ def _run(
 
     The last item holds the conversions of the inputs.
     """
-    data, stated = _read(e, file)
-    chosen = masks(e, part, file, data[e.time])
+    read = read_channels(e, file, missing)
+    chosen = masks(e, part, file, read.t)
     used = slice(int(np.flatnonzero(np.any(chosen, axis=0))[-1]) + 1)
-    data = {column: values[used] for column, values in data.items()}
+    data = {column: values[used] for column, values in read.columns.items()}
     fit, choose, test = (mask[used] for mask in chosen)
-    t = data[e.time]
-    notes = _checked(e, file, data)
+    t = read.t[used]
+    notes = _checked(e, file, t, data)
     if not missing:
-        there = _filled(e, data)
+        there = _filled(e, t, data)
         fit, choose, test = fit & there, choose & there, test & there
         notes += _left_out(file, there, (fit, choose, test))
     for name, derived in e.derived.items():
-        data[name] = _derivative(t, data[derived.derivative])
+        data[name] = _derivative(t, data[derived.key])
     given = dict[str, Array | float](e.input_constants)
-    converted = [_input(e, fmu, name, stated) for name in e.input_columns]
+    converted = [_input(e, fmu, name, read) for name in e.input_columns]
     for c in converted:
         given[c.variable] = data[c.column] * c.factor + c.offset
     u = np.empty((t.size, len(e.inputs)))
     for j, name in enumerate(e.inputs):
         u[:, j] = given[name]
-    measured = [data[output.column] for output in e.outputs.values()]
+    measured = [data[output.key] for output in e.outputs.values()]
     outputs = np.column_stack(measured) if measured else np.empty((t.size, 0))  # of an experiment planned
     y = outputs * scale[:, 0] + scale[:, 1]
-    return Run(t, u, y, fit, choose, test), [*notes, *stated.notes], converted
+    more = [note for stated in read.stated.values() for note in stated.notes]
+    return Run(t, u, y, fit, choose, test), [*notes, *read.notes, *more], converted
 
 
-def _input(e: Experiment, fmu: FmuDescription, name: str, stated: StatedUnits) -> Conversion:
+def _input(e: Experiment, fmu: FmuDescription, name: str, read: Channels) -> Conversion:
     """The conversion of an input's column; none if neither the experiment nor the file states its unit."""
     channel, where, variable = e.input_columns[name], f"{e.file}: [inputs] {name}", f"'{name}' of {fmu.name}"
-    column, times = _source(e, channel.column)
+    base = base_of(e, channel.key)
+    stated = read.stated[base.file]
     target = model_unit(fmu.variables[name].unit, channel.model_unit, variable, where)
     if channel.unit is None:
-        scale = stated.to(column, target, where, times)
-        return Conversion(name, channel.column, stated.stated(column, where, times), target, *scale)
+        scale = stated.to(base.column, target, where, base.times)
+        unit = stated.stated(base.column, where, base.times)
+        return Conversion(name, channel.key, unit, target, *scale)
     scale = column_conversion(channel.unit, target, variable, where)
     if scale != SAME:
-        said = f"column '{channel.column}' is converted from {channel.unit} to {target}"
-        stated.notes.append(Note("unit", channel.column, said))
-    return Conversion(name, channel.column, channel.unit, target, *scale)
+        said = f"column '{channel.key}' is converted from {channel.unit} to {target}"
+        stated.notes.append(Note("unit", channel.key, said))
+    return Conversion(name, channel.key, channel.unit, target, *scale)
 
 
-def _check_units(e: Experiment, stated: StatedUnits) -> None:
-    """Compare the units declared for the measured inputs and outputs with those stated in the file."""
-    declared = {f"[outputs.{name}]": (output.column, output.unit) for name, output in e.outputs.items()}
-    for name, channel in e.input_columns.items():
-        if channel.unit is not None:
-            declared[f"[inputs] {name}"] = channel.column, channel.unit
-    for where, (name, unit) in declared.items():
-        column, times = _source(e, name)
-        stated.check(column, times, unit, f"{e.file}: {where}")
-
-
-def _filled(e: Experiment, data: dict[str, Array]) -> BoolArray:
+def _filled(e: Experiment, t: Array, data: dict[str, Array]) -> BoolArray:
     """Whether every output has a number at a sample (N,); in `data`, values between neighbours fill gaps."""
-    t = data[e.time]
     there = np.ones(t.size, dtype=np.bool_)
-    for column in dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values()):
+    for column in dict.fromkeys(base_of(e, output.key).key for output in e.outputs.values()):
         known = np.isfinite(data[column])
         data[column] = np.interp(t, t[known], data[column][known])
         there &= known
@@ -186,12 +176,11 @@ def _left_out(file: Path, there: BoolArray, parts: Sequence[BoolArray]) -> list[
     return [Note("gap", "", said)]
 
 
-def _checked(e: Experiment, file: Path, data: dict[str, Array]) -> list[Note]:
-    """Notes on the columns of a file, (N,) each; raises BadInput for gaps and for missing numbers."""
-    t = data[e.time]
+def _checked(e: Experiment, file: Path, t: Array, data: dict[str, Array]) -> list[Note]:
+    """Notes on the columns of a record, (N,) each; raises BadInput for gaps and for missing numbers."""
     check_gaps(str(file), t)
-    measured = dict.fromkeys(_source(e, output.column)[0] for output in e.outputs.values())
-    needed = {_source(e, c.column)[0] for c in e.input_columns.values()}
+    measured = dict.fromkeys(base_of(e, output.key).key for output in e.outputs.values())
+    needed = {base_of(e, c.key).key for c in e.input_columns.values()}
     for column, values in data.items():
         may_miss = column in measured and column not in needed
         check_cells(str(file), column, t, np.where(np.isnan(values), 0.0, values) if may_miss else values)
@@ -214,41 +203,3 @@ def _derivative(t: Array, x: Array) -> Array:
     found = np.full(t.size, np.nan)
     found[there] = np.gradient(x[there], t[there])
     return found
-
-
-def _source(e: Experiment, column: str) -> tuple[str, int]:
-    """The column of the file behind one that may be derived, and how many times it is differentiated."""
-    times = 0
-    while column in e.derived:
-        column, times = e.derived[column].derivative, times + 1
-    return column, times
-
-
-def _read(e: Experiment, file: Path) -> tuple[dict[str, Array], StatedUnits]:
-    """The columns an experiment uses, (N,) each, the time in seconds and checked, and the units stated."""
-    wanted = _wanted(e)
-    sheet = read_sheet(file, e.time, wanted, e.data_options)
-    for name in e.derived:
-        if name in sheet.known:
-            raise BadInput(f"{e.file}: [derived.{name}] has the name of a column of {file}; take another one")
-    for column, where in wanted.items():
-        if column in sheet.apart:
-            raise BadInput(f"{e.file}: {where}: column '{column}' of {file} {sheet.apart[column]}")
-        if column not in sheet.cells:
-            known = did_you_mean(column, [*sheet.known, *e.derived])
-            raise BadInput(f"{e.file}: {where}: column '{column}' is not in {file}; {known}")
-    stated = StatedUnits(sheet)
-    _check_units(e, stated)
-    columns = {column: sheet.numbers(column) for column in wanted if column != e.time}
-    t = stated.seconds(e.time, f"{e.file}: key 'time'", e.time_unit)
-    check_time(str(file), e.time, t, np.arange(t.size) + sheet.first, sheet.row)
-    return {e.time: t, **columns}, stated
-
-
-def _wanted(e: Experiment) -> dict[str, str]:
-    """The columns that must be in a file, and where the experiment names them."""
-    named = {e.time: "key 'time'"}
-    named |= {c.column: f"[inputs] {name}" for name, c in e.input_columns.items()}
-    named |= {output.column: f"[outputs.{name}]" for name, output in e.outputs.items()}
-    named |= {derived.derivative: f"[derived.{name}]" for name, derived in e.derived.items()}
-    return {column: where for column, where in named.items() if column not in e.derived}

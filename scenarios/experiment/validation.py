@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from fmus.errors import BadInput, did_you_mean
 from fmus.taken import check_text
-from scenarios.experiment.declaration import Table
+from scenarios.experiment.table import Table
 
 T = TypeVar("T", bound=Table)
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.experiment.declaration import Table
+from scenarios.experiment.table import Table
 
 CALIBRATED = "calibrated"  # kind of the rows of a parameter that close-loop has calibrated
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]

@@ -129,6 +129,10 @@ class _Planned:
             e = read_table(Experiment, table)
             if e.split and e.split.files:
                 raise BadInput("[split] names files, but a fleet's records have one each; give windows in s")
+            if named := [name for name, other in e.files.items() if other.file is not None]:
+                raise BadInput(
+                    f"[files.{named[0]}] names a file, but a fleet's records have one each; add its channels"
+                )
             if "close-loop" in self.setup.commands and e.split is None:
                 raise BadInput("key 'split' is missing; close-loop needs it to set a test part apart")
             if "estimate" in self.setup.commands and e.estimate is None:

@@ -1,21 +1,24 @@
-"""An experiment drafted from an FMU and a record: what is guessed, how sure that is, and the file of it."""
+"""An experiment drafted from an FMU and a record of one or several files: what is guessed, and how sure."""
 
-import json
-import os
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import copysign, floor, log10
 from pathlib import Path
 
+import numpy as np
+
 from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.experiment.readers.header import spelled
+from scenarios.experiment.readers.units import dates_apart
+from scenarios.experiment.sampling import SAME
 from scenarios.preparing.matching import SURE, Match, matches
 from scenarios.preparing.quantities import alike, known, likely_unit, quantities_of, words_of
 from scenarios.preparing.survey import Channel, Raster
 
-IDENTIFY = 0.65  # share of the record that identifies; the rest tests
+ONE_MORE = 0.65  # likeness of a further column that makes it worth another file; a mere guess has less
+LATEST = 0.2  # of a record that may pass before it is used
 AROUND = 0.2  # of the FMU's value: the bounds of a parameter that is calibrated
-CALIBRATED = 6  # parameters; with more the user has to choose
+IDENTIFY = 0.65  # share of the record that identifies; the rest tests
 FORCES = ("force", "torque")
 LABELS = {"force": "mass", "torque": "shaft"}  # of the only port of its kind
 MOTION = {"force": ("velocity", "displacement"), "torque": ("speed of rotation", "angle")}
@@ -26,6 +29,7 @@ class Signal:
     """An input or output of the FMU with its column, the unit of each, and how sure all that is."""
 
     variable: FmuVariable
+    raster: Raster
     channel: Channel
     unit: str | None
     model_unit: str | None
@@ -43,15 +47,32 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Clock:
+    """What is added to the times of a raster, s, to have those of the record; found: how, None if not."""
+
+    offset: float
+    found: str | None
+
+
+UNKNOWN = Clock(0.0, None)
+
+
+@dataclass(frozen=True)
 class Draft:
-    """An experiment as it was guessed."""
+    """An experiment as it was guessed.
+
+    rasters: of all files, those of the record and of others; clocks: of others than the record, as found;
+    settling: how long the FMU takes to forget its start values, s.
+    """
 
     fmu: Path
     description: FmuDescription
-    raster: Raster
+    rasters: tuple[Raster, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    ports: tuple[Place, ...]
+    ports: tuple[Place, ...] = ()
+    clocks: Mapping[Raster, Clock] = field(default_factory=dict)
+    settling: float = 0.0
 
     @property
     def signals(self) -> tuple[Signal, ...]:
@@ -59,9 +80,56 @@ class Draft:
         return (*self.inputs, *self.outputs)
 
     @property
+    def raster(self) -> Raster:
+        """The record itself: the raster with the slowest output, since what is faster is thinned."""
+        slow = max((s.raster.step for s in self.outputs), default=0.0)
+        used = [s.raster for s in self.outputs if s.raster.step > slow / (1 + SAME)]
+        return max(used or self.rasters, key=lambda r: [s.raster for s in self.signals].count(r))
+
+    @property
+    def others(self) -> tuple[Raster, ...]:
+        """The other rasters that signals come from."""
+        return tuple(dict.fromkeys(s.raster for s in self.signals if s.raster is not self.raster))
+
+    def clock(self, raster: Raster) -> Clock:
+        """The clock of a raster."""
+        return self.clocks.get(raster, UNKNOWN)
+
+    def name(self, raster: Raster) -> str:
+        """How a raster is called in [files]: by its group of channels, if it has one, else by its file."""
+        plain = [r.time.rpartition("/")[0] or r.file.stem for r in self.rasters]
+        i = self.rasters.index(raster)
+        return plain[i] if plain.count(plain[i]) == 1 else f"{plain[i]}_{i + 1}"
+
+    def column(self, raster: Raster, channel: Channel) -> str:
+        """How a column is called where those of all files are listed."""
+        return channel.name if len(self.rasters) == 1 else f"{self.name(raster)}: {channel.name}"
+
+    def column_of(self, s: Signal) -> str:
+        """How the column of a signal is called there."""
+        return self.column(s.raster, s.channel)
+
+    @property
+    def columns(self) -> dict[str, tuple[Raster, Channel]]:
+        """All columns by their names."""
+        return {self.column(r, c): (r, c) for r in self.rasters for c in r.channels}
+
+    @property
+    def late(self) -> bool:
+        """Whether the part that identifies begins when the FMU has forgotten its start values."""
+        return not self.description.states and self.settling < LATEST * float(np.ptp(self.raster.t))
+
+    @property
     def split(self) -> tuple[float, float, float]:
         """Begin of the record, end of the part that identifies, and end of the part that tests, s."""
         begin, end = self.raster.longest()
+        for other in self.others:
+            ahead = self.clock(other).offset + dates_apart(other.begin, self.raster.begin)
+            first, last = (t + ahead for t in other.longest())
+            if first < end and last > begin:
+                begin, end = max(begin, first), min(end, last)
+        if self.late:
+            begin += self.settling
         middle = begin + IDENTIFY * (end - begin)
         places = max(0, 2 - floor(log10(self.raster.step)))  # finer than a sample, coarser than rounding
         return round(begin, places), round(middle, places), round(end, places)
@@ -75,35 +143,46 @@ class Draft:
     @property
     def unused(self) -> list[str]:
         """Columns that are no signal."""
-        taken = {s.channel.name for s in self.signals}
-        return [c.name for c in self.raster.channels if c.name not in taken]
+        taken = [s.channel for s in self.signals]
+        return [name for name, (_, c) in self.columns.items() if c not in taken]
 
 
-def draft(fmu: Path, description: FmuDescription, raster: Raster) -> Draft:
-    """The guess: columns by likeness, ports by the inputs that are forces and have no column."""
+def draft(fmu: Path, description: FmuDescription, rasters: Sequence[Raster]) -> Draft:
+    """The guess: columns by likeness, ports by the inputs that are forces and have no column.
+
+    Rasters are put together only where that gives columns to more variables than any of them alone.
+    """
+    alone = max((_drafted(fmu, description, [r]) for r in rasters), key=lambda d: len(d.signals))
+    together = _drafted(fmu, description, rasters)
+    more = sum(s.likeness for s in together.signals) - sum(s.likeness for s in alone.signals)
+    return together if more > ONE_MORE else alone
+
+
+def _drafted(fmu: Path, description: FmuDescription, rasters: Sequence[Raster]) -> Draft:
     signals = [description.variables[n] for n in (*description.inputs, *description.outputs)]
-    found = [_signal(m) for m in matches(signals, raster.channels)]
+    home = {c: r for r in rasters for c in r.channels}
+    found = [_signal(m, home[m.channel]) for m in matches(signals, [*home])]
     inputs = tuple(s for s in found if s.variable.causality == "input")
     outputs = tuple(s for s in found if s.variable.causality == "output")
-    made = Draft(fmu, description, raster, inputs, outputs, ())
+    made = Draft(fmu, description, tuple(rasters), inputs, outputs)
     return replace(made, ports=tuple(_ports(made)))
 
 
-def _signal(m: Match) -> Signal:
+def _signal(m: Match, raster: Raster) -> Signal:
     unit = spelled(m.channel.unit) if known(spelled(m.channel.unit or "")) and m.channel.unit else None
     if m.variable.unit:
-        return Signal(m.variable, m.channel, unit, None, m.likeness)
+        return Signal(m.variable, raster, m.channel, unit, None, m.likeness)
     guess = likely_unit(m.variable.name, m.variable.description, unit)
-    return Signal(m.variable, m.channel, unit, guess, m.likeness)
+    return Signal(m.variable, raster, m.channel, unit, guess, m.likeness)
 
 
 def with_column(made: Draft, variable: str, column: str | None) -> Draft:
     """The draft with another column for a variable, or without one; its ports are guessed anew."""
     v = made.description.variables[variable]
-    kept = [s for s in made.signals if s.variable.name != variable and s.channel.name != column]
-    if column is not None:
-        [channel] = [c for c in made.raster.channels if c.name == column]
-        kept.append(_signal(Match(v, channel, 1.0)))
+    raster, channel = (None, None) if column is None else made.columns[column]
+    kept = [s for s in made.signals if s.variable.name != variable and s.channel is not channel]
+    if raster is not None and channel is not None:
+        kept.append(_signal(Match(v, channel, 1.0), raster))
     inputs = tuple(s for s in kept if s.variable.causality == "input")
     changed = replace(made, inputs=inputs, outputs=tuple(s for s in kept if s not in inputs), ports=())
     return replace(changed, ports=tuple(_ports(changed)))
@@ -145,117 +224,24 @@ def sure(likeness: float) -> str:
     return "sure" if likeness >= SURE else "likely" if likeness >= 0.6 else "a guess"
 
 
-def toml_of(made: Draft, folder: Path) -> str:
-    """The text of experiment.toml in a folder, with a comment on each guess."""
-    return "\n".join([*_head(made, folder), *_parameters(made), *_signals(made), *_places(made)]) + "\n"
+def uncertain(description: FmuDescription) -> list[FmuVariable]:
+    """The parameters that may be calibrated, but for factors of one."""
+    variables = [description.variables[n] for n in description.parameters]
+    return [v for v in variables if v.start and v.variability != "constant" and not is_factor(v)]
 
 
-def _head(made: Draft, folder: Path) -> Iterator[str]:
-    begin, middle, end = made.split
-    r = made.raster
-    yield "# Drafted by 'railfmi init' from the FMU and the record; every guess has a comment."
-    yield "# Correct what is wrong, then run: railfmi close-loop experiment.toml --dry-run"
-    yield f"id = {_text(made.fmu.stem.lower())}"
-    yield f"fmu = {_text(_path(made.fmu, folder))}"
-    yield f"data = {_text(_path(r.file, folder))}"
-    yield f"time = {_text(r.time)}"
-    yield ""
-    yield f"[split]  # the record runs from {r.t[0]:.9g} to {r.t[-1]:.9g} s"
-    yield f"identify = [{begin!r}, {middle!r}]  # the first {IDENTIFY:.0%}: effects are fitted to it"
-    yield f"test = [{middle!r}, {end!r}]  # the rest: errors are reported on it"
-
-
-def _parameters(made: Draft) -> Iterator[str]:
-    variables = [made.description.variables[n] for n in made.description.parameters]
-    some = [v for v in variables if v.start and v.variability != "constant"]
-    if not some:
-        return
-    yield ""
-    few = len(uncertain := [v for v in some if not _is_factor(v)]) <= CALIBRATED
-    yield "[calibrate]  # parameters that are uncertain, with bounds; remove those that you know exactly"
-    if not few:
-        yield f"# the FMU has {len(some)} parameters: take away the '#' of those that are uncertain"
-    for v in some:
-        low, high = _bounds(v)
-        of = f" {v.unit}" if v.unit and v.unit != "1" else ""
-        said = f"the FMU's value is {v.start:.6g}{of}, +-{AROUND:.0%}"
-        if _is_factor(v):
-            said = (
-                "exactly 1 and without a unit, so probably no measured value; take away the '#' if it is one"
-            )
-        out = "" if few and v in uncertain else "# "
-        yield f"{out}{_key(v.name)} = [{low!r}, {high!r}]  # {said}"
-
-
-def _is_factor(v: FmuVariable) -> bool:
+def is_factor(v: FmuVariable) -> bool:
     """Whether a parameter is a factor 1 or -1, which with a mass or an inertia beside it cannot be told."""
     return v.unit == "1" and abs(v.start or 0.0) == 1.0
 
 
-def _bounds(v: FmuVariable) -> tuple[float, float]:
+def bounds_of(v: FmuVariable) -> tuple[float, float]:
+    """The bounds of a parameter about the FMU's value, within the FMU's limits."""
     start = v.start or 0.0
     ends = sorted(start + copysign(AROUND * abs(start), sign) for sign in (-1.0, 1.0))
     low = ends[0] if v.min is None else max(ends[0], v.min)
     high = ends[1] if v.max is None else min(ends[1], v.max)
     return float(f"{low:.9g}"), float(f"{high:.9g}")
-
-
-def _signals(made: Draft) -> Iterator[str]:
-    if made.description.inputs:
-        yield ""
-        yield "[inputs]"
-    for s in made.inputs:
-        units = [f"unit = {_text(s.unit)}"] if s.unit else []
-        units += [f"model_unit = {_text(s.model_unit)}"] if s.model_unit and s.unit else []
-        table = ", ".join([f"column = {_text(s.channel.name)}", *units])
-        yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}"
-    for v in made.free_inputs:
-        yield f"{_key(v.name)} = {v.start or 0.0!r}  # no column looks like it: constant at its start value"
-    for s in made.outputs:
-        yield ""
-        yield f"[outputs.{_key(s.variable.name)}]  # {_why(s)}"
-        yield f"column = {_text(s.channel.name)}"
-        unit = s.unit or s.variable.unit or s.model_unit or "1"
-        yield f"unit = {_text(unit)}" + ("" if s.unit else "  # a guess, the record states none")
-        if not s.variable.unit:
-            yield f"model_unit = {_text(s.model_unit or unit)}  # a guess: the FMU states no unit"
-        yield f"# noise_std = {s.channel.noise:.3g}  # in '{unit}', as it looks in the record"
-    if made.unused:
-        yield ""
-        yield f"# columns that are not used: {', '.join(made.unused)}"
-
-
-def _why(s: Signal) -> str:
-    stated = f"FMU variable in {s.variable.unit}" if s.variable.unit else "the FMU states no unit"
-    return f"{sure(s.likeness)} ({s.likeness:.0%}); {stated}"
-
-
-def _places(made: Draft) -> Iterator[str]:
-    for port in made.ports:
-        yield ""
-        yield "[[ports]]  # where an effect may act; laws over a displacement need an output that gives it"
-        yield f"name = {_text(port.name)}"
-        yield f"force = {_text(port.force)}"
-        yield f"velocity = {_text(port.velocity)}"
-        if port.displacement:
-            yield f"displacement = {_text(port.displacement)}"
-    if not made.ports:
-        yield ""
-        yield "# No port was found: without one only changes of inputs, parameters and sensors are tried."
-        yield "# A port is an input that adds a force or torque, and the output that is its velocity:"
-        yield '# [[ports]]\n# name = "shaft"\n# force = "T_ext"\n# velocity = "omega"'
-
-
-def _path(file: Path, folder: Path) -> str:
-    return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
-
-
-def _text(value: str | None) -> str:
-    return json.dumps(value or "", ensure_ascii=False)
-
-
-def _key(name: str) -> str:
-    return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else _text(name)
 
 
 def doubtful(made: Draft) -> Sequence[Signal]:

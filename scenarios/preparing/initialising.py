@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
 from scenarios.drawing.typography import aligned
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import unwritten, writable
-from scenarios.preparing.draft import Draft, doubtful, draft, sure, toml_of, with_column
+from scenarios.preparing.clocks import with_clocks
+from scenarios.preparing.draft import Draft, doubtful, draft, sure, with_column
 from scenarios.preparing.survey import survey
+from scenarios.preparing.text import toml_of
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
@@ -28,80 +31,99 @@ Ask = Callable[[str, Sequence[str], str], str]
 
 @dataclass(frozen=True, repr=False)
 class Initialised(Shown):
-    """What was drafted, and the file that holds it."""
+    """What was drafted, the file that holds it, and the files that it was drafted from."""
 
     file: Path
     draft: Draft
+    records: tuple[Path, ...] = ()
 
     def lines(self) -> list[str]:
         """The mapping as a table, and what was found beside it."""
         d = self.draft
         rows = [("FMU variable", "", "column", "unit", "unit in the FMU", "how sure")]
         rows += [
-            (s.variable.name, str(s.variable.causality), s.channel.name, s.unit or "not stated",
+            (s.variable.name, str(s.variable.causality), d.column_of(s), s.unit or "not stated",
              s.variable.unit or f"{s.model_unit or 'not stated'} (guess)",
              f"{sure(s.likeness)}, {s.likeness:.0%}")
             for s in d.signals
         ]  # fmt: skip
         lines = aligned(rows)
+        for r in d.others:
+            clock = d.clock(r)
+            said = (
+                f"offset = {clock.offset!r} s, {clock.found}" if clock.found else "offset not found; say it"
+            )
+            lines.append(
+                f"clock of {d.name(r)} ({1 / r.step:.4g} Hz; record {1 / d.raster.step:.4g} Hz): {said}"
+            )
         for port in d.ports:
             far = f", displacement {port.displacement}" if port.displacement else ", no displacement"
             lines.append(f"port '{port.name}': force {port.force}, velocity {port.velocity}{far}")
         for v in d.free_inputs:
             lines.append(f"input '{v.name}' has no column; it is constant at {v.start or 0.0:g}")
+        used = {s.raster.file for s in d.signals}
+        for file in (f for f in self.records if f not in used):
+            lines.append(f"{file.name} is not used: none of its columns looks like a further variable")
         if d.unused:
             lines.append(f"columns that are not used: {', '.join(d.unused)}")
         return lines
 
     def to_frame(self) -> pd.DataFrame:
         """A row for each variable of the FMU that has a column; likeness is between 0 and 1."""
+        d = self.draft
         rows = {
             s.variable.name: {
-                "causality": s.variable.causality, "column": s.channel.name, "unit": s.unit,
+                "causality": s.variable.causality, "column": d.column_of(s), "unit": s.unit,
                 "model_unit": s.variable.unit or s.model_unit, "likeness": s.likeness,
             }
-            for s in self.draft.signals
+            for s in d.signals
         }  # fmt: skip
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("variable")
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """How much each column looks like the variable that it was taken for."""
-        drawn = axes_or_new(ax)
-        signals = self.draft.signals
-        drawn.barh([f"{s.variable.name}: {s.channel.name}" for s in signals], [s.likeness for s in signals])
+        drawn, d = axes_or_new(ax), self.draft
+        names = [f"{s.variable.name}: {d.column_of(s)}" for s in d.signals]
+        drawn.barh(names, [s.likeness for s in d.signals])
         drawn.set(xlim=(0, 1), xlabel="how sure the match is")
         return drawn
 
 
 def init(
     fmu: str | Path,
-    data: str | Path,
+    data: str | Path | Sequence[str | Path],
     out: str | Path = ".",
     time: str | None = None,
     ask: Ask | None = None,
     force: bool = False,
+    isolation: Isolation | None = ISOLATED,
 ) -> Initialised:
     """Write a commented experiment.toml that `close-loop` accepts.
 
-    out: folder of the file. time: the time column, by default it is looked for. ask: asks a user about what
-    is not sure; None takes the likeliest. force: whether an existing experiment.toml may be replaced.
+    data: the file of the record, or those of several loggers with clocks of their own; how far these are
+    apart is found by their dates or by a simulation, and written as a guess. out: folder of the file.
+    time: the time column of the first file, by default it is looked for. ask: asks a user about what is not
+    sure; None takes the likeliest. force: whether an existing experiment.toml may be replaced. isolation:
+    limits of the process in which a foreign FMU is simulated.
     Raises BadInput if nothing in the record looks like an output of the FMU.
     """
-    model, record, folder = Path(fmu), Path(data), Path(out).absolute()
+    model, folder = Path(fmu), Path(out).absolute()
+    records = [Path(data)] if isinstance(data, str | Path) else [Path(d) for d in data]
     file = folder / "experiment.toml"
     if file.exists() and not force:
         raise BadInput(f"{file}: exists already; give another --out, or --force to replace it")
     description = describe(model)
-    rasters = survey(record, time)
-    made = max((draft(model, description, raster) for raster in rasters), key=lambda d: len(d.signals))
+    rasters = [r for i, record in enumerate(records) for r in survey(record, None if i else time)]
+    made = draft(model, description, rasters)
     if ask is not None:
         made = _asked(made, ask)
     if not made.outputs:
         raise BadInput(
-            f"{record}: no column looks like an output of {model.name} ({', '.join(description.outputs)}); "
-            f"the columns are {', '.join(c.name for c in made.raster.channels)}; rename one, or run "
-            "the command on a terminal, where it asks"
+            f"{', '.join(map(str, records))}: no column looks like an output of {model.name} "
+            f"({', '.join(description.outputs)}); the columns are {', '.join(made.columns)}; rename one, or "
+            "run the command on a terminal, where it asks"
         )
+    made = with_clocks(made, isolation)
     text = toml_of(made, writable(folder))
     part = file.with_name(f".{file.name}.{os.getpid()}")
     try:
@@ -116,15 +138,15 @@ def init(
         raise unwritten(error, folder) from error
     finally:
         part.unlink(missing_ok=True)
-    return Initialised(file, made)
+    return Initialised(file, made, tuple(records))
 
 
 def _asked(made: Draft, ask: Ask) -> Draft:
     """The draft after questions about each signal that is not sure, and each output without a column."""
     for s in doubtful(made):
-        answers = [c.name for c in made.raster.channels]
+        answers = [*made.columns]
         question = f"column of {s.variable.causality} '{s.variable.name}' ({NONE} for none)"
-        answer = ask(question, [*answers, NONE], s.channel.name)
+        answer = ask(question, [*answers, NONE], made.column_of(s))
         made = with_column(made, s.variable.name, None if answer == NONE else answer)
     taken = {s.variable.name for s in made.signals}
     for name in made.description.outputs:

@@ -1,45 +1,124 @@
-"""`railfmi inspect`: what a record or an FMU holds, as lines and, for a record, a picture."""
+"""`railfmi inspect`: what a record or an FMU holds, as lines, as a table and, for a record, as pictures."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.signal import welch
 
 from estimator.record import Array
 from fmus.host.archive import describe, problems
-from fmus.host.description import FmuDescription
+from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.drawing.sheet import INK, NOISE, Plot, envelope, name_axes, sheet, sheets
 from scenarios.drawing.typography import aligned, unit
 from scenarios.output import writable, written_at_once
 from scenarios.preparing.survey import Raster, survey
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MOST_POWER = 0.99  # of a channel's variance lies below the frequency that is told
 KINDS = ("input", "output", "parameter")  # of the variables that are listed
 PANELS = 6  # channels on a sheet
 
 
-def inspect(file: str | Path, out: str | Path | None = None, time: str | None = None) -> list[str]:
-    """What a file holds, as lines; out: folder for the pictures of a record, None draws none.
+class Inspected(Shown):
+    """What a file holds."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordInspected(Inspected):
+    """The rasters of a record, and the pictures that were drawn of them."""
+
+    rasters: tuple[Raster, ...]
+    pictures: tuple[tuple[Path, ...], ...]
+
+    def lines(self) -> list[str]:
+        """Rates, remarks and channels of each raster."""
+        found = list[str]()
+        for raster, files in zip(self.rasters, self.pictures, strict=True):
+            found += [*_of_raster(raster), *(f"picture: {file}" for file in files)]
+        return found
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each channel; noise is a standard deviation in the channel's unit, bandwidth in Hz."""
+        rows = [
+            {
+                "channel": c.name, "unit": c.unit, "rate": 1 / r.step, "least": c.present.min(),
+                "greatest": c.present.max(), "noise": c.noise, "bandwidth": bandwidth(c.x, r.step),
+                "remarks": "; ".join(c.remarks),
+            }
+            for r in self.rasters
+            for c in r.channels
+        ]  # fmt: skip
+        return pd.DataFrame(rows).set_index("channel")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """All channels over time, one below the other, each from its least to its greatest value."""
+        drawn = axes_or_new(ax)
+        channels = [(r, c) for r in self.rasters for c in r.channels]
+        for i, (r, c) in enumerate(channels):
+            spread = float(np.ptp(c.present)) or 1.0
+            drawn.plot(*envelope(r.t, (c.x - c.present.min()) / spread - 1.2 * i), linewidth=0.7)
+        drawn.set_yticks([0.5 - 1.2 * i for i in range(len(channels))], [c.name for _, c in channels])
+        drawn.set_xlabel("time in s")
+        return drawn
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FmuInspected(Inspected):
+    """The variables of an FMU."""
+
+    file: Path
+    description: FmuDescription
+
+    def lines(self) -> list[str]:
+        """Its variables, and what it offers."""
+        return [*_of_fmu(self.file, self.description)]
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each input, output and parameter."""
+        rows = [
+            {
+                "variable": v.name, "kind": _kind(v, self.description), "unit": v.unit, "start": v.start,
+                "min": v.min, "max": v.max, "description": v.description,
+            }
+            for v in _shown(self.description)
+        ]  # fmt: skip
+        return pd.DataFrame(rows).set_index("variable")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """How many variables of each kind it has."""
+        drawn = axes_or_new(ax)
+        count = self.to_frame()["kind"].value_counts()
+        drawn.barh(list(count.index), list(count))
+        drawn.set_xlabel("variables")
+        return drawn
+
+
+def inspect(file: str | Path, out: str | Path | None = None, time: str | None = None) -> Inspected:
+    """What a file holds; out: folder for the pictures of a record, None draws none.
 
     time: the time column of a record, by default it is looked for.
     """
     path = Path(file)
     if path.suffix.lower() == ".fmu":
-        return [*_of_fmu(path)]
-    lines, plots = list[str](), list[Plot]()
-    folder = None if out is None else Path(out).absolute()
-    for i, raster in enumerate(survey(path, time)):
-        lines += [*_of_raster(raster)]
-        if folder is not None and raster.channels:
-            more = list(_plots(raster, f"_{i + 1}" if i else ""))
-            lines += [f"picture: {folder / plot.name}.png" for plot in more]
-            plots += more
-    if folder is not None and plots:
+        return FmuInspected(path, describe(path))
+    rasters = tuple(survey(path, time))
+    if out is None:
+        return RecordInspected(rasters, tuple(() for _ in rasters))
+    folder = Path(out).absolute()
+    plots = [list(_plots(r, f"_{i + 1}" if i else "")) if r.channels else [] for i, r in enumerate(rasters)]
+    if any(plots):
         with written_at_once(writable(folder)) as part:
-            for plot in plots:
+            for plot in chain.from_iterable(plots):
                 plot.write(part)
-    return lines
+    return RecordInspected(rasters, tuple(tuple(folder / f"{p.name}.png" for p in some) for some in plots))
 
 
 def _of_raster(r: Raster) -> Iterator[str]:
@@ -100,31 +179,29 @@ def _plots(r: Raster, ending: str) -> Iterator[Plot]:
         yield Plot(f"record{ending}{more}", figure, f"The channels of {r.file.name} and their spectra.")
 
 
-def _of_fmu(path: Path) -> Iterator[str]:
-    about = describe(path)
-    d = about.widened
+def _shown(d: FmuDescription) -> list[FmuVariable]:
+    return [v for v in d.widened.variables.values() if v.causality in KINDS]
+
+
+def _kind(v: FmuVariable, d: FmuDescription) -> str:
+    return "state" if v.name in d.states else str(v.causality)
+
+
+def _of_fmu(path: Path, d: FmuDescription) -> Iterator[str]:
     way = "co-simulation" if d.exchange is None else "model exchange, integrated by railfmi"
     yield f"{path.name}: {d.name}, FMI {d.fmi_version} for {way}"
     rows = [("variable", "kind", "unit", "start", "limits", "description")]
-    for v in d.variables.values():
-        if v.causality in KINDS:
-            limits = f"{'' if v.min is None else f'{v.min:g}'} to {'' if v.max is None else f'{v.max:g}'}"
-            rows.append(
-                (
-                    v.name,
-                    "state" if v.name in d.states else v.causality,
-                    v.unit or "not stated",
-                    "" if v.start is None else f"{v.start:g}",
-                    limits if limits != " to " else "",
-                    v.description,
-                )
-            )
+    for v in _shown(d):
+        limits = f"{'' if v.min is None else f'{v.min:g}'} to {'' if v.max is None else f'{v.max:g}'}"
+        start = "" if v.start is None else f"{v.start:g}"
+        said = limits if limits != " to " else ""
+        rows.append((v.name, _kind(v, d), v.unit or "not stated", start, said, v.description))
     yield from aligned(rows)
-    if d.unused:
-        yield f"not used, or by their elements only: {', '.join(d.unused)}"
-    if whole := [v.name for v in d.variables.values() if v.whole and v.causality in KINDS]:
+    if unused := d.widened.unused:
+        yield f"not used, or by their elements only: {', '.join(unused)}"
+    if whole := [v.name for v in _shown(d) if v.whole]:
         yield f"whole numbers and truths, which are set and read but not estimated: {', '.join(whole)}"
-    yield from _access(about)
+    yield from _access(d)
     found = problems(path)
     if found:
         yield f"against the letter of the standard: {found[0]}" + (

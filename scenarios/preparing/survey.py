@@ -43,13 +43,14 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Channels of a file that share their times t (N,), s."""
+    """Channels of a file that share their times t (N,), s; begin: the date of 0 s, if the times are dates."""
 
     file: Path
     time: str
     t: Array
     channels: tuple[Channel, ...]
     remarks: tuple[str, ...]
+    begin: pd.Timestamp | None = None
 
     @property
     def step(self) -> float:
@@ -141,7 +142,7 @@ def _raster(sheet: Sheet, time: str) -> Raster:
     notes = [note.sentence for note in (*stated.notes, *time_notes(sheet.file.name, t))]
     gaps = np.flatnonzero(np.diff(t) > GAP * np.median(np.diff(t)))
     notes += [f"no data from {t[i]:.9g} to {t[i + 1]:.9g} s" for i in gaps[:3]]
-    return Raster(sheet.file, time, t, tuple(channels), tuple(notes))
+    return Raster(sheet.file, time, t, tuple(channels), tuple(notes), stated.begin(time))
 
 
 def _numbers(sheet: Sheet, column: str) -> Array | None:

@@ -62,9 +62,11 @@ class Trial(Shown):
         error: rms, in the FMU's unit; share: of the standard deviation of the measured values; factor: nan if
         the two have not the same course.
         """
-        record, y = self.problem.record, self.problem.record.runs[0].y
-        error = np.sqrt(np.mean((y - self.simulated) ** 2, axis=0))
-        factors = [factor_of(*pair) for pair in zip(y.T, self.simulated.T, strict=True)]
+        record, run = self.problem.record, self.problem.record.runs[0]
+        used = run.fit | run.unseen  # what lies before the split may show how the FMU starts
+        y, simulated = run.y[used], self.simulated[used]
+        error = np.sqrt(np.mean((y - simulated) ** 2, axis=0))
+        factors = [factor_of(*pair) for pair in zip(y.T, simulated.T, strict=True)]
         columns = {
             "error": error,
             "share": error / (y.std(axis=0) + 1e-300),

@@ -6,12 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AliasChoices, Field, model_validator
 
 from fmus.contact.forces.conditions import Condition
-from scenarios.experiment.declaration import (
-    Interval,
-    Number,
-    Positive,
-    Table,
-)
+from scenarios.experiment.table import Interval, Number, Positive, Table
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]

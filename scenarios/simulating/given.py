@@ -13,9 +13,9 @@ from fmus.host.description import FmuDescription
 from fmus.host.master.signals import Source
 from fmus.units import column_conversion, model_unit
 from scenarios.experiment.checks import check_time
-from scenarios.experiment.declaration import Number, Table
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.units import StatedUnits
+from scenarios.experiment.table import Number, Table
 from scenarios.experiment.validation import read_table
 from scenarios.simulating.declaration import Declaration, Ride
 from scenarios.track.inputs import inputs

@@ -14,12 +14,7 @@ from pydantic import Field, model_validator
 from scipy.interpolate import PchipInterpolator
 
 from fmus.errors import BadInput, did_you_mean
-from scenarios.experiment.declaration import (
-    Interval,
-    Number,
-    Positive,
-    Table,
-)
+from scenarios.experiment.table import Interval, Number, Positive, Table
 from scenarios.experiment.validation import read_table
 
 Array = NDArray[np.float64]

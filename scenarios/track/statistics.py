@@ -9,7 +9,7 @@ from pydantic import Field
 from scipy.optimize import least_squares
 
 from fmus.errors import BadInput
-from scenarios.experiment.declaration import Positive, Table
+from scenarios.experiment.table import Positive, Table
 from scenarios.track.rails import Array, Quantity
 
 Negative = Annotated[float, Field(strict=True, allow_inf_nan=False, lt=0)]

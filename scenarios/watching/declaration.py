@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, PlainValidator, model_validator
 
 from estimator.monitoring.monitor import Settings
-from scenarios.experiment.declaration import NotNegative, Positive, Table
+from scenarios.experiment.table import NotNegative, Positive, Table
 from scenarios.experiment.validation import read_file, read_table
 from scenarios.watching.triggers import TRIGGERS
 from scenarios.watching.triggers.trigger import Trigger

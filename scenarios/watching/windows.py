@@ -75,6 +75,12 @@ class Reading:
                 f"{e.file}: [derived.{name}] is made of the samples to both sides, which a stream does not "
                 "have yet; measure the column, or leave it out"
             )
+        for key in ("files", "rate"):
+            if getattr(e, key):
+                raise BadInput(
+                    f"{e.file}: key '{key}': a stream is read as it comes, at the times of its rows; leave "
+                    "the key out, and have its source resample the channels"
+                )
         self._e, self._more = e, tuple(more)
         self._conversions = {c.variable: c for c in conversions}
         self._columns = tuple(dict.fromkeys([*(c.column for c in conversions), *more]))

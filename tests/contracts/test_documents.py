@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from estimator.filters import filters
 from scenarios.cli.app import loaded
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.estimated import Options
 from tests.helpers.paths import ROOT
 
 DOCUMENTS = [

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.experiment.declaration import Positive
+from scenarios.experiment.table import Positive
 from scenarios.track.sources.source import Source
 from scenarios.track.track import Track
 
@@ -38,7 +38,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.experiment.declaration import Positive
+from scenarios.experiment.table import Positive
 from scenarios.track.defects.defect import Defect
 from scenarios.track.rails import Quantity
 
@@ -105,7 +105,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.experiment.declaration import Positive
+from scenarios.experiment.table import Positive
 from scenarios.watching.triggers.trigger import Trigger
 
 

@@ -102,6 +102,22 @@ def test_pushes_recover_the_missing_force_without_any_state(drive: ForeignBuilde
     assert np.all(std > 0)
 
 
+def test_samples_before_the_split_do_not_count_as_a_missing_force(drive: ForeignBuilder) -> None:
+    """An FMU whose states nobody can set starts otherwise than the machine that was moving before."""
+    t = np.arange(SAMPLES) * DT
+    truth = 5 + 4 * np.sin(2 * np.pi * t / 6)
+    asked = problem(drive, truth, np.random.default_rng(6))
+    [base] = asked.simulate({})
+    run = asked.record.runs[0]
+    n, first = int(run.fit.sum()), int(1.5 / DT)
+    residual = (run.y - base)[:n]
+    residual[:first] += [0.05, 1.0] * np.exp(-t[:first, None] / 0.3)
+    error = [pushed(asked, {}, CARRIAGE, residual, NOISE, k)[0] - truth[:n] for k in (first, 0)]
+    kept, spoiled = (np.sqrt(np.mean(e[first + 50 : -50] ** 2)) for e in error)
+    assert kept < 0.3
+    assert spoiled > 2 * kept
+
+
 def test_calibration_finds_the_mass_within_its_standard_error(drive: ForeignBuilder) -> None:
     asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(2))
     found = fit(asked, [Unknown("M", 90.0, 80.0, 110.0, 3.0)], Weighting.white(NOISE))

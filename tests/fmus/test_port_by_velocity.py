@@ -11,6 +11,7 @@ from fmus.effects.force_law import ForceLaw
 from fmus.errors import BadInput
 from fmus.export.around.outside import Outside
 from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
 from fmus.host.archive import describe
 from fmus.host.description import PortNames
@@ -19,6 +20,7 @@ from tests.helpers.packed import with_description
 
 FULL = PortNames("carriage", "F_ext", "q_dot", "q")
 FAST = PortNames("carriage", "F_ext", "q_dot", None)
+INTEGRATED = PortNames("carriage", "F_ext", "q_dot", None, integrated=True)
 LAWS = [kind for kind, effect in EFFECTS.items() if issubclass(effect, ForceLaw)]
 
 
@@ -73,6 +75,46 @@ def test_the_motion_is_that_with_a_displacement(drive, tmp_path, kind):
             start = {f"{kind}_carriage_{amplitude}": 30.0}
             found.append(fmu.simulate(t, {"F": 100 * np.sin(9 * t)}, ["q", "q_dot"], start))
     assert_allclose(found[1], found[0], rtol=1e-12, atol=1e-15)
+
+
+def test_with_an_integrated_displacement_all_laws_are_offered(drive):
+    assert kinds(drive, INTEGRATED) == kinds(drive, FULL)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("cubic_stiffness", {"k_3": 6e6}),
+        ("bump_stop", {"k": 3e4, "gap": 0.005}),
+        ("coulomb_friction", {"F_c": 30}),
+    ],
+)
+def test_the_motion_is_that_with_the_displacement_of_the_fmu(drive, tmp_path, kind, values):
+    t = np.arange(400) * 2e-3
+    found = []
+    for port in (FULL, INTEGRATED):
+        path = build_coupled(drive, (port,), ((kind, "carriage"),), tmp_path / f"{port.integrated}.fmu")
+        with Fmu(path) as fmu:
+            states = [n for n in fmu.description.states if n == "carriage_displacement"]
+            assert len(states) == (port.integrated and kind != "coulomb_friction")
+            start = {f"{kind}_carriage_{name}": value for name, value in values.items()}
+            found.append(fmu.simulate(t, {"F": 100 * np.sin(9 * t)}, ["q", "q_dot", *states], start))
+            without = fmu.simulate(t, {"F": 100 * np.sin(9 * t)}, ["q", "q_dot"], {})
+    assert_allclose(found[1][:, :2], found[0], rtol=1e-5, atol=2e-6)  # trapezoids of 1 ms
+    assert np.abs(found[0] - without).max() > 1e-3  # the law matters
+    if found[1].shape[1] == 3:
+        assert_allclose(found[1][:, 2], found[1][:, 0], atol=2e-7)
+
+
+def test_a_native_carrier_integrates_as_the_python_one_does(drive, tmp_path):
+    t, effects = np.arange(200) * 2e-3, (("cubic_stiffness", "carriage"),)
+    found = []
+    for build in (build_coupled, build_carrier):
+        with Fmu(build(drive, (INTEGRATED,), effects, tmp_path / f"{build.__name__}.fmu")) as fmu:
+            start = {"cubic_stiffness_carriage_k_3": 6e6}
+            names = ["q", "q_dot", "carriage_displacement"]
+            found.append(fmu.simulate(t, {"F": 100 * np.sin(9 * t)}, names, start))
+    assert_allclose(found[1], found[0], rtol=1e-9, atol=1e-14)
 
 
 def test_a_displacement_that_nobody_gives_is_the_integral_of_the_velocity():

@@ -11,7 +11,7 @@ from fmus.errors import BadInput
 from fmus.host.fmu import Fmu
 from scenarios.estimating.estimating import estimate
 from scenarios.estimating.result import stretches
-from scenarios.experiment.declaration import Alarm, Options
+from scenarios.experiment.estimated import Alarm, Options
 from tests.estimator.test_filters_fmu import PYTHON_VDP, SHOW_SPEED
 from tests.helpers.vdp import solved
 from tests.truth.rig import write_record

@@ -11,7 +11,7 @@ from estimator.filters.history import History
 from fmus.models import model_class
 from scenarios.estimating.estimating import estimate
 from scenarios.estimating.form import choices, leading, parameters_of_form, widened
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.estimated import Options
 from tests.truth.wheelset import OTHER, write_record
 
 ASKED = """

@@ -11,7 +11,7 @@ from fmus.model import declared
 from fmus.models import MODELS
 from scenarios.estimating.estimating import estimate
 from scenarios.estimating.page import headline
-from scenarios.experiment.declaration import Options
+from scenarios.experiment.estimated import Options
 from tests.scenarios.test_command_line import railfmi
 from tests.scenarios.test_estimate_command import write_rig, write_vdp
 from tests.truth.rig import write_record

@@ -76,6 +76,7 @@ BAD_EXPERIMENTS = [
         "[[ports]]\nname = 'wheel'\nforce = 'a'\nvelocity = 'b'\ndisplacement = 'c'\n[estimate]",
         "twice",
     ),
+    ('displacement = "theta_w"', 'displacement = "theta_w"\nintegrate = true', "leave one of the two out"),
     ("[parameters]", "[parameters", "is not valid TOML"),
     ('id = "rig"', 'idd = "rig"\ntme = 3', "key 'idd' is not known; did you mean 'id'? (and 2 more)"),
     ('id = "rig"', '"i\\nd" = "rig"', "key 'i d' is not known; did you mean 'id'?"),

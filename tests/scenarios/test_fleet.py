@@ -139,6 +139,13 @@ def test_an_experiment_without_an_estimate_cannot_be_estimated(tmp_path):
         plan_of(file, ISOLATED)
 
 
+def test_a_file_with_a_clock_of_its_own_belongs_to_no_fleet(tmp_path):
+    file = written(tmp_path)
+    (tmp_path / "setup.toml").write_text(SETUP + '\n[files.tacho]\nfile = "tacho.csv"\ntime = "t"\n')
+    with pytest.raises(BadInput, match=r"\[files\.tacho\] names a file, but a fleet's records have one each"):
+        plan_of(file, ISOLATED)
+
+
 def keys(plan: Plan) -> list[str]:
     return [j.task.key if j.task else "" for j in plan.jobs]
 

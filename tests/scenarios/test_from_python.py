@@ -138,7 +138,9 @@ def returned() -> dict[str, type]:
 
 def test_every_result_shows_itself():
     found = returned()
-    assert {"close_loop", "close_loops", "estimate", "plan", "report", "init", "dry_run"} <= set(found)
+    assert {"close_loop", "close_loops", "estimate", "plan", "report", "init", "inspect", "dry_run"} <= set(
+        found
+    )
     for name, kind in found.items():
         assert issubclass(kind, Shown), name
         assert kind.__repr__ is Shown.__repr__, name  # a dataclass would bring its own
@@ -159,6 +161,11 @@ def test_results_of_the_way_in_and_of_several_show_themselves(built, tmp_path):
     with Fmu(built("drive")) as drive:
         measured = drive.simulate_frame(t, {"F": F}, ["q", "q_dot"])
     measured.assign(F=F).to_csv(tmp_path / "data.csv")
+    fmu, record = railfmi.inspect(built("drive")), railfmi.inspect(tmp_path / "data.csv")
+    for seen in (fmu, record):
+        assert_shown(seen)
+    assert fmu.to_frame().loc["q", "unit"] == "m"
+    assert record.to_frame().loc["F", "greatest"] == pytest.approx(100, rel=1e-3)
     begun = railfmi.init(built("drive"), tmp_path / "data.csv", out=tmp_path)
     assert_shown(begun)
     assert list(begun.to_frame()["column"]) == ["F", "q", "q_dot"]

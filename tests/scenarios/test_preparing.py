@@ -8,19 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from estimator.record import Record, Run
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.cli.app import run_safely
 from scenarios.cli.console import interrupted, say_notices, will_write
 from scenarios.experiment.experiment import load_experiment
 from scenarios.output import WRITING, replaced
-from scenarios.preparing.draft import draft, toml_of, with_column
+from scenarios.preparing.draft import draft, with_column
 from scenarios.preparing.initialising import init
 from scenarios.preparing.inspecting import bandwidth, inspect
 from scenarios.preparing.matching import SURE, likeness, matches
 from scenarios.preparing.ports import port_remarks
 from scenarios.preparing.survey import Channel, survey
-from scenarios.preparing.trial import dry_run, duration, factor_of
+from scenarios.preparing.text import toml_of
+from scenarios.preparing.trial import Trial, dry_run, duration, factor_of
 from tests.helpers.foreign import GOOD, foreign_builder
 from tests.helpers.paths import SHIPPED
 
@@ -149,7 +151,7 @@ def test_the_order_of_the_columns_does_not_matter(names):
 
 def drafted(folder, description=MOTOR, **record):
     [raster] = survey(log(folder, **record))
-    return draft(folder / "Motor.fmu", description, raster)
+    return draft(folder / "Motor.fmu", description, [raster])
 
 
 def test_a_draft_guesses_units_ports_split_and_bounds(tmp_path):
@@ -280,6 +282,18 @@ def test_a_trial_notices_a_wrong_unit(tmp_path):
     assert trial.candidates == dry_run(DEMO).candidates > 20
 
 
+def test_a_trial_judges_the_parts_of_the_record_alone():
+    """What lies before them may show how the FMU starts."""
+    part = T >= 1.0
+    y = np.sin(T)[:, None]
+    run = Run(T, np.empty((T.size, 0)), y, part & (T < 7), part & False, part & (T >= 7))
+    simulated = y + 0.01 * np.cos(40 * T)[:, None] + np.where(part, 0.0, 50.0)[:, None]
+    problem = SimpleNamespace(record=Record((run,), (), ("y",), np.array([np.nan])))
+    told = Trial(problem, simulated, 1.0, 1, 1).to_frame().loc["y"]
+    assert told["error"] == pytest.approx(0.01 / np.sqrt(2), rel=0.02)
+    assert told["factor"] == pytest.approx(1.0, rel=0.01)
+
+
 @given(st.floats(0.01, 100))
 def test_the_factor_between_signals_of_one_course(factor):
     x = np.sin(T)
@@ -295,7 +309,7 @@ def test_durations(seconds, words):
 
 
 def test_inspecting_an_fmu_tells_what_is_missing(tmp_path):
-    said = "\n".join(inspect(foreign_builder(tmp_path)()))
+    said = repr(inspect(foreign_builder(tmp_path)()))
     assert "whether it can be used: railfmi check" in said
     assert "state" in said
 

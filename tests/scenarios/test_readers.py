@@ -23,6 +23,7 @@ from fmus.errors import BadInput
 from fmus.host.master.recording import Recording
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.readers import READERS, read_sheet
+from scenarios.experiment.readers.layout import layout_of
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.record import load_record
 from tests.helpers.experiment_files import (
@@ -663,11 +664,32 @@ def test_wrong_options_are_one_clear_line(tmp_path, said, words):
     assert words in str(refused.value)
 
 
-def test_another_encoding_has_to_be_said(tmp_path):
-    file = lines(tmp_path, "t;Weg in °\n0;1\n1;2\n", encoding="cp1252")
-    with pytest.raises(BadInput, match='encoding = "cp1252"'):
+@pytest.mark.parametrize("zipped", [False, True])
+def test_the_encoding_of_windows_is_recognised_and_told(tmp_path, zipped):
+    text = "t;Weg in °\n" + "0;1\n1;2\n"
+    file = lines(tmp_path, text, encoding="cp1252")
+    if zipped:
+        file = file.rename(tmp_path / "log.csv")
+        (tmp_path / "log.csv.gz").write_bytes(gzip.compress(file.read_bytes()))
+        file = tmp_path / "log.csv.gz"
+    sheet = read_sheet(file)
+    assert "Weg in °" in sheet.known
+    assert "not UTF-8; its names and units are read as cp1252" in sheet.remarks[0]
+    assert read_sheet(file, options={"encoding": "cp1252"}).remarks == ()
+
+
+def test_utf_8_is_recognised_where_the_part_looked_at_ends_within_a_letter(tmp_path):
+    content = b"t;x\n" + b"".join(b"%d;%d\n" % (i, i) for i in range(20_000))
+    cut = 65_536 - 1  # the two bytes of this letter lie on both sides of the end of that part
+    file = tmp_path / "log.csv"
+    file.write_bytes(content[:cut] + "µ".encode() + content[cut + 2 :])
+    assert layout_of(file, {}).encoding == "utf-8"
+
+
+def test_what_is_no_text_of_windows_either_has_to_be_said(tmp_path):
+    file = lines(tmp_path, "t;Weg in\x81\n0;1\n1;2\n", encoding="latin-1")
+    with pytest.raises(BadInput, match=r'such as \[data\] encoding = "latin-1"'):
         read_sheet(file)
-    assert "Weg in °" in read_sheet(file, options={"encoding": "cp1252"}).known
 
 
 def test_a_table_and_a_matrix_of_hdf5(tmp_path):

@@ -11,7 +11,7 @@ from estimator.filters import filters
 from estimator.record import Record
 from fmus.errors import BadInput
 from scenarios.estimating.estimating import estimate
-from scenarios.experiment.declaration import Alarm
+from scenarios.experiment.estimated import Alarm
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from tests.helpers.experiment_files import (

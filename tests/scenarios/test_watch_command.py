@@ -156,6 +156,13 @@ WRONG = {
         edited("experiment.toml", "[estimate]", '[derived.a]\nderivative = "omega_w"\n[estimate]'),
         ["[derived.a]", "both sides"],
     ),
+    "a record that is thinned": (
+        edited("experiment.toml", 'id = "', 'rate = 50\nid = "'), ["key 'rate'", "leave the key out"]
+    ),
+    "another clock": (
+        edited("experiment.toml", "[estimate]", '[files.tacho]\ntime = "t"\n[estimate]'),
+        ["key 'files'", "have its source resample"],
+    ),
     "another checkpoint": (foreign_checkpoint, [FILE, "--anew"]),
     "events of an earlier stream": (
         lambda f: (f / "out" / "events" / "000001").mkdir(parents=True), ["events", "move it away"]

@@ -53,7 +53,7 @@ def offered(problem: Problem, forces: Sequence[MissingForce]) -> list[tuple[str,
         for m in forces
         for k, law in FREE_FORMS.items()
         if (m.port.name not in known or law.fits(known[m.port.name]))
-        and (m.port.displacement or not law.needs_displacement())
+        and (m.port.has_displacement or not law.needs_displacement())
     ]
 
 

@@ -41,20 +41,21 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     """The missing force at each port of the problem, each assumed to be the only one.
 
     noise: (n_y,) standard deviation of each output. If the FMU has hidden states, so that it cannot be
-    linearised by restarts, its responses to force pulses are used instead of the smoother.
+    linearised by restarts, its responses to force pulses are used instead of the smoother, from the first
+    sample that is fitted: nobody can set how such an FMU starts.
     """
     plant, run = problem.plant, problem.record.runs[0]
     if not problem.ports:
         return []
     names = [name for p in problem.ports for name in p.motion]
     [full, *_] = problem.simulate(theta, (*plant.states, *names))
-    last = int(np.flatnonzero(run.fit)[-1]) + 1
+    first, last = np.flatnonzero(run.fit)[[0, -1]] + (0, 1)
     keep = np.arange(0, last, max(1, -(-last // SMOOTHED_SAMPLES)))
     n_y, n = len(plant.outputs), len(plant.states)
     y, x, motion = np.split(full, (n_y, n_y + n), axis=1)
     if not shows_its_state(problem, theta, x[:last]):
         whole = run.y[:last] - y[:last]
-        pushes = [pushed(problem, theta, port, whole, noise) for port in problem.ports]
+        pushes = [pushed(problem, theta, port, whole, noise, first) for port in problem.ports]
         return [
             MissingForce(p, run.t[keep], f[keep], s[keep], *motion_of(p, i, run.t[keep], motion[keep]))
             for i, (p, (f, s)) in enumerate(zip(problem.ports, pushes, strict=True))

@@ -18,9 +18,17 @@ DAMPING = 1e-3  # ridge, as share of the largest response; points without influe
 
 
 def pushed(
-    problem: Problem, theta: Mapping[str, float], port: PortNames, residual: Array, noise: Array
+    problem: Problem,
+    theta: Mapping[str, float],
+    port: PortNames,
+    residual: Array,
+    noise: Array,
+    first: int = 0,
 ) -> tuple[Array, Array]:
-    """Force at the port and its standard deviation, (n,) each, from the residual (n, n_y)."""
+    """Force at the port and its standard deviation, (n,) each, from the residual (n, n_y).
+
+    Samples before the first to be counted may show that the FMU starts otherwise than the machine did.
+    """
     run = problem.record.runs[0].part(0, len(residual))
     start = problem.start(theta)
     base = problem.plant.simulate(run, start)
@@ -28,9 +36,9 @@ def pushed(
     knots = np.linspace(run.t[0], run.t[-1], PUSHES)
     hats = np.array([np.interp(run.t, knots, row) for row in np.eye(PUSHES)])  # (PUSHES, n)
     answers = [problem.plant.simulate(run, start, push={port.force: size * hat}) - base for hat in hats]
-    g = np.stack([(a / noise).ravel() for a in answers], axis=1)
+    g = np.stack([(a[first:] / noise).ravel() for a in answers], axis=1)
     scale = np.linalg.norm(g, axis=0).max() + 1e-300
     normal = g.T @ g + (DAMPING * scale) ** 2 * np.eye(PUSHES)
-    sizes = np.linalg.solve(normal, g.T @ (residual / noise).ravel())
+    sizes = np.linalg.solve(normal, g.T @ (residual[first:] / noise).ravel())
     deviation = np.sqrt(np.diag(np.linalg.inv(normal)))
     return size * (sizes @ hats), size * (deviation @ hats)

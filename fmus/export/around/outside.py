@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import Literal
 
 import casadi as cs
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from fmus.component import Component
 from fmus.effects import EFFECTS
+from fmus.effects.effect import Effect
+from fmus.effects.force_law import ForceLaw
 from fmus.effects.site import Site
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable, PortNames
@@ -53,15 +56,29 @@ class Outside(Site):
         self.motion = cs.SX.sym("motion", 2 * len(ports))
         self._alike = _alike(model) if model else {}
 
+    def build(self, effects: Iterable[tuple[type[Effect], str]]) -> None:
+        """See Site.build: a displacement that a law needs and no output gives becomes a state."""
+        chosen = list(effects)
+        over = {at for effect, at in chosen if issubclass(effect, ForceLaw) and effect.needs_displacement()}
+        for i, port in enumerate(self.names):
+            if port.integrated and port.displacement is None and port.name in over:
+                doc = f"displacement at {port.name} since the start, integrated from {port.velocity}"
+                name = f"{port.name}_displacement"
+                self.add(State(UNITS[self._kind(port)]["q"], doc=doc, name=name))
+                self.rates[name] = self.motion[2 * i + 1]
+        super().build(chosen)
+
     def ports(self) -> dict[str, Port]:
         """See Site.ports: by displacement and velocity read from the FMU."""
         single = {
             port.name: Port(
-                self.motion[2 * i],
+                self.symbols.get(f"{port.name}_displacement", self.motion[2 * i])
+                if port.integrated
+                else self.motion[2 * i],
                 self.motion[2 * i + 1],
                 {port.force: 1.0},
-                "rotation" if self._turns(port) else "translation",
-                has_displacement=port.displacement is not None,
+                self._kind(port),
+                has_displacement=port.has_displacement,
             )
             for i, port in enumerate(self.names)
         }
@@ -79,6 +96,9 @@ class Outside(Site):
         """See Site.own_inputs: those that are no ports."""
         forces = {port.force for port in self.names}
         return [u for u in super().own_inputs() if u.name not in forces]
+
+    def _kind(self, port: PortNames) -> Literal["rotation", "translation"]:
+        return "rotation" if self._turns(port) else "translation"
 
     def _turns(self, port: PortNames) -> bool:
         known = self.description.variables

@@ -174,6 +174,8 @@ def _is_symbol(word: str) -> bool:
 def _motion(case: Case, port: PortNames) -> str:
     of = {n: label("", case.words.unit(n)) for n in (port.force, *port.motion)}
     displacement = f", q is {port.displacement}{of[port.displacement]}" if port.displacement else ""
+    if port.integrated:
+        displacement = f", q is the integral of {port.velocity} since the start of the simulation"
     return (
         f"F acts at the port “{port.name}”{of[port.force]}, positive in the direction of motion; "
         f"v is {port.velocity}{of[port.velocity]}{displacement}."

@@ -12,7 +12,7 @@ import pandas as pd
 from fmus.errors import BadInput
 from fmus.taken import check_text
 from scenarios.experiment.readers.header import units_of
-from scenarios.experiment.readers.layout import BLANKS, Layout, layout_of
+from scenarios.experiment.readers.layout import BLANKS, WINDOWS, Layout, layout_of
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -32,7 +32,11 @@ class Csv(Reader):
         layout = layout_of(file, options)
         cells = _cells(file, layout, options)
         units = {**units_of(layout.names, layout.units), **_units(file)}
-        return Sheet(file, cells, layout.names, units, row="line", first=layout.first)
+        taken = (
+            f"{file.name}: is not UTF-8; its names and units are read as {WINDOWS}, as Windows writes them"
+        )
+        remarks = (taken,) if layout.encoding == WINDOWS and "encoding" not in options else ()
+        return Sheet(file, cells, layout.names, units, row="line", first=layout.first, remarks=remarks)
 
 
 def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
@@ -66,7 +70,7 @@ def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
     except UnicodeDecodeError as error:
         raise BadInput(
             f"{file}: is not text in the encoding {layout.encoding}; "
-            'say which it is, [data] encoding = "cp1252", or save it as UTF-8'
+            'say which it is, such as [data] encoding = "latin-1", or save it as UTF-8'
         ) from error
     filled = np.flatnonzero(table.notna().any(axis=1))
     if not filled.size:

@@ -1,5 +1,6 @@
 """How a text file of columns is laid out: encoding, separator, decimal sign, names, line of units."""
 
+import codecs
 import csv
 import gzip
 from collections import Counter
@@ -16,6 +17,8 @@ from scenarios.experiment.readers.header import is_line_of_units, is_number
 LOOKED_AT = 1000  # lines below the names, from which separator and decimal sign are read
 BLANKS = r"\s+"
 SEPARATORS = {",": ",", ";": ";", "\t": "\t", " ": BLANKS}  # as pandas wants them, likeliest first
+WINDOWS = "cp1252"  # what loggers of Western Europe write that do not write UTF-8
+BEGINS = 1 << 16  # bytes from which the encoding is read
 BOMS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 
 
@@ -78,10 +81,17 @@ def layout_of(file: Path, options: Mapping[str, Any]) -> Layout:
 
 
 def _encoding(file: Path) -> str:
-    """By the mark at the beginning, else UTF-8."""
+    """By the mark at the beginning, else UTF-8 if the beginning is that, else that of Windows."""
     with _bytes(file) as stream:
-        begins = stream.read(3)
-    return next((encoding for mark, encoding in BOMS.items() if begins.startswith(mark)), "utf-8")
+        begins = stream.read(BEGINS)
+    marked = next((encoding for mark, encoding in BOMS.items() if begins.startswith(mark)), None)
+    if marked:
+        return marked
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(begins)  # which may end within a letter
+    except UnicodeDecodeError:
+        return "utf-8" if b"\0" in begins else WINDOWS  # text has no zeros
+    return "utf-8"
 
 
 def _bytes(file: Path) -> Any:
@@ -102,7 +112,7 @@ def _head(file: Path, encoding: str, above: int) -> list[str]:
     except (UnicodeError, LookupError) as error:
         raise BadInput(
             f"{file}: is not text in the encoding {encoding}; "
-            'say which it is, [data] encoding = "cp1252", or save it as UTF-8'
+            'say which it is, such as [data] encoding = "latin-1", or save it as UTF-8'
         ) from error
 
 

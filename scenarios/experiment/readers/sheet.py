@@ -21,6 +21,7 @@ class Sheet:
     units: units by column, for columns with a unit in the file.
     apart: for columns of the file that are not among the cells, the reason.
     row, first: the word for a row in this format, and the number of the first row.
+    remarks: on how the file was read, where a user should know.
     """
 
     file: Path
@@ -30,6 +31,7 @@ class Sheet:
     apart: Mapping[str, str] = field(default_factory=dict)
     row: str = "row"
     first: int = 1
+    remarks: tuple[str, ...] = ()
 
     def numbers(self, column: str) -> Array:
         """The numbers of a column (N,), nan for a blank cell; raises BadInput for any other content."""

@@ -21,7 +21,7 @@ class StatedUnits:
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
         self._file = sheet.file
-        self.notes: list[Note] = []
+        self.notes = [Note("file", "", remark) for remark in sheet.remarks]
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
         """Raise BadInput if the file contradicts the unit declared at `where` for a measured output.
@@ -70,6 +70,11 @@ class StatedUnits:
             self.notes.append(Note("unit", column, f"{said}, to {target}"))
         return found
 
+    def begin(self, column: str) -> "pd.Timestamp | None":
+        """The first date of a time column; None if it holds numbers or durations."""
+        cells = _dates(self._sheet.cells[column])
+        return cells.min() if cells.dtype.kind == "M" else None
+
     def seconds(self, column: str, where: str, unit: str | None = None) -> Array:
         """The time column (N,) s: dates count from the first one, numbers are in the unit stated, else s.
 
@@ -107,6 +112,19 @@ class StatedUnits:
         for _ in range(derived):
             unit = f"({unit})/s"
         return unit
+
+
+def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> float:
+    """How much later one date is than another one, s; 0 if one of them is none, as of times without dates."""
+    if one is None or other is None:
+        return 0.0
+    try:
+        return float((one - other).total_seconds())
+    except TypeError as error:
+        raise BadInput(
+            f"the dates of one file have a time zone ({one} and {other}), those of another one have none; "
+            "export both alike"
+        ) from error
 
 
 def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.experiment.declaration import Positive
+from scenarios.experiment.table import Positive
 from scenarios.track.defects.defect import Defect
 from scenarios.track.rails import Array, Quantity
 

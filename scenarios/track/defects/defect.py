@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenarios.experiment.declaration import Number, Table
+from scenarios.experiment.table import Number, Table
 from scenarios.track.rails import (
     Array,
     Quantity,

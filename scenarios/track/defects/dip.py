@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
-from scenarios.experiment.declaration import Positive
+from scenarios.experiment.table import Positive
 from scenarios.track.defects.defect import MARGIN, Defect
 from scenarios.track.rails import Array, Quantity
 

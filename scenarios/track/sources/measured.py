@@ -10,10 +10,10 @@ from scipy.integrate import cumulative_trapezoid
 from estimator.record import BoolArray
 from fmus.errors import BadInput, did_you_mean
 from fmus.units import to_si
-from scenarios.experiment.declaration import Number, Positive, Table
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits
+from scenarios.experiment.table import Number, Positive, Table
 from scenarios.track.rails import (
     PLANES,
     Array,

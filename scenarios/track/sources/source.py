@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import ClassVar
 
-from scenarios.experiment.declaration import Table
+from scenarios.experiment.table import Table
 from scenarios.track.track import Track
 
 

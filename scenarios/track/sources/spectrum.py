@@ -10,12 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fmus.errors import did_you_mean
-from scenarios.experiment.declaration import (
-    Interval,
-    Number,
-    Positive,
-    Table,
-)
+from scenarios.experiment.table import Interval, Number, Positive, Table
 from scenarios.track.rails import (
     PLANES,
     Array,

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from estimator.record import Array
-from scenarios.experiment.declaration import Number
+from scenarios.experiment.table import Number
 from scenarios.watching.triggers.trigger import Trigger
 
 Corner = tuple[Number, Number]

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from estimator.record import Array
-from scenarios.experiment.declaration import Positive
+from scenarios.experiment.table import Positive
 from scenarios.watching.triggers.trigger import Trigger
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from estimator.record import Array
-from scenarios.experiment.declaration import Table
+from scenarios.experiment.table import Table
 
 
 class Trigger(Table, ABC):
