@@ -14,6 +14,7 @@ STEPS = 20_000_000  # of a simulation of coupled FMUs, which are planned in memo
 # files and requests
 TEXT = 64.0  # MB of a file that is read as a whole: a profile, a TOML file, a result
 COLUMNS = 10_000  # of a record
+RECORD = 8.0  # GB that the columns of a record may have in memory, or its text unpacked
 READING = 600.0  # s, that a record may take to be read by a library which a damaged one may crash
 DRAWS = 10_000  # measurements of a pair by which the reading of points is tested
 

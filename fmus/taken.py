@@ -1,5 +1,6 @@
 """Checks of what is taken from outside before any of it is read: the numbers stand in `limits`."""
 
+import gzip
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -7,6 +8,9 @@ from fmus import limits
 from fmus.errors import BadInput
 
 MB, GB = 1e6, 1e9  # bytes
+NUMBER = 8  # bytes
+DEFLATE = 1032  # times: the most that deflate, by which gzip packs, makes of a byte (the zlib manual)
+BLOCK = 1 << 20  # bytes
 
 
 def check_file(path: Path) -> None:
@@ -31,6 +35,30 @@ def check_columns(path: Path, number: int) -> None:
         raise BadInput(
             f"{path}: has {number} columns, more than {limits.COLUMNS}; keep those that the experiment names"
         )
+
+
+def check_record(path: Path, size: float) -> None:
+    """Raise BadInput for a record whose columns would have more bytes in memory than any record should."""
+    if size / GB > limits.RECORD:
+        raise BadInput(
+            f"{path}: holds {size / GB:.3g} GB, more than {limits.RECORD:g} GB; cut it into several "
+            "records, or keep only the columns that the experiment names"
+        )
+
+
+def check_gzip(path: Path) -> None:
+    """Raise BadInput for a gzip file whose content is larger than any record should be.
+
+    Where even the densest content would not be, the file is not read. What the file says of its own size
+    is not believed.
+    """
+    if path.stat().st_size * DEFLATE <= limits.RECORD * GB:
+        return
+    size = 0
+    with gzip.open(path) as content:
+        while block := content.read(BLOCK):
+            size += len(block)
+            check_record(path, size)
 
 
 def check_packed(packed: ZipFile, path: Path) -> None:

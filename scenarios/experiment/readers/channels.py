@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from fmus.errors import BadInput
+from fmus.taken import NUMBER, check_record
 from scenarios.experiment.readers.sheet import Sheet
 
 
@@ -56,6 +57,7 @@ def sheet_of(
         elif name in named:
             rows = f"{named[name][0].rows} rows of its own, '{axis.full_name}' has {axis.rows}"
             apart[name] = f"is not sampled at the times named ({rows}); resample it to them"
+    check_record(file, NUMBER * axis.rows * len(found))
     cells = pd.DataFrame({name: _cells(c.load()) for name, c in found.items()})
     return Sheet(file, cells, tuple(named), {name: c.unit for name, c in found.items() if c.unit}, apart)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from fmus.errors import BadInput
-from fmus.taken import check_text
+from fmus.taken import check_gzip, check_text
 from scenarios.experiment.readers.header import units_of
 from scenarios.experiment.readers.layout import BLANKS, WINDOWS, Layout, layout_of
 from scenarios.experiment.readers.reader import Reader
@@ -29,6 +29,8 @@ class Csv(Reader):
 
     def sheet(self, file: Path, time: str | None, columns: Collection[str] | None, **options: Any) -> Sheet:
         """All columns, up to the last row that is not blank."""
+        if file.suffix.lower() == ".gz":
+            check_gzip(file)
         layout = layout_of(file, options)
         cells = _cells(file, layout, options)
         units = {**units_of(layout.names, layout.units), **_units(file)}

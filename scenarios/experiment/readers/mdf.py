@@ -10,6 +10,7 @@ from typing import Any, BinaryIO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.taken import NUMBER, check_record
 from scenarios.experiment.readers.channels import Channel, sheet_of
 from scenarios.experiment.readers.reader import Reader, library
 from scenarios.experiment.readers.sheet import Sheet
@@ -26,6 +27,9 @@ class Mdf(Reader):
         asammdf = library("asammdf", "asammdf", file)
         with file.open("rb") as stream, _opened(asammdf, stream, options) as source:
             groups = range(len(source.groups))
+            for group in source.groups:  # their master channels are read whatever is wanted
+                about = group.channel_group
+                check_record(file, about.cycles_nr * max(about.samples_byte_nr, NUMBER))
             return sheet_of(file, [c for g in groups for c in _channels(source, g)], time, columns)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fmus.errors import BadInput
+from fmus.taken import NUMBER, check_record
 from scenarios.experiment.readers.reader import Reader, library
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -26,6 +27,7 @@ class Parquet(Reader):
             if twice:
                 raise BadInput(f"{file}: column '{twice[0]}' occurs twice; rename one")
             wanted = [name for name in schema.names if columns is None or name in columns]
+            check_record(file, NUMBER * source.metadata.num_rows * len(wanted))
             cells = source.read(columns=wanted).to_pandas(ignore_metadata=True)
         switches = {name: "float64" for name in cells.columns if cells[name].dtype == bool}
         units = {

@@ -13,7 +13,7 @@ import pandas as pd
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import FmuEnded, Isolation
 from fmus.host.apart.room import room_of
-from fmus.limits import READING
+from fmus.limits import MEMORY, READING
 from scenarios.experiment.readers.sheet import Sheet
 
 NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
@@ -70,8 +70,8 @@ class Reader(ABC):
             room.call(_read_for_trial, self, file.absolute(), time, columns, dict(options))
         except FmuEnded as error:
             raise BadInput(
-                f"{file}: is not a sound {self.kind} file (it brings down the process that reads it); "
-                "record or export it again"
+                f"{file}: is not a sound {self.kind} file (it brings down the process that reads it, or "
+                f"needs more than {MEMORY:g} GB of memory there); record or export it again"
             ) from error
 
     def __call__(self, file: Path) -> pd.DataFrame:
