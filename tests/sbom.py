@@ -15,9 +15,13 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
 ROOT = Path(__file__).parents[1]
 FILE, LOCK = ROOT / "sbom.cdx.json", ROOT / "requirements.lock"
 DECLARED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+WHEEL = DECLARED["tool"]["hatch"]["build"]["targets"]["wheel"]
 OF_DEVELOPERS = ("dev", "docs")  # extras whose packages no user needs
 OURS = "railfmi"
 PINNED = re.compile(r"^([\w.-]+)==(\S+)(?: ; ([^\\]+?))? \\$")
@@ -62,8 +66,7 @@ def declared() -> dict[str, list[str]]:
 
 def named(requirements: Iterable[str]) -> set[str]:
     """The names in requirements, as the lock writes them."""
-    names = {re.split(r"[^\w.-]", requirement)[0] for requirement in requirements}
-    return {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+    return {canonicalize_name(Requirement(requirement).name) for requirement in requirements}
 
 
 def reached(begin: set[str], packages: Mapping[str, Pin]) -> set[str]:
@@ -88,7 +91,7 @@ def scopes(packages: Mapping[str, Pin]) -> dict[str, str]:
 
 def inside() -> Iterator[dict[str, Any]]:
     """Libraries that lie in the packages as files of other people."""
-    for package in DECLARED["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
+    for package in WHEEL["packages"]:
         for file in sorted((ROOT / package).rglob("*.js")):
             if begins := INSIDE.match(file.read_text(encoding="utf-8")):
                 name, version = begins.groups()

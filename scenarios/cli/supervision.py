@@ -97,6 +97,9 @@ def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
         code = command(arguments)
+    except KeyboardInterrupt:  # before the command could take it, or after
+        code = STOPPED
+        raise
     finally:  # also after a mistake in this program, which Python then shows
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what was asked for is done, and what is left is short
         os.write(tells, bytes([code]))

@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from tests.helpers.paths import ROOT
-from tests.sbom import DECLARED, FILE, LOCK, Pin, bill, declared, inside, pins
+from tests.sbom import DECLARED, FILE, LOCK, WHEEL, Pin, bill, declared, inside, pins
 
 INTEROP = ROOT / "requirements-interop.lock"
 OTHERS = "interop"  # the extra that has a lock of its own
@@ -125,7 +125,7 @@ def test_what_is_needed_to_run_has_a_licence_and_reaches_down(shipped: dict[str,
 
 def test_each_file_of_other_people_is_in_the_bill_of_materials() -> None:
     """A library built into one file says in its first line what it is; its licence lies beside it."""
-    packages = [ROOT / name for name in DECLARED["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]]
+    packages = [ROOT / name for name in WHEEL["packages"]]
     built = [f for package in packages for f in package.rglob("*.js") if _is_packed(f)]
     listed = {c["evidence"]["occurrences"][0]["location"] for c in inside()}
     assert {f.relative_to(ROOT).as_posix() for f in built} == listed
@@ -138,4 +138,4 @@ def _is_packed(file: Path) -> bool:
 
 
 def test_the_bill_of_materials_is_part_of_the_package() -> None:
-    assert DECLARED["tool"]["hatch"]["build"]["targets"]["wheel"]["sbom-files"] == [FILE.name]
+    assert WHEEL["sbom-files"] == [FILE.name]

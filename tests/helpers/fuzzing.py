@@ -4,9 +4,7 @@ Run as a module, `python -m tests.helpers.fuzzing SECONDS [SEED]` reads spoiled 
 """
 
 import io
-import os
 import random
-import subprocess
 import sys
 import tempfile
 import time
@@ -27,7 +25,7 @@ from fmus.export.ssp.reading import read_package
 from fmus.host.archive import describe
 from fmus.host.master.expression import parsed
 from scenarios.experiment.experiment import load_experiment
-from scenarios.experiment.readers import READERS, read_sheet
+from scenarios.experiment.readers import read_sheet
 from scenarios.reporting.entries import entry
 from scenarios.simulating.expression import statement
 from scenarios.simulating.reading import load_scenario
@@ -132,9 +130,6 @@ def wrong(target: Target, data: bytes, folder: Path) -> str:
     """The traceback where a file raises anything but BadInput; empty else."""
     file = folder / target.name
     file.write_bytes(data)
-    reader = READERS.get(file.suffix)
-    if reader is not None and reader.fragile:
-        return _wrong_apart(target, file)
     try:
         target.read(file)
     except BadInput:
@@ -142,31 +137,6 @@ def wrong(target: Target, data: bytes, folder: Path) -> str:
     except Exception:
         return traceback.format_exc()
     return ""
-
-
-def _wrong_apart(target: Target, file: Path) -> str:
-    """The same for a format whose library may end the process that reads: it ends, and a command says so.
-
-    A damage that one process survives may end the next (uninitialised memory), so that a trial does not help.
-    """
-    child = os.fork()
-    if not child:
-        code = 0
-        try:
-            target.read(file)
-        except BadInput:
-            pass
-        except BaseException:
-            traceback.print_exc()
-            code = 1
-        os._exit(code)
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if code >= 0:
-        return f"{file} ends with {code}; the traceback is above" if code else ""
-    command = [sys.executable, "-m", "railfmi", "inspect", str(file), "--out", str(file.parent / "out")]
-    done = subprocess.run(command, capture_output=True, text=True)
-    told = [line for line in done.stderr.splitlines() if line.startswith("railfmi: ")]
-    return "" if done.returncode in (0, 2) and len(told) == done.returncode // 2 else done.stderr
 
 
 def main(seconds: float, seed: int = 0) -> None:

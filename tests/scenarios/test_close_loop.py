@@ -254,6 +254,9 @@ def test_the_measured_drive_shows_friction_and_an_offset(tmp_path: Path) -> None
     result = close_loop(tmp_path, data_dir=SHARED / "benchmarks", jobs=1)
     assert named(result) >= {("coulomb_friction", "carriage"), ("constant_force", "carriage")}
     assert result.verdict == "ambiguous"  # richer laws of friction lead by little; see docs/benchmarks.md
+    found = {effect.kind: effect.parameters for effect in result.effects}
     assert result.calibrated["M"][0] == pytest.approx(95, abs=2.5)
+    assert found["coulomb_friction"]["F_c"][0] == pytest.approx(20.4, abs=2)
+    assert found["constant_force"]["F_0"][0] == pytest.approx(-3.2, abs=0.5)
     assert result.error["q_dot"]["before"] >= 14e-3
     assert result.error["q_dot"]["after"] <= 6.5e-3
