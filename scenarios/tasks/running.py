@@ -4,6 +4,7 @@ The workers are processes of one thread each. A worker that is killed is replace
 another one. What was finished lies in the store, so that nothing else has to survive.
 """
 
+import atexit
 import os
 import tempfile
 import time
@@ -24,6 +25,7 @@ try:
     import dask
     from distributed import Client, LocalCluster, as_completed, get_worker
     from distributed.comm import CommClosedError
+    from distributed.deploy.spec import close_clusters
     from distributed.diagnostics.plugin import WorkerPlugin
 except ImportError as missing:
     raise BadInput(
@@ -195,10 +197,14 @@ def _client(crew: Crew) -> Iterator[Any]:
                 yield client
             return
         with tempfile.TemporaryDirectory(prefix="railfmi_workers_") as folder:
-            cluster = LocalCluster(
-                n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
-                dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
-            )  # fmt: skip
+            try:
+                cluster = LocalCluster(
+                    n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
+                )  # fmt: skip
+            except KeyboardInterrupt:  # what has begun to start cannot be closed: distributed fails at exit
+                atexit.unregister(close_clusters)
+                raise
             try:
                 with Client(cluster, timeout=CONNECTING) as client:
                     yield client
