@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
-from contextlib import suppress
+from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -22,7 +22,8 @@ NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 class Reader(ABC):
     """A data format: `kind` is the word for its files, `suffixes` are the file endings in lower case.
 
-    fragile: whether a damaged file may crash the library that reads it; it is tried in another process first.
+    fragile: whether a damaged file may crash the library that reads it; it is read in another process then,
+    and its columns hold numbers alone.
     """
 
     kind: ClassVar[str]
@@ -44,7 +45,13 @@ class Reader(ABC):
             reason = f"data file cannot be read ({error.strerror}); correct its path"
             raise BadInput(f"{file}: {reason}") from error
         if self.fragile:
-            self._try_apart(file, time, columns, options)
+            return self._read_apart(file, time, columns, options)
+        return self._read_here(file, time, columns, options)
+
+    def _read_here(
+        self, file: Path, time: str | None, columns: Collection[str] | None, options: Mapping[str, Any]
+    ) -> Sheet:
+        """Read an existing file; what a library trips over is BadInput."""
         try:
             return self.sheet(file, time, columns, **options)
         except (BadInput, Warning):  # warnings are errors where somebody made them so
@@ -61,18 +68,23 @@ class Reader(ABC):
                 f"{file}: is not a sound {self.kind} file ({said}); record or export it again"
             ) from error
 
-    def _try_apart(
+    def _read_apart(
         self, file: Path, time: str | None, columns: Collection[str] | None, options: Mapping[str, Any]
-    ) -> None:
-        """Raise BadInput where the file ends a process that reads it."""
-        room = room_of(Isolation(run=READING))
+    ) -> Sheet:
+        """Read a file in another process, where it can end nothing but that."""
+        there = file.absolute()  # the other process may work in another folder
         try:
-            room.call(_read_for_trial, self, file.absolute(), time, columns, dict(options))
+            cells, parts = room_of(Isolation(run=READING)).call(
+                _parts_of_sheet, self, there, time, columns, dict(options)
+            )
         except FmuEnded as error:
             raise BadInput(
                 f"{file}: is not a sound {self.kind} file (it brings down the process that reads it, or "
                 f"needs more than {MEMORY:g} GB of memory there); record or export it again"
             ) from error
+        except BadInput as error:
+            raise BadInput(str(error).replace(str(there), str(file))) from error
+        return Sheet(file, pd.DataFrame(cells), **parts)
 
     def __call__(self, file: Path) -> pd.DataFrame:
         """All columns of a file whose columns share their rows."""
@@ -86,11 +98,13 @@ class Reader(ABC):
         """
 
 
-def _read_for_trial(reader: Reader, file: Path, *asked: Any) -> None:
-    """Read a file and forget it; what is wrong with it is told where it is read again."""
-    time, columns, options = asked
-    with suppress(Exception):
-        reader.sheet(file, time, columns, **options)
+def _parts_of_sheet(reader: Reader, *asked: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The columns of a sheet, which hold numbers, and its other parts, as another process may send them."""
+    sheet = reader._read_here(*asked)
+    cells = {str(name): sheet.cells[name].to_numpy() for name in sheet.cells}
+    return cells, {
+        part.name: getattr(sheet, part.name) for part in fields(Sheet) if part.name not in ("file", "cells")
+    }
 
 
 def library(module: str, package: str, file: Path) -> ModuleType:
