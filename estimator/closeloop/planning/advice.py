@@ -24,7 +24,7 @@ from fmus.host.fmu import FmuError
 
 ASSUMED_NOISE = 0.01  # of an output that is not measured, as share of its rms; said in the text
 MOST_TRIED = 12  # changes of the inputs that are simulated
-ROUNDING = 1e-9  # share of an output's largest value, below which simulations differ by rounding only
+EQUAL = 1e-9  # share of an output's largest value, below which simulations differ by rounding only
 NAMED = 2  # sensors and changes of the inputs that are named
 
 
@@ -101,7 +101,7 @@ def _same(
 
 def _equal(y: Array, other: Array) -> bool:
     """Whether two simulations (N, n_y) are the same up to rounding."""
-    return bool(np.all(np.abs(y - other) <= ROUNDING * np.abs(other).max(axis=0)))
+    return bool(np.all(np.abs(y - other) <= EQUAL * np.abs(other).max(axis=0)))
 
 
 def sentences(c: EffectClass, length: float) -> list[str]:
