@@ -53,8 +53,12 @@ class RowsLoop:
 
     def __init__(self, one: Fmu, recipe: Recipe, other: Loop) -> None:
         constants = dict(zip(recipe.constant_refs.tolist(), recipe.constants.tolist(), strict=True))
-        base = base_of(one.description, {})
-        base[list(constants)] = list(constants.values())
+        named = {
+            v.name: constants[r]
+            for v in one.description.variables.values()
+            if (r := v.reference) in constants
+        }
+        base = base_of(one.description, named)
         self._rows = Rows(one.instance.library, base, recipe.set_refs, recipe.get_refs)
         self._other, self._times = other, STILL
 

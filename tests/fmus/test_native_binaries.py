@@ -133,6 +133,7 @@ def compiled_life(name, fmi, folder, *flags, effects=()):
     sizes = {"N_STATES": len(model.of(State)), "FIRST_INPUT": len(model.of(State))}
     sizes["FIRST_OUTPUT"] = len(model.of(State, Input, Parameter))
     sizes["N_VARIABLES"] = sizes["FIRST_OUTPUT"] + len(model.of(Output))
+    sizes["FIRST_REFERENCE"] = 1 if fmi == 3 else 0
     facts = [f"-D{k}={v}" for k, v in sizes.items()]
     token = root.get("guid") or root.get("instantiationToken")
     program = folder / "life"

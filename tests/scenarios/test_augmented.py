@@ -90,7 +90,7 @@ def found(effects, values, verdict="traced"):
 def experiment(folder):
     data = folder / "data.csv"
     data.write_text("time,F,q\n0,0,0\n")
-    return SimpleNamespace(id="pull", data_files=(data,))
+    return SimpleNamespace(id="pull", every_file=(data,))
 
 
 def handed_over(builder, folder, effects, values, told=lambda _: None):

@@ -175,7 +175,7 @@ class Trace:
         slope = self._side * float(pull[i] + self._gram[i, o] @ rest)
         bend = float(self._gram[i, i] + self._gram[i, o] @ follow)
         if bend <= 0:
-            return np.inf, True, rest, follow
+            return WIDE, True, rest, follow
         spare = slope**2 - bend * (rise - self._rise)
         return (np.sqrt(max(spare, 0.0)) - slope) / bend, spare >= 0, rest, follow
 

@@ -33,6 +33,7 @@ typedef fmi3Byte Byte;
 
 enum { INSTANCES = 100, STEPS = 5 };
 #define DT 2e-3
+#define REFERENCE(place) (FIRST_REFERENCE + (place)) /* of the variable at a place of the description */
 
 static int wrong = 0; /* answers that were not the expected ones */
 
@@ -77,7 +78,7 @@ static int along(Component c, unsigned out, unsigned in, double *v) {
 }
 
 static void other_types(Component c) {
-    unsigned r = 0;
+    unsigned r = REFERENCE(0);
     int i = 0;
     DONE(fmi2GetInteger(c, NULL, 0, NULL));
     REFUSED(fmi2GetInteger(c, &r, 1, &i));
@@ -124,7 +125,7 @@ static int along(Component c, unsigned out, unsigned in, double *v) {
 }
 
 static void other_types(Component c) {
-    unsigned r = 0;
+    unsigned r = REFERENCE(0);
     int32_t i = 0;
     bool on = false;
     DONE(fmi3GetInt32(c, NULL, 0, NULL, 0));
@@ -163,7 +164,7 @@ static void saved_and_restored(Component c) {
 }
 
 static void refused(Component c) {
-    unsigned unknown = 100000, output = FIRST_OUTPUT, input = FIRST_INPUT;
+    unsigned unknown = 100000, output = REFERENCE(FIRST_OUTPUT), input = REFERENCE(FIRST_INPUT);
     double value = 0.0, nan_value = NAN;
     REFUSED(get(c, &unknown, 1, &value));
     REFUSED(set(c, &unknown, 1, &value));
@@ -176,14 +177,15 @@ static void refused(Component c) {
 
 static void all_read(Component c) {
     for (unsigned i = 0; i < N_VARIABLES; i++) {
+        unsigned r = REFERENCE(i);
         double v = NAN;
-        DONE(get(c, &i, 1, &v));
+        DONE(get(c, &r, 1, &v));
         if (!isfinite(v)) wrong++;
     }
 }
 
 static double co_simulated(Component c) {
-    unsigned state = 0, input = FIRST_INPUT;
+    unsigned state = REFERENCE(0), input = REFERENCE(FIRST_INPUT);
     double x = 0.1, y, u = 1.0;
     DONE(set(c, &state, 1, &x));
     DONE(begin(c));
@@ -198,7 +200,7 @@ static double co_simulated(Component c) {
     REFUSED(step(c, STEPS * DT, -DT));
     DONE(step(c, STEPS * DT, DT));
     REFUSED(step(c, 0, DT));
-    DONE(along(c, FIRST_OUTPUT, FIRST_INPUT, &y));
+    DONE(along(c, REFERENCE(FIRST_OUTPUT), REFERENCE(FIRST_INPUT), &y));
     DONE(get(c, &state, 1, &y));
     return y;
 }
