@@ -48,4 +48,4 @@ def run_elsewhere(
     told = None if tell is None else room.function(tell)
     with stopped_by_ctrl_c(Stopping(room)):
         return room.call(marched, dict(fmus), {**options, "inputs": inputs}, duration, cells.name, told)
-    return recorder.last
+    return Stop(recorder.last)
