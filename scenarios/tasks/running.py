@@ -4,12 +4,11 @@ The workers are processes of one thread each. A worker that is killed is replace
 another one. What was finished lies in the store, so that nothing else has to survive.
 """
 
-import atexit
 import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,12 +19,12 @@ from fmus.errors import BadInput
 from fmus.files import write_at_once
 from scenarios.tasks.hashes import hash_of, hash_of_program
 from scenarios.tasks.store import BUILDS, Answer, Store
+from scenarios.tasks.undisturbed import undisturbed
 
 try:
     import dask
     from distributed import Client, LocalCluster, as_completed, get_worker
     from distributed.comm import CommClosedError
-    from distributed.deploy.spec import close_clusters
     from distributed.diagnostics.plugin import WorkerPlugin
 except ImportError as missing:
     raise BadInput(
@@ -196,21 +195,22 @@ def _client(crew: Crew) -> Iterator[Any]:
             with _reached(crew.scheduler) as client:
                 yield client
             return
-        with tempfile.TemporaryDirectory(prefix="railfmi_workers_") as folder:
-            try:
+        with tempfile.TemporaryDirectory(prefix="railfmi_workers_") as folder, ExitStack() as stack:
+            with undisturbed():  # distributed can close a cluster that is whole, and fails at half of one
                 cluster = LocalCluster(
                     n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
                     dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
                 )  # fmt: skip
-            except KeyboardInterrupt:  # what has begun to start cannot be closed: distributed fails at exit
-                atexit.unregister(close_clusters)
-                raise
-            try:
-                with Client(cluster, timeout=CONNECTING) as client:
-                    yield client
-            finally:
-                with suppress(TimeoutError):
-                    cluster.close(timeout=CLOSING)
+                stack.callback(_close, cluster)
+                client = Client(cluster, timeout=CONNECTING)
+                stack.callback(_close, client)
+            yield client
+
+
+def _close(part: Any) -> None:
+    """Close the client, or the workers and their scheduler."""
+    with undisturbed(), suppress(TimeoutError):
+        part.close(timeout=CLOSING)
 
 
 def _reached(address: str) -> Any:

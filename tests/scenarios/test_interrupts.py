@@ -15,6 +15,7 @@ import pytest
 from fmus.files import remove_left
 from fmus.host.master.recording import read_recording
 from scenarios.cli.supervision import FOLDER
+from scenarios.tasks.undisturbed import undisturbed
 from tests.helpers.interrupting import PATIENCE, SIGNALS, orphans
 from tests.helpers.misbehaving import EXPERIMENT, SCENARIO, Fault, bad_fmu, write_data
 from tests.helpers.paths import SHIPPED
@@ -177,3 +178,57 @@ def test_a_build_leaves_no_compiler(tmp_path, number):
     assert "interrupted" in done.stdout
     assert not (tmp_path / "out").exists()
     assert_tidied(tmp_path / "temporary")
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda n: n.name)
+def test_a_fleet_ends_in_one_line_while_its_workers_start(tmp_path, number):
+    """Half of a cluster, which its library cannot close, would end in tracebacks of that library."""
+    pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
+    (tmp_path / "temporary").mkdir()
+    fleet = SHIPPED / "fleet" / "fleet.toml"
+    arguments = ["fleet", fleet, "--workers", "2", "--quiet", "--out", tmp_path / "out"]
+    begun = tmp_path / "temporary" / "railfmi_*" / "railfmi_workers_*"
+    done = ended(arguments, number, begun, tmp_path / "temporary")
+    assert done.returncode == SIGNALS[number]
+    assert done.stdout.startswith("railfmi: interrupted")
+    assert len(done.stdout.splitlines()) == 1, done.stdout
+    assert_tidied(tmp_path / "temporary")
+
+
+@pytest.fixture
+def raising():
+    """Ctrl-C raises KeyboardInterrupt, as where a script runs in the foreground."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_ctrl_c_comes_after_what_it_must_not_break_off(raising, fails):
+    steps = []
+
+    def block():
+        with undisturbed():
+            signal.raise_signal(signal.SIGINT)
+            steps.append("after the signal")
+            if fails:
+                raise RuntimeError("as of a worker that got the signal too")
+
+    with pytest.raises(KeyboardInterrupt):
+        block()
+    assert steps == ["after the signal"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_nothing_comes_where_no_ctrl_c_was(raising):
+    with undisturbed():
+        pass
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_a_job_in_the_background_goes_on_ignoring_ctrl_c(raising):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with undisturbed():
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
