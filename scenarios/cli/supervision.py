@@ -12,8 +12,10 @@ import os
 import signal
 import sys
 import tempfile
+from _thread import interrupt_main
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from threading import Timer
 from types import FrameType
 from typing import NoReturn
 
@@ -28,6 +30,7 @@ STOPPED = 130  # exit code of a command that says itself that it was interrupted
 DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
 REAPER = 36  # of the call prctl: orphans among the descendants become children
 PAGE = 1 << 13  # bytes
+AGAIN = 0.05  # s, until an interrupt that was dropped comes again
 FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary files
 MEMORY_HINT = "; where memory runs out, the system does this"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
@@ -48,6 +51,15 @@ class Interrupts:
     def __call__(self, _number: int, _frame: FrameType | None) -> None:
         self.came = True
         raise KeyboardInterrupt
+
+    def comes_again(self, dropped: "sys.UnraisableHookArgs") -> None:
+        """One that fell where Python drops exceptions, such as in a callback of a reference, comes again."""
+        if self.came and issubclass(dropped.exc_type, KeyboardInterrupt):
+            again = Timer(AGAIN, interrupt_main)
+            again.daemon = True
+            again.start()
+        else:
+            sys.__unraisablehook__(dropped)
 
 
 INTERRUPTED = Interrupts()
@@ -93,6 +105,7 @@ def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
     os.setsid()
     _control(DEATH_SIGNAL, signal.SIGTERM)
     signal.signal(signal.SIGINT, INTERRUPTED)
+    sys.unraisablehook = INTERRUPTED.comes_again
     code = 1
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)

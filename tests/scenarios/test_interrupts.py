@@ -232,3 +232,31 @@ def test_a_job_in_the_background_goes_on_ignoring_ctrl_c(raising):
     with undisturbed():
         signal.raise_signal(signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+DROPPED = """
+import os, signal, sys, time, weakref
+from scenarios.cli.supervision import supervised
+
+class Thing: pass
+
+def command(_):
+    try:
+        thing = Thing()
+        held = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGINT))
+        del thing
+        time.sleep(60)
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+sys.exit(supervised(command, []))
+"""
+
+
+def test_an_interrupt_that_python_drops_comes_again():
+    """In a callback of a reference, such as importlib has, an exception is printed and forgotten."""
+    done = subprocess.run(
+        [sys.executable, "-c", DROPPED], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
