@@ -152,6 +152,32 @@ def test_every_operation_is_that_of_the_library(operations, pairs):
     assert np.all(same | near), [CODES[j] for j in np.flatnonzero(~(same | near).all(axis=0))]
 
 
+@settings(max_examples=200)
+@given(st.lists(st.tuples(ORDINARY, ORDINARY), min_size=2, max_size=9))
+def test_an_operation_does_not_depend_on_what_the_neighbours_of_a_row_are(operations, pairs):
+    asked, now = [f"y_{code}" for code in CODES], np.zeros(1)
+    starts = [{"a": a, "b": b} for a, b in pairs]
+    alone = [operations.simulate_rows(now, {}, asked, [s])[0] for s in starts]
+    assert_array_equal(operations.simulate_rows(now, {}, asked, starts), alone)
+
+
+@by_size
+def test_a_row_is_the_same_whatever_its_neighbours_are(name):
+    model = MODELS[name]()
+    states = names(model, State)
+    with Fmu(native(name)) as fmu:
+        outputs, compared = fmu.description.outputs, 0
+        t, inputs, starts = record(model, 3, 4, n=4)
+        wild = [{**s, n: 10.0**k * (1.0 + abs(s[n]))} for s in starts[1:] for n in states for k in (0, 2, 4)]
+        alone = fmu.simulate_rows(t, inputs, outputs, starts[:1])[0]
+        for other in wild:
+            both = fmu.simulate_rows(t, inputs, outputs, [starts[0], other])
+            if both is not None:  # a group with a row that cannot be advanced is left to instances
+                compared += 1
+                assert_array_equal(both[0], alone)
+        assert compared > 0
+
+
 def test_a_function_with_an_operation_without_lanes_has_none():
     x = cs.SX.sym("x")
     assert lanes_of([cs.Function("plain", [x], [cs.sin(x)])]) is not None

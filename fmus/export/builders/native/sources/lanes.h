@@ -34,15 +34,15 @@ static inline double sign_of(double x) { return x < 0 ? -1.0 : x > 0 ? 1.0 : x; 
 #endif
 #define ONLY VECTORS static inline __attribute__((always_inline, unused)) void
 
-/* Numbers that a series does not cover are left to C's library, lane after lane. */
+/* Lanes that a series does not cover are left to C's library; the others keep the values of the series, so that a row
+   does not depend on its neighbours. */
 #define LIBRARY_UNLESS(condition, function)                                                                       \
     {                                                                                                             \
         Bits covered = (Bits)(condition);                                                                         \
         if (!USUALLY(lanes_everywhere(&covered))) {                                                              \
-            Lanes x = *a, r;                                                                                      \
-            EACH(i) r[i] = function(x[i]);                                                                        \
+            Lanes given = *a, r = *y;                                                                             \
+            EACH(i) if (!covered[i]) r[i] = function(given[i]);                                                   \
             *y = r;                                                                                               \
-            return;                                                                                               \
         }                                                                                                         \
     }
 
@@ -72,7 +72,6 @@ VECTORS static inline __attribute__((always_inline)) bool lanes_everywhere(const
 
 /* e to the x: 2 to a whole number times the Taylor series of what is left, up to 0.35. */
 ONLY lanes_exp(const Lanes *a, Lanes *y) {
-    LIBRARY_UNLESS(MAGNITUDE(*a) < 700.0, exp)
     Lanes x = *a, shifted = x * 1.4426950408889634 + ROUNDING, n = shifted - ROUNDING;
     Lanes r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10; /* ln 2 in two parts */
     Lanes s = ALL(1.6059043836821613e-10); /* 1 / 13! */
@@ -90,6 +89,7 @@ ONLY lanes_exp(const Lanes *a, Lanes *y) {
     s = s * r * r + r + 1.0;
     Bits power = ((Bits)shifted << 52) + (Bits)ALL(1.0); /* n stands in the last bits of the shifted number */
     *y = s * (Lanes)power;
+    LIBRARY_UNLESS(MAGNITUDE(x) < 700.0, exp)
 }
 
 /* Sine and cosine by the polynomials of fdlibm (k_sin.c, k_cos.c) after removal of quarter turns. */
@@ -115,13 +115,13 @@ ONLY lanes_wave(const Lanes *a, int ahead, Lanes *y) {
 }
 
 ONLY lanes_sin(const Lanes *a, Lanes *y) {
-    LIBRARY_UNLESS(MAGNITUDE(*a) < 1e5, sin)
     lanes_wave(a, 0, y);
+    LIBRARY_UNLESS(MAGNITUDE(*a) < 1e5, sin)
 }
 
 ONLY lanes_cos(const Lanes *a, Lanes *y) {
-    LIBRARY_UNLESS(MAGNITUDE(*a) < 1e5, cos)
     lanes_wave(a, 1, y);
+    LIBRARY_UNLESS(MAGNITUDE(*a) < 1e5, cos)
 }
 
 /* Arc tangent by the rational function of Cephes (atan.c), up to 0.66; beyond it by a quarter or half of pi. */
@@ -172,17 +172,20 @@ ONLY lanes_pow(const Lanes *a, const Lanes *b, Lanes *y) {
     *y = r;
 }
 
-/* n elements of a table one after the other, from a place on that differs from lane to lane. */
+/* n elements of a table one after the other, from a place on that differs from lane to lane; none beside the table. */
 ONLY lanes_rows(const double *table, long long size, const Lanes *number, int n, Lanes *y) {
     const double *row[WIDTH];
     Lanes at = *number;
-    bool inside = true;
-    EACH(i) inside = inside && at[i] >= 0 && at[i] + n <= (double)size;
-    if (!inside) {
+    bool inside[WIDTH], all = true;
+    EACH(i) {
+        inside[i] = at[i] >= 0 && at[i] + n <= (double)size;
+        all = all && inside[i];
+    }
+    if (n > size) {
         for (int k = 0; k < n; k++) y[k] = ALL(NAN);
         return;
     }
-    EACH(i) row[i] = table + (long long)at[i];
+    EACH(i) row[i] = table + (inside[i] ? (long long)at[i] : 0);
     int k = 0;
 #if defined(__clang__) || __GNUC__ >= 12
     for (; k + 4 <= n; k += 4) /* four by four, turned from rows to lanes */
@@ -202,6 +205,8 @@ ONLY lanes_rows(const double *table, long long size, const Lanes *number, int n,
         }
 #endif
     for (; k < n; k++) EACH(i) y[k][i] = row[i][k];
+    if (!USUALLY(all))
+        EACH(i) for (int j = 0; !inside[i] && j < n; j++) y[j][i] = NAN;
 }
 
 /* The case of each lane, as C's switch takes it, and the one of all lanes, or -1 where they differ. */
