@@ -279,6 +279,14 @@ class SearchPolicy:
         "movement of an unknown of an answer by halved steps of the simulation, above which they are halved",
         "derivation: a bias of half of an error adds 12 % to it, as `noise_share`",
     )
+    bent: float = limit(
+        0.15,
+        "share of a residual's change",
+        "share by which the slopes of an answer may miss the change of its residual at the end of a 95 % "
+        "interval; else the likelihood profile is followed to the end",
+        "D. M. Bates, D. G. Watts, Nonlinear Regression Analysis (1988), 7.3: a curvature of 0.3, which "
+        "departs from the tangent by half of it",
+    )
     parts_of_a_step: int = limit(
         4,
         "parts",
