@@ -5,11 +5,13 @@ from pathlib import Path
 
 from tests.contracts import test_fuzzed_files
 from tests.helpers.fuzzing import targets
+from tests.helpers.interrupting import SIGNALS
 from tests.helpers.misbehaving import DEATHS, ENDLESS, HARMLESS
+from tests.helpers.small_commands import EVERY_COMMAND
 from tests.scenarios import (
     test_command_line,
     test_full_disk,
-    test_interrupts,
+    test_interrupts_at_random,
     test_misbehaving,
     test_output,
     test_trials_before,
@@ -52,11 +54,13 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
     for command, (_, most) in test_full_disk.CASES.items():
         told = f"one line, exit code 2, no part of a file, at each of up to {most} places"
         yield "disk full from any change of a file on", command, told, _file(test_full_disk)
-    for command in test_interrupts.COMMANDS:
-        for number in test_interrupts.SIGNALS:
-            told = "exit code of the signal; no traceback, part of a file, process or folder is left"
-            what = f"{number.name} at {test_interrupts.MOMENTS} moments"
-            yield what, command, told, _file(test_interrupts)
+    for command in EVERY_COMMAND:
+        for number in SIGNALS:
+            told = (
+                "exit code of the signal, one line; no traceback, part of a file, process or folder is left"
+            )
+            what = f"{number.name} at {test_interrupts_at_random.MOMENTS // len(SIGNALS)} random moments"
+            yield what, command, told, _file(test_interrupts_at_random)
     for name in targets():
         told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
         yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)

@@ -14,7 +14,8 @@ from hashlib import sha256
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-WRITTEN = {".pyc", ".so", ".json"}  # what a run writes itself, such as the cache of compiled modules
+WRITTEN = {".so", ".json"}  # what a run writes itself
+COMPILED = "__pycache__"  # and the folder of its compiled modules and functions
 
 
 def read_for(records: Iterable[Path]) -> list[str]:
@@ -60,12 +61,15 @@ def _trace(record: Path) -> set[str]:
         sys.argv = ["answer", str(record), str(Path(folder) / "answer.json"), "1"]
         answer.main()
     opened |= {m.__file__ for m in list(sys.modules.values()) if getattr(m, "__file__", None)}  # type: ignore[misc]
-    inside = {Path(f).absolute() for f in opened}
+    inside = {Path(f).absolute() for f in opened} - {Path(__file__).absolute()}  # which only listens
     tops = {ROOT / top for top in ("fmus", "estimator", "scenarios", "benchmarks", "tests")}
     return {
         p.relative_to(ROOT).as_posix()
         for p in inside
-        if p.is_file() and p.suffix not in WRITTEN and not tops.isdisjoint(p.parents)
+        if p.is_file()
+        and p.suffix not in WRITTEN
+        and COMPILED not in p.parts
+        and not tops.isdisjoint(p.parents)
     }
 
 

@@ -32,9 +32,14 @@ class Request:
 
 
 class Estimator(ABC):
-    """A filter that an experiment can choose; `name` is the value of the key `filter`."""
+    """A filter that an experiment can choose; `name` is the value of the key `filter`.
+
+    moments: whether mean and covariance are all that it knows. If not, its estimates cannot be smoothed, and
+    `watch` cannot carry it over a gap.
+    """
 
     name: ClassVar[str]
+    moments: ClassVar[bool] = True
 
     @classmethod
     @abstractmethod

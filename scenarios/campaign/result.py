@@ -1,16 +1,15 @@
 """The result of campaign, as it is written to result.json beside the tables."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from scenarios.campaign.indices import Index
-from scenarios.shown import Shown, axes_or_new
+from scenarios.shown import axes_or_new
+from scenarios.tasks.result import TasksResult
 from scenarios.tasks.store import FAILED
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ class Measured:
 
 
 @dataclass(frozen=True, repr=False)
-class CampaignResult(Shown):
+class CampaignResult(TasksResult):
     """The result of a campaign; each field is a key of result.json.
 
     tasks: how many points are `planned`, `finished`, `failed` (answered with a reason) and `left` (not done,
@@ -49,19 +48,10 @@ class CampaignResult(Shown):
     campaign: str
     sample: str
     points: int
-    tasks: dict[str, int]
     varied: list[str]
     measured: list[Measured]
     indices: list[Index]
     failed: list[dict[str, Any]]
-    railfmi: str
-    program_sha256: str
-    wall_seconds: float
-
-    @property
-    def complete(self) -> bool:
-        """Whether each point has an answer, if only the reason why there is none."""
-        return self.tasks["left"] == 0
 
     @property
     def headline(self) -> str:
@@ -100,10 +90,6 @@ class CampaignResult(Shown):
         drawn.barh([i.key for i in some], [i.total for i in some], xerr=[low, high])
         drawn.set(xlabel="total index", title=self.campaign)
         return drawn
-
-    def write(self, file: Path) -> None:
-        """Write as JSON."""
-        file.write_text(json.dumps(asdict(self), indent=1, ensure_ascii=False), encoding="utf-8")
 
 
 def _ends(some: Sequence[Index]) -> tuple[list[float], list[float]]:

@@ -14,11 +14,11 @@ import typer
 
 from fmus.errors import BadInput
 from scenarios.cli.console import NOTICES, app, say_notices
-from scenarios.cli.supervision import INTERRUPTED, supervised
+from scenarios.cli.supervision import INTERRUPTED, STOPPED, supervised
 from scenarios.cli.voice import VOICE, said
 
 FOLDER = Path(__file__).parent
-NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision", "voice")
+NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision", "tasks", "voice")
 COMMANDS = {  # module by the name of its command
     module.name.replace("_", "-"): module.name
     for module in iter_modules([str(FOLDER)])
@@ -107,9 +107,9 @@ def _run_safely(arguments: Sequence[str]) -> int:
     try:
         NOTICES.clear()
         code = loaded(arguments)(list(arguments), standalone_mode=False)
-        if code == 130 and not INTERRUPTED.told:  # typer made an exit code of the exception
+        if code == STOPPED and not INTERRUPTED.told:  # typer made an exit code of the exception
             return _interrupted()
-        if code != 130:
+        if code != STOPPED:
             say_notices()
         _flush_output()
         return code if isinstance(code, int) else 0
@@ -189,4 +189,4 @@ def _is_of_fmu(error: Exception) -> bool:
 
 def _interrupted() -> int:
     said.print("railfmi: interrupted; files that were finished before are kept")
-    return 130
+    return STOPPED

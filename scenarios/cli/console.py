@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from scenarios.cli.supervision import INTERRUPTED
+from scenarios.cli.supervision import INTERRUPTED, STOPPED
 from scenarios.cli.voice import VOICE, said
 from scenarios.output import replaced
 
@@ -80,7 +80,7 @@ def interrupted(sentence: str) -> typer.Exit:
     """Say that the command was interrupted, and what can be done; the exception that ends it."""
     said.print(f"railfmi: interrupted; {sentence}", markup=False, soft_wrap=True)
     INTERRUPTED.told = True
-    return typer.Exit(130)
+    return typer.Exit(STOPPED)
 
 
 Trust = Annotated[

@@ -24,6 +24,7 @@ from fmus.limits import INTERRUPT
 Command = Callable[[Sequence[str]], int]
 
 FAILED = 2  # exit code of a command that has not finished
+STOPPED = 130  # exit code of a command that says itself that it was interrupted
 DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
 REAPER = 36  # of the call prctl: orphans among the descendants become children
 PAGE = 1 << 13  # bytes
@@ -53,7 +54,10 @@ INTERRUPTED = Interrupts()
 
 
 def supervised(command: Command, arguments: Sequence[str]) -> int:
-    """Run a command in a process of its own; its exit code, or 128 plus the signal that interrupted it."""
+    """Run a command in a process of its own; its exit code, or 128 plus the signal that interrupted it.
+
+    A signal that comes when the command has done all that it was asked for changes nothing.
+    """
     if not hasattr(os, "fork"):
         return command(arguments)
     place = Path(tempfile.gettempdir())
@@ -93,7 +97,11 @@ def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
         code = command(arguments)
+    except KeyboardInterrupt:  # before the command could take it, or after
+        code = STOPPED
+        raise
     finally:  # also after a mistake in this program, which Python then shows
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what was asked for is done, and what is left is short
         os.write(tells, bytes([code]))
     sys.exit(code)
 
@@ -129,11 +137,13 @@ class Watch:
         """Wait for the end of the command; its exit code."""
         _, status = os.waitpid(self._child, 0)
         signal.alarm(0)
+        for number in INTERRUPTS:  # too late to change anything: the answer is the command's
+            signal.signal(number, signal.SIG_IGN)
         code = self._code()
         self._kill()  # what it has left: workers, compilers; FMUs end with the process that uses them
         _end_orphans()
         if code is not None:
-            return 128 + self._signal if self._signal else code
+            return 128 + self._signal if self._signal and code == STOPPED else code
         if self._signal:
             hint = next((HINTS[name] for name in self._arguments if name in HINTS), "")
             _say(f"interrupted{hint}")

@@ -5,6 +5,7 @@ from math import inf, sqrt
 
 import numpy as np
 
+from estimator.filters import filters
 from estimator.filters.bounds import Transform, bounded
 from estimator.filters.system import UnknownParameter, UnknownState
 from estimator.filters.unknown_input import (
@@ -38,6 +39,11 @@ def check_options(e: Experiment, o: Options, d: FmuDescription) -> None:
             if name not in known:
                 where = f"{e.file}: [estimate.options] {key} '{name}'"
                 raise BadInput(f"{where} is not estimated; {did_you_mean(name, known)}")
+    if o.smooth and not filters()[o.filter].moments:
+        raise BadInput(
+            f"{e.file}: [estimate.options] smooth does not work with filter = '{o.filter}', which knows more "
+            "than mean and covariance; leave one of them out"
+        )
 
 
 def parameters_of(e: Experiment, o: Options, d: FmuDescription) -> Iterator[UnknownParameter]:

@@ -1,17 +1,16 @@
 """The result of fleet, as it is written to result.json beside the tables."""
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from scenarios.drawing.typography import quantity, unit, with_error
 from scenarios.fleet.rows import Row
-from scenarios.shown import Shown, axes_or_new
+from scenarios.shown import axes_or_new
+from scenarios.tasks.result import TasksResult
 from scenarios.tasks.store import FAILED
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ RESULTS, DRIFTS, LEVELS, EFFECTS = "results", "drifts.parquet", "levels.parquet"
 
 
 @dataclass(frozen=True, repr=False)
-class FleetResult(Shown):
+class FleetResult(TasksResult):
     """The result of a fleet; each field is a key of result.json.
 
     tasks: how many are `planned`, `finished`, `failed` (answered with a reason), `left` (not done, with a
@@ -35,7 +34,6 @@ class FleetResult(Shown):
     fleet: str
     vehicles: int
     records: int
-    tasks: dict[str, int]
     verdicts: dict[str, dict[str, int]]
     failed: list[dict[str, str]]
     drifts: list[dict[str, Any]]
@@ -43,14 +41,6 @@ class FleetResult(Shown):
     effects: list[dict[str, Any]]
     level: float
     mileage_unit: str
-    railfmi: str
-    program_sha256: str
-    wall_seconds: float
-
-    @property
-    def complete(self) -> bool:
-        """Whether each task has an answer, if only the reason why there is none."""
-        return self.tasks["left"] == 0
 
     @property
     def headline(self) -> str:
@@ -85,10 +75,6 @@ class FleetResult(Shown):
         drawn.barh([*bars], [*bars.values()])
         drawn.set(xlabel="answers", title=self.fleet)
         return drawn
-
-    def write(self, file: Path) -> None:
-        """Write as JSON."""
-        file.write_text(json.dumps(asdict(self), indent=1, ensure_ascii=False), encoding="utf-8")
 
 
 def verdicts_of(rows: Sequence[Row]) -> dict[str, dict[str, int]]:

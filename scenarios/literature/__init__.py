@@ -40,8 +40,8 @@ def run_row(
 ) -> Outcome:
     """Run a row and write result.json, table.md and its figures to a folder.
 
-    records: a folder with CASE.csv for each case, or a function that makes the records. By default the FMU
-    simulates them, which proves less, because model and truth are then the same.
+    records: a folder with CASE.csv for each case, or a function that makes the records. By default the FMU,
+    or a row whose equations are its own, simulates them. This proves less: model and truth are then the same.
     fmu: by default the row's model as a native build.
     cases: the cases to run, by default all.
     Raises BadInput if a row, a case or a record cannot be used.
@@ -60,13 +60,13 @@ def run_row(
         measured = []
         for case in chosen:
             tell(f"{case.name}: the record")
-            measured.append((case, _source(records, used)(case)))
+            measured.append((case, _source(records, row, used)(case)))
         outcome = row.rebuilt(measured, used, tell)
     outcome.write(target)
     return outcome
 
 
-def _source(records: Path | Source | None, fmu: Path) -> Source:
+def _source(records: Path | Source | None, row: Row, fmu: Path) -> Source:
     if records is None:
-        return twin(fmu)
+        return row.simulated or twin(fmu)
     return recorded(records) if isinstance(records, Path) else records

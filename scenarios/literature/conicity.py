@@ -9,6 +9,7 @@ import numpy as np
 from estimator.filters.ekf import Ekf
 from estimator.filters.estimator import Estimate
 from estimator.record import Array
+from fmus.errors import BadInput
 from scenarios.literature.case import TRUE, Case, Record
 from scenarios.literature.conicity_figures import figures
 from scenarios.literature.conicity_fits import (
@@ -27,6 +28,7 @@ from scenarios.literature.conicity_model import (
     V,
     Wheelset,
 )
+from scenarios.literature.conicity_run import simulated
 from scenarios.literature.conicity_table import Tabled
 from scenarios.literature.following import Followed, follow, rmse
 from scenarios.literature.outcome import Bound, Finding, Outcome
@@ -129,6 +131,16 @@ def tried(case: Case, record: Record, tell: Tell) -> Tried:
     return Tried(case, record, filters, fits, table)
 
 
+def own_record(case: Case) -> Record:
+    """The record of a case by the equations of the row; BadInput for the case of other equations."""
+    if case.true == OTHER_EQUATIONS:
+        raise BadInput(
+            f"case '{case.name}': its record is not of this row's equations; give records, or choose case "
+            f"'{GENERIC}'"
+        )
+    return simulated(case)
+
+
 def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
     """See Row; no FMU is needed, the equations are the source's."""
     every = [tried(case, record, tell) for case, record in measured]
@@ -183,4 +195,5 @@ ROW = Row(
     "wheelset",
     CASES,
     rebuilt,
+    own_record,
 )

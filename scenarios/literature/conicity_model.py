@@ -1,5 +1,6 @@
 """Wheelset of Charles et al. 2008 (eq. 1 to 5) as the system of a filter, its conicity known in four ways."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -146,4 +147,30 @@ class Along(Constant):
     def moved(self, more: Array, shift: Array, by: Array) -> Array:
         """See Belief."""
         kept: Array = more * self._kept
+        return kept
+
+
+class Curved(Along):
+    """Conicity is a known function of the shift [m], (k,) -> (k,); the irregularity alone is estimated.
+
+    kept: see Along.
+    """
+
+    names: tuple[str, ...] = ("d",)
+
+    def __init__(self, curve: Callable[[Array], Array], kept: float = 1.0) -> None:
+        super().__init__(kept)
+        self._curve = curve
+
+    def conicity(self, more: Array, shift: Array) -> Array:
+        """See Belief."""
+        return self._curve(shift)
+
+    def irregularity(self, more: Array) -> Array:
+        """See Belief."""
+        return more[:, 0]
+
+    def moved(self, more: Array, shift: Array, by: Array) -> Array:
+        """See Belief."""
+        kept: Array = more * self._kept[1]
         return kept

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from estimator.filters.estimator import Diverged, Filter
+from estimator.filters.estimator import Diverged, Estimate
 from estimator.record import Array
 
 NORMAL_95 = 1.96  # standard deviations of a normal distribution that hold 95 % of it
@@ -23,6 +23,13 @@ class Named(Protocol):
 
     def values(self, x: Array, std: Array) -> tuple[Array, Array]:
         """Values and deviations in the FMU's units, (N, n) each, from x (N, n) and its deviations."""
+
+
+class Stepping(Protocol):
+    """What is led through a record: a Filter, or what looks like one."""
+
+    def step(self, u: Array, y: Array) -> Estimate:
+        """See Filter.step."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,7 @@ class Followed:
         return float((self.t[-1] - self.t[0]) / self.seconds)
 
 
-def follow(filter: Filter, joint: Named, t: Array, u: Array, y: Array) -> Followed:
+def follow(filter: Stepping, joint: Named, t: Array, u: Array, y: Array) -> Followed:
     """Run a filter of a system on inputs u (N, k) and outputs y (N, m) at times t (N,)."""
     x, spread = np.full((2, len(t), len(joint.names)), np.nan)
     likelihood, nis, reason = 0.0, 0.0, ""

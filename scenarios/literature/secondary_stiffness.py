@@ -1,4 +1,8 @@
-"""Secondary vertical stiffness: Kalman filter with weighted least squares (thesis 4.6.3), and joint UKF."""
+"""Secondary vertical stiffness: Kalman filter with weighted least squares (thesis 4.6.3), and joint UKF.
+
+Beside them runs the rule of the source as it is printed, on the record and on the same record with all signs
+turned, as of the track upside down: in a linear vehicle both say the same of its stiffness.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,6 +18,7 @@ from scenarios.literature.following import BAND, Followed, covered, follow, rmse
 from scenarios.literature.outcome import Finding, Outcome
 from scenarios.literature.parameter_figure import Line, Panel, parameter_figure
 from scenarios.literature.prediction_error import Weighted, identified
+from scenarios.literature.printed_rule import Printed, by_the_rule
 from scenarios.literature.row import Measured, Row, Tell
 from scenarios.literature.wheelset import variances
 
@@ -33,6 +38,7 @@ BOUNDS = (2e4, 2e6)
 MEMORY = 1.5  # s, of the least squares
 HEALTH_STD, HEALTH_WALK = 0.2, 0.03
 KILO = 1e-3
+RULE, TURNED = "rule as printed", "rule as printed, signs turned"
 WHEN, NEAR, SETTLED = 20.0, 0.1, 5.0
 WEIGHTS = np.array([0.35, 0.06, 0.35, 0.06, 0.06, 0.06, 0.06])  # 70 % on coach bounce and roll, thesis 4.6.3
 STATES = tuple(
@@ -77,6 +83,14 @@ def least_squares(record: Record, fmu: Path) -> Followed:
         )
 
 
+def printed_rule(record: Record, fmu: Path, sign: float = 1.0) -> Followed:
+    """The rule of the source as printed; sign: -1 turns the signs of all inputs and outputs."""
+    unknown = UnknownParameter("k1", START, STD, bounded(None))
+    with Joint(fmu, MEASURED, STATES, [unknown], (), INPUTS, {}, DT) as joint:
+        u, y = (sign * record.table(names) for names in (INPUTS, MEASURED))
+        return by_the_rule(joint, Printed(WEIGHTS), record.t, u, y)
+
+
 def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
     """See Row."""
     findings: list[Finding] = []
@@ -98,6 +112,11 @@ def rebuilt(measured: Measured, fmu: Path, tell: Tell) -> Outcome:
             found = joint_ukf(record, fmu, {"k1": stiffness()}) if ours else least_squares(record, fmu)
             lines[label] = Line.of(found, "k1", KILO)
             findings += _judged(case, label, found)
+        for label, sign in ((RULE, 1.0), (TURNED, -1.0)):
+            tell(f"{case.name}: {label}")
+            found = printed_rule(record, fmu, sign)
+            lines[label] = Line.of(found, "k1", KILO)
+            findings += _as_printed(case, label, found)
         panels.append(Panel(case.name, [KILO * case.truth("k1", record.t)], lines, "k1 [kN/m]"))
     return Outcome(ROW.name, findings, [parameter_figure("secondary_stiffness", panels)], NOTES)
 
@@ -116,6 +135,22 @@ def _judged(case: Case, way: str, found: Followed) -> list[Finding]:
     ]
 
 
+def _as_printed(case: Case, way: str, found: Followed) -> list[Finding]:
+    """How far the printed rule comes, and where it wanders on the way, which has no target."""
+    k1 = KILO * found.value["k1"]
+    known = np.isfinite(k1)
+    if not known.any():
+        return [Finding(case.name, f"{way}: time until it ends", "s", 0.0, note=found.reason)]
+    until, true = float(found.t[known][-1]), KILO * case.truth("k1", found.t)[known]
+    off = rmse(k1[known], true) / (KILO * TRUE)
+    made = [
+        Finding(case.name, f"{way}: relative RMSE of k1 until it ends", "1", off, note=found.reason),
+        Finding(case.name, f"{way}: time until it ends", "s", until),
+    ]
+    ends = zip(("smallest", "largest"), (k1[known].min(), k1[known].max()), strict=True)
+    return [*made, *(Finding(case.name, f"{way}: {end} k1", "kN/m", float(value)) for end, value in ends)]
+
+
 def _localised(case: Case, found: Followed) -> list[Finding]:
     made = []
     for c in CORNERS:
@@ -131,8 +166,9 @@ def _localised(case: Case, found: Followed) -> list[Finding]:
 
 
 NOTES = (
-    "The source's rule adds the weighted sum of residuals to k1, whether or not a positive one means a "
-    "larger k1; here each residual is weighted by its sensitivity to k1, as in least squares.",
+    "The source's rule (eq. 4.13, 4.14) adds the weighted sum of residuals to k1, whether or not a positive "
+    "one means a larger k1. Least squares weight each residual by its sensitivity to k1 too.",
+    "The printed rule has no bounds. A stiffness below zero cannot be simulated, and there it ends.",
     "The source gives only curves; their end values are in the column of the source.",
 )
 

@@ -27,6 +27,9 @@ AXLES = 19.0  # m between the bogie centres
 TORQUE = 852.0  # N.m, thesis 4.5
 REST = 5.0  # s without torque at the beginning and the end, there
 WHEEL, GEAR = 0.5, 5.0  # m, 1: rolling radius and gearbox of the driven wheelset
+POLE_PAIRS = 5  # of the rig's motor
+R_WHEEL, R_ROLLER = 0.3482, 0.45215  # m, of the rig: thesis 4.6.4, 4.1
+BRAKE = 1.1 * 8000.0 * R_WHEEL  # N.m over mu0, a little above the adhesion of the rig's wheel
 PULL = 1.1 * 2 * 79.7e3 * WHEEL / GEAR  # N.m over mu0, a little above the adhesion of both wheels
 
 
@@ -83,10 +86,16 @@ def _waves(spectrum: Spectrum, s: Array, rng: np.random.Generator) -> tuple[Arra
     return grown * z, grown * slope + growing * z
 
 
+def alignment(speed: float, t: Array, rng: np.random.Generator, deviation: float) -> tuple[Array, Array]:
+    """Random alignment (N,), m, of that deviation at times t (N,), s, and its rate, m/s; speed: m/s."""
+    z, slope = _waves(SPECTRA["erri_low"]["alignment"], speed * t, rng)
+    scale = deviation / z.std()
+    return scale * z, scale * speed * slope
+
+
 def _alignment(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
-    z, slope = _waves(SPECTRA["erri_low"]["alignment"], case.speed * t, rng)
-    scale = CHOCEN_DOBRIKOV["alignment"].sd / z.std()
-    return {"y_irr": scale * z, "y_irr_dot": scale * case.speed * slope}
+    y, y_dot = alignment(case.speed, t, rng, CHOCEN_DOBRIKOV["alignment"].sd)
+    return {"y_irr": y, "y_irr_dot": y_dot}
 
 
 def _rails(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
@@ -103,6 +112,9 @@ def _rails(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
 
 
 def _torque(case: Case, t: Array, rng: np.random.Generator) -> dict[str, Array]:
+    if "mu0" in case.true:
+        limit = BRAKE * case.truth("mu0", t) * np.clip(1.5 * np.sin(2 * np.pi * t), 0.1, 1.0)
+        return {"T_P": np.minimum(limit, TORQUE), "f_sync": np.full_like(t, case.speed)}
     quarter = (t[-1] - 2 * REST) / 4
     knots, values = [0.0], [0.0]
     for i, share in enumerate((0.5, -0.5, 1.0, 0.7)):
@@ -120,6 +132,11 @@ def _rolling(speed: float) -> dict[str, float]:
     return {"V": speed, "omega_left": speed / WHEEL}
 
 
+def _synchronous(supply: float) -> dict[str, float]:
+    omega_r = 2 * np.pi * supply / POLE_PAIRS
+    return {"omega_r": omega_r, "omega_w": omega_r * R_ROLLER / R_WHEEL}
+
+
 INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]] = {
     "wheelset": _alignment,
     "vehicle7dof": _rails,
@@ -129,4 +146,5 @@ INPUTS: dict[str, Callable[[Case, Array, np.random.Generator], dict[str, Array]]
 STARTS: dict[str, Callable[[float], dict[str, float]]] = {
     "wheelset": lambda speed: {"V": speed},
     "traction": _rolling,
+    "testrig": _synchronous,
 }

@@ -197,7 +197,7 @@ def _client(crew: Crew) -> Iterator[Any]:
         with tempfile.TemporaryDirectory(prefix="railfmi_workers_") as folder:
             cluster = LocalCluster(
                 n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
-                dashboard_address=None, local_directory=folder, silence_logs="CRITICAL",
+                dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
             )  # fmt: skip
             try:
                 with Client(cluster, timeout=CONNECTING) as client:

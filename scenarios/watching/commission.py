@@ -98,10 +98,15 @@ class Making:
         options = self._e.estimate.options if self._e.estimate else None
         if options is None:
             raise ValueError("a filter needs the options of an experiment")
-        asked = request(options, self._c.noise, self._c.usual, self._c.u)
+        asked, kind = request(options, self._c.noise, self._c.usual, self._c.u), filters()[options.filter]
+        if not kind.moments:
+            raise BadInput(
+                f"{self._e.file}: [estimate.options] filter = '{options.filter}' knows more than mean and "
+                "covariance, which a gap in a stream does not keep; choose 'ukf' or 'ekf'"
+            )
 
         def begin(start: Estimate) -> Steps:
-            return filters()[options.filter].of(self.joint, start, asked)
+            return kind.of(self.joint, start, asked)
 
         return Carried(begin, self._c.usual, self._c.every, self._c.parts)
 

@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from estimator.filters import filters
 from tests.helpers.carriage import record, to_and_fro, write
 from tests.helpers.further import Further
 
@@ -157,4 +158,4 @@ def test_a_filter_is_one_file(mine):
 def test_a_filter_of_ones_own_is_offered_where_another_name_is_wrong(mine):
     mine.write("estimator/filters/deaf.py", DEAF)
     said = mine.refused("estimate", asks_for(mine.work, "def"), "--out", "out")
-    assert "key 'estimate.options.filter' must be one of dual, ekf, ukf, deaf, not 'def'" in said
+    assert f"key 'estimate.options.filter' must be one of {', '.join(filters())}, deaf, not 'def'" in said

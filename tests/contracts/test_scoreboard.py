@@ -21,6 +21,13 @@ def test_the_page_is_that_of_the_kept_scoreboard_and_right_about_the_code() -> N
     assert page(text, board, changed(board.code)) == text, said
 
 
+def test_what_a_run_compiles_is_no_code_that_answers() -> None:
+    """A clean checkout has none of it, so that the page would be wrong there."""
+    kept = Board.kept().code
+    assert "estimator/closeloop/pipeline.py" in kept
+    assert not [f for f in kept if "__pycache__" in f]
+
+
 def test_the_set_of_the_page_can_be_repeated() -> None:
     named = re.findall(r"(?:SEED=|--seed )(\d{3,})", PAGE.read_text(encoding="utf-8"))
     assert set(named) == {str(Board.kept().seed)}

@@ -18,9 +18,9 @@ from fmus.host.grading import check
 from fmus.host.grading.check import Check, Grade, grade
 from fmus.host.grading.fitness import LETTER, fitness
 from fmus.host.grading.trials import TRIALS
-from tests.helpers.everything import EVERY_MODEL
 from tests.helpers.foreign import AT_START, GOOD, HIDDEN
 from tests.helpers.packed import repacked, with_description
+from tests.helpers.sizes import bare_and_with_all_effects
 
 FMI1 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="1.0" modelName="one" modelIdentifier="one" guid="{0}"
@@ -43,8 +43,7 @@ def assert_only(path, title, words):
     assert re.search(words, next(c.sentence for c in found.checks if c.title == title))
 
 
-@pytest.mark.parametrize("effects", [(), ("all",)], ids=["bare", "all effects"])
-@pytest.mark.parametrize("name", EVERY_MODEL)
+@bare_and_with_all_effects
 def test_our_builds_are_clean(built, name, effects):
     found = grade(built(name, *effects))
     assert found.name.lower() == name

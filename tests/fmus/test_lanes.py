@@ -16,8 +16,9 @@ from fmus.model import Model
 from fmus.models import MODELS
 from fmus.variables import Input, Output, Parameter, State
 from tests.helpers.everything import near_start
-from tests.helpers.native import every_native, native
+from tests.helpers.native import native
 from tests.helpers.runs import names, start_of
+from tests.helpers.sizes import by_size
 
 ALIKE = 1e-12  # relative to the size of a variable, the greatest difference between rows and instances
 ALONG = 1e-9  # the same after many steps, over which contact and friction enlarge what rounding leaves
@@ -77,7 +78,7 @@ def record(model, seed, k, n=60):
     return t, dict(zip(names(model, Input), u.T, strict=True)), starts
 
 
-@every_native
+@by_size
 def test_rows_are_simulated_as_instances_are(name):
     model = MODELS[name]()
     with Fmu(native(name)) as fmu:
@@ -94,7 +95,7 @@ def test_rows_are_simulated_as_instances_are(name):
 
 
 @pytest.mark.skipif(len(WIDTHS) == 1, reason="this processor has four lanes only")
-@pytest.mark.parametrize("name", MODELS)
+@by_size
 def test_a_row_is_the_same_however_many_are_advanced_at_once(name, tmp_path):
     model = MODELS[name]()
     t, inputs, starts = record(model, 7, 11)

@@ -31,7 +31,6 @@ from tests.helpers.native import (
     STRICT,
     compiler,
     description,
-    every_native,
     every_version,
     native,
     unpacked,
@@ -39,6 +38,7 @@ from tests.helpers.native import (
 from tests.helpers.packed import repacked
 from tests.helpers.paths import ROOT
 from tests.helpers.runs import run, stirred
+from tests.helpers.sizes import by_size
 
 LIFE = ROOT / "tests" / "helpers" / "c" / "native_life.c"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -85,7 +85,7 @@ def shows_only_the_interface(path, fmi):
 
 
 @ELF
-@every_native
+@by_size
 @every_version
 def test_a_linux_library_shows_fmi_and_rows_alone_and_needs_an_old_libc_alone(name, fmi, tmp_path):
     path = library(native(name, fmi=fmi), tmp_path)
@@ -151,7 +151,7 @@ def lived(program, *before):
     return done.stdout + done.stderr
 
 
-@every_native
+@by_size
 @every_version
 def test_address_and_undefined_behaviour_sanitizers_find_nothing(name, fmi, tmp_path):
     flags = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -162,7 +162,7 @@ def test_address_and_undefined_behaviour_sanitizers_find_nothing(name, fmi, tmp_
 
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
-@every_native
+@by_size
 @every_version
 def test_valgrind_finds_nothing_in_a_hundred_instances(name, fmi, tmp_path):
     check = ["valgrind", "--leak-check=full", "--show-leak-kinds=all", "--error-exitcode=9"]
@@ -182,7 +182,7 @@ def _own(source):
     return [p.name for p in source.iterdir() if not re.match(r"fmi[23][A-Z]", p.name)]
 
 
-@every_native
+@by_size
 @pytest.mark.parametrize("effects", [(), pytest.param(("all",), marks=pytest.mark.slow)], ids=["bare", "all"])
 def test_there_are_no_globals(name, effects, tmp_path):
     """Nothing can be written but what an instance holds: sections of data and of zeros are empty."""

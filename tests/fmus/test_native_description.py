@@ -36,11 +36,11 @@ from fmus.variables import (
 from tests.helpers.everything import near_start, values
 from tests.helpers.native import (
     description,
-    every_native,
     every_version,
     native,
 )
 from tests.helpers.runs import heavier, names
+from tests.helpers.sizes import by_size
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 SCHEMA = {  # file in the FMU: its schema
@@ -75,7 +75,7 @@ def unknowns(path, fmi, kind):
     }
 
 
-@every_native
+@by_size
 @every_version
 def test_the_standard_has_nothing_to_object(name, fmi):
     path = native(name, fmi=fmi)
@@ -91,14 +91,14 @@ def test_all_effects_change_nothing_in_that(fmi):
     assert problems(native("drive", "all", fmi=fmi)) == []
 
 
-@every_native
+@by_size
 @every_version
 def test_it_grades_as_fit_for_use_here(name, fmi):
     found = grade(native(name, fmi=fmi))
     assert [c for c in found.checks if c.passed is not True] == []
 
 
-@every_native
+@by_size
 @every_version
 def test_description_says_all_that_the_model_declares(name, fmi):
     model, found = MODELS[name](), variables(native(name, fmi=fmi), fmi)
@@ -119,7 +119,7 @@ def test_description_says_all_that_the_model_declares(name, fmi):
         assert shown["variability"] == (tunable if isinstance(v, Parameter) else "continuous")
 
 
-@every_native
+@by_size
 @every_version
 def test_every_state_has_its_derivative(name, fmi):
     model, path = MODELS[name](), native(name, fmi=fmi)
@@ -137,7 +137,7 @@ def test_every_state_has_its_derivative(name, fmi):
         assert found[n]["causality"] == ("output" if n in names(model, Output) else "local")
 
 
-@every_native
+@by_size
 @every_version
 def test_dependencies_are_complete(name, fmi):
     """What is not listed does not matter: moved alone, it changes no output."""
@@ -225,7 +225,7 @@ def test_names_and_units_of_derivatives_never_clash():
     )
 
 
-@every_native
+@by_size
 @every_version
 def test_units_and_display_units_are_defined(name, fmi):
     path = native(name, fmi=fmi)
@@ -281,7 +281,7 @@ def test_probes_are_terminals_of_every_port(tmp_path):
     assert [t.get("name") for t in root.iter("Terminal")] == list(MODELS["testrig"]().ports())
 
 
-@every_native
+@by_size
 @every_version
 def test_page_and_icon_are_inside(name, fmi):
     path = native(name, fmi=fmi)

@@ -23,20 +23,17 @@ from fmus.variables import (
     Parameter,
     State,
 )
-from tests.helpers.everything import EVERY_MODEL, near_start, values
-from tests.helpers.native import every_native, every_version, native
+from tests.helpers.everything import near_start, values
+from tests.helpers.native import every_version, native
 from tests.helpers.runs import (
     DT,
     names,
     start_of,
     stirred,
 )
+from tests.helpers.sizes import by_size, quick_if_smallest
 
 LONG = 0.05  # s, many internal steps
-# every effect at every place of a large model is a large program to compile
-with_effects = pytest.mark.parametrize(
-    "name", [n if n == "drive" else pytest.param(n, marks=pytest.mark.slow) for n in EVERY_MODEL]
-)
 
 
 def history(path, model, dt, seed, steps=30):
@@ -52,7 +49,7 @@ def history(path, model, dt, seed, steps=30):
     return np.array(found)
 
 
-@every_native
+@by_size
 @pytest.mark.parametrize("dt", [DT, LONG])
 def test_native_python_and_both_versions_agree_to_the_last_bit(built, name, dt):
     model = MODELS[name]()
@@ -64,7 +61,7 @@ def test_native_python_and_both_versions_agree_to_the_last_bit(built, name, dt):
     assert_array_equal(found[0], found[1])
 
 
-@with_effects
+@quick_if_smallest  # every effect at every place makes a large program of any model
 def test_builds_with_effects_agree(built, name):
     model = MODELS[name]()
     expected = history(built(name, "all"), model, DT, 5, steps=10)
@@ -125,7 +122,7 @@ def test_functions_called_in_equations_are_compiled_too(law, tmp_path):
     assert_allclose(back, along, rtol=1e-12)
 
 
-@every_native
+@by_size
 @pytest.mark.parametrize("parts", [1, 2.5, 3, 7.000000001])
 def test_a_step_is_divided_as_in_python(built, name, parts):
     """Lengths about multiples of the internal step, where one more or less would show."""
@@ -134,7 +131,7 @@ def test_a_step_is_divided_as_in_python(built, name, parts):
     assert_allclose(runs[1], runs[0], rtol=1e-9, atol=1e-15)
 
 
-@every_native
+@by_size
 @every_version
 def test_model_exchange_by_cvode_gives_the_run_of_co_simulation(name, fmi):
     model = MODELS[name]()
@@ -185,7 +182,7 @@ def exchanged(path, fmi, start_values):
         fmu.freeInstance()
 
 
-@every_native
+@by_size
 @every_version
 def test_partial_derivatives_are_those_of_the_equations(name, fmi):
     model, rng = MODELS[name](), np.random.default_rng(9)
@@ -216,7 +213,7 @@ def jacobian_of(model, point):
     return cs.Function("J", [v], [cs.jacobian(h, v)])(point).full()
 
 
-@every_native
+@by_size
 @every_version
 def test_model_exchange_shows_the_equations(name, fmi):
     model = MODELS[name]()

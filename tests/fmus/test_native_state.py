@@ -32,7 +32,7 @@ from fmus.variables import (
     State,
 )
 from tests.helpers.everything import near_start
-from tests.helpers.native import every_native, every_version, native
+from tests.helpers.native import every_version, native
 from tests.helpers.runs import (
     DT,
     names,
@@ -40,6 +40,7 @@ from tests.helpers.runs import (
     start_of,
     stirred,
 )
+from tests.helpers.sizes import by_size
 
 
 def wrongs(model):
@@ -75,7 +76,7 @@ def wrongs(model):
     return found
 
 
-@every_native
+@by_size
 @every_version
 def test_what_cannot_be_done_is_refused_with_its_reason_and_changes_nothing(name, fmi):
     model = MODELS[name]()
@@ -106,7 +107,7 @@ def test_a_run_away_is_discarded_and_leaves_the_state(fmi):
         fmu.step(1e-3)
 
 
-@every_native
+@by_size
 @every_version
 def test_a_saved_state_is_all_there_is(name, fmi):
     """Saved, restored, as bytes, into an instance that never ran: bitwise, parameters and all."""
@@ -149,7 +150,7 @@ def test_a_damaged_or_foreign_state_is_refused(fmi):
 
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10_000), middle=st.integers(1, 9))
-@every_native
+@by_size
 @every_version
 def test_a_run_goes_on_from_the_values_it_shows(name, fmi, seed, middle):
     model, rng = MODELS[name](), np.random.default_rng(seed)
@@ -162,7 +163,7 @@ def test_a_run_goes_on_from_the_values_it_shows(name, fmi, seed, middle):
         assert_array_equal(run(other, rows[middle:]), run(fmu, rows[middle:]))
 
 
-@every_native
+@by_size
 @every_version
 def test_a_hundred_instances_do_not_meet(name, fmi):
     model = MODELS[name]()

@@ -13,8 +13,9 @@ from fmus.export.builders.native.libraries import folder
 from fmus.export.builders.native.working import build_working
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
-from tests.helpers.native import description, every_native, native
+from tests.helpers.native import description, native
 from tests.helpers.runs import heavier, run, stirred
+from tests.helpers.sizes import by_size
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def compiled(monkeypatch, empty_cache):
     return calls
 
 
-@every_native
+@by_size
 def test_it_computes_what_the_native_build_computes(name, tmp_path):
     model = MODELS[name]()
     rows = stirred(model, np.random.default_rng(1))

@@ -33,6 +33,7 @@ from tests.helpers.runs import (
     start_of,
     stirred,
 )
+from tests.helpers.sizes import by_size
 
 
 def shortened(step, x, u, p):
@@ -60,7 +61,7 @@ def test_a_step_is_the_equations_step(built, name, seed):
             assert_allclose(fmu.read(names(model, Output)), values(made.h, x, u, p), rtol=1e-9)
 
 
-@every_model
+@by_size
 def test_effects_built_in_change_nothing_until_they_are_switched_on(built, name):
     model = MODELS[name]()
     outputs, rows = [], stirred(model, np.random.default_rng(2))
@@ -197,7 +198,7 @@ def test_a_build_after_a_run_in_the_same_process(built, tmp_path):
     assert (tmp_path / "Testrig.fmu").read_bytes() == built("testrig").read_bytes()
 
 
-@every_model
+@by_size
 def test_an_fmu_runs_where_this_repository_is_not(built, name, tmp_path):
     """Isolated, without the .pth file that makes an editable install visible, with FMPy alone."""
     script = """

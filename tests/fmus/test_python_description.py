@@ -31,6 +31,7 @@ from fmus.variables import (
 )
 from tests.helpers.everything import EVERY_MODEL
 from tests.helpers.runs import every_model, heavier
+from tests.helpers.sizes import bare_and_with_all_effects, by_size
 
 
 def xml_of(path):
@@ -38,8 +39,7 @@ def xml_of(path):
         return ElementTree.fromstring(packed.read("modelDescription.xml"))
 
 
-@every_model
-@pytest.mark.parametrize("effects", [(), ("all",)], ids=["bare", "all effects"])
+@bare_and_with_all_effects
 def test_validation_has_nothing_to_object(built, name, effects):
     assert problems(built(name, *effects)) == []
 
@@ -92,7 +92,7 @@ def test_description_says_all_that_the_model_declares(built, name):
         assert node.get("variability") == (tunable if isinstance(v, Parameter) else "continuous")
 
 
-@every_model
+@by_size
 def test_description_defines_every_unit(built, name):
     root = xml_of(built(name, "all"))
     units = {node.get("name"): node.find("BaseUnit").attrib for node in root.iter("Unit")}

@@ -16,11 +16,8 @@ from fmus.variables import Output, State
 from tests.helpers.everything import near_start
 from tests.helpers.native import every_version, native
 from tests.helpers.runs import names, run, start_of, stirred
+from tests.helpers.sizes import quick_if_smallest
 
-QUICK = "drive"  # to compile
-every_one = pytest.mark.parametrize(
-    "name", [n if n == QUICK else pytest.param(n, marks=pytest.mark.slow) for n in MODELS]
-)
 PROJECT = """
 cmake_minimum_required(VERSION 3.15)
 project(of_an_importer C)
@@ -48,7 +45,7 @@ def by_cmake(folder, name, place):
 
 @pytest.mark.parametrize("built_by", [by_fmpy, pytest.param(by_cmake, marks=pytest.mark.slow)])
 @every_version
-@every_one
+@quick_if_smallest
 def test_a_library_built_from_the_shipped_sources_is_ours(name, fmi, built_by, tmp_path):
     if not (shutil.which("cmake") and shutil.which("cc")):
         pytest.skip("no CMake and C compiler here")

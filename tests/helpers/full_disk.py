@@ -58,13 +58,15 @@ def whole(file: Path) -> bool:
     """Whether a file is complete, by its form."""
     data = file.read_bytes()
     try:
-        if file.suffix == ".json":
-            json.loads(data)
-        elif file.suffix == ".toml":
-            tomllib.loads(data.decode())
-        elif file.suffix in (".fmu", ".ssp", ".checkpoint"):
-            with zipfile.ZipFile(file) as packed:
-                return packed.testzip() is None
+        match file.suffix:
+            case ".json":
+                json.loads(data)
+                return True
+            case ".toml":
+                tomllib.loads(data.decode())
+            case ".fmu" | ".ssp" | ".checkpoint":
+                with zipfile.ZipFile(file) as packed:
+                    return packed.testzip() is None
         ending = ENDINGS.get(file.suffix, b"\n")
         return data.endswith(ending) or data.rstrip().endswith(ending)
     except (ValueError, zipfile.BadZipFile):

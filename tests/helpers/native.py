@@ -8,27 +8,13 @@ from multiprocessing.util import Finalize
 from pathlib import Path
 from xml.etree import ElementTree
 
-import casadi as cs
 import pytest
 
 from fmus.export.builders.native.build import build_native
-from fmus.model import equations
 from fmus.models import MODELS
-from tests.helpers.everything import EVERY_MODEL, fitting
+from tests.helpers.everything import fitting
 
 every_version = pytest.mark.parametrize("fmi", [2, 3])
-
-
-def calls(function):
-    """How often a function of scalars calls others."""
-    return [function.instruction_id(i) for i in range(function.n_instructions())].count(cs.OP_CALL)
-
-
-# tables and choices between laws make long programs: their models take a while to compile
-QUICK = [name for name in EVERY_MODEL if not calls(equations(MODELS[name]()).f)]
-every_native = pytest.mark.parametrize(
-    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in EVERY_MODEL]
-)
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-ffp-contract=off"]
 DEFINED = ["-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX"]
 

@@ -17,6 +17,9 @@ from scenarios.literature import ROWS
 from scenarios.literature.case import TIME, Case, Record
 from tests.helpers.rows_charles import of_charles
 from tests.helpers.rows_mal import of_mal, piece
+from tests.helpers.rows_mal_cone import of_cone
+from tests.helpers.rows_modes import of_modes
+from tests.helpers.rows_rig_fastsim import of_rig_fastsim
 from tests.helpers.rows_torsion import of_torsion
 from tests.helpers.rows_ward import of_ward
 from tests.truth import rig, vehicle, wheelset
@@ -34,12 +37,18 @@ def truth(case: Case, form: Form = SAME) -> Record:
     """The record of a case, by the truth model of its kind; form: of the wheelset's contact."""
     if "gauge_sd" in case.true:
         return of_ward(case)
-    if "alignment_sd" in case.true:
+    if "alignment_sd" in case.true or "alignment_step" in case.true:
         return of_charles(case)
+    if "lambda_w" in case.true:
+        return of_cone(case)
+    if case.model == "testrig" and case.judged:
+        return of_rig_fastsim(case)
     if case.judged:
         return of_mal(case, form)
     if case.model == "wheelset":
         return of_wheelset(case, form)
+    if case.model == "testrig" and "mu0" in case.true:
+        return of_modes(case)
     return {"testrig": of_rig, "vehicle7dof": of_vehicle, "traction": of_torsion}[case.model](case)
 
 

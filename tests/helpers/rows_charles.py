@@ -10,7 +10,7 @@ from scenarios.literature.case import (
     Case,
     Record,
 )
-from tests.truth.wheelset_track import random_alignment
+from tests.truth.wheelset_track import random_alignment, shifted_alignment
 
 # Table 1; I_wy and W are not in it and are those of Ward et al. 2010
 TABLE_1 = {
@@ -29,11 +29,24 @@ def conicity(y: np.ndarray) -> np.ndarray:
 
 
 def of_charles(case: Case) -> Record:
-    """A run over random irregularity by Runge-Kutta of order 4."""
-    rng, t, V, p = np.random.default_rng(case.seed), case.times, case.speed, TABLE_1
+    """A run over random irregularity, or over a step of it, by Runge-Kutta of order 4."""
+    rng, t = np.random.default_rng(case.seed), case.times
     fine = np.arange(PARTS * (len(t) - 1) + 1) * case.dt / PARTS
-    sd = case.true["alignment_sd"]
-    run = random_alignment(rng, fine, V, sd, LIMIT * sd)
+    if "alignment_step" in case.true:
+        run = shifted_alignment(fine, case.speed, case.true["alignment_step"], case.when)
+    else:
+        sd = case.true["alignment_sd"]
+        run = random_alignment(rng, fine, case.speed, sd, LIMIT * sd)
+    true = motion(run.y_irr, case.dt / PARTS, case.speed)
+    seen = {n: true[n] + rng.normal(0.0, std, len(t)) for n, std in case.noise.items()}
+    given = {"y_irr": run.y_irr[:: 2 * PARTS]}
+    true["conicity"] = conicity(true["y"] - given["y_irr"])
+    return Record({TIME: t, **given, **seen, **{n + TRUE: true[n] for n in case.judged}})
+
+
+def motion(irregularity: np.ndarray, h: float, V: float) -> dict[str, np.ndarray]:
+    """Motion and accelerations at every PARTS-th step of h [s]; irregularity (2 n - 1,), m, by half steps."""
+    p = TABLE_1
     start, table = -WIDE, conicity(np.arange(-WIDE, WIDE, 1e-5)).tolist()
 
     def rates(x, d):
@@ -56,20 +69,17 @@ def of_charles(case: Case) -> Record:
     def moved(x, h, k):
         return tuple(a + h * b for a, b in zip(x, k, strict=True))
 
-    d, h, x, rows = run.y_irr.tolist(), case.dt / PARTS, (0.0,) * 6, []
-    for i in range(len(fine)):
+    d, x, rows = irregularity.tolist(), (0.0,) * 6, []
+    last = len(d) // 2
+    for i in range(last + 1):
         k1 = rates(x, d[2 * i])
         if i % PARTS == 0:
             rows.append((*x, k1[2], k1[3], k1[5]))
-        if i == len(fine) - 1:
+        if i == last:
             break
         k2 = rates(moved(x, h / 2, k1), d[2 * i + 1])
         k3 = rates(moved(x, h / 2, k2), d[2 * i + 1])
         k4 = rates(moved(x, h, k3), d[2 * i + 2])
         x = tuple(a + h / 6 * (b + 2 * (c + e) + f) for a, b, c, e, f in zip(x, k1, k2, k3, k4, strict=True))
     names = ("y", "psi", "y_dot", "psi_dot", "y_m", "y_m_dot", "y_ddot", "psi_ddot", "y_m_ddot")
-    true = dict(zip(names, np.array(rows).T, strict=True))
-    seen = {n: true[n] + rng.normal(0.0, std, len(t)) for n, std in case.noise.items()}
-    given = {"y_irr": np.array(d[:: 2 * PARTS])}
-    true["conicity"] = conicity(true["y"] - given["y_irr"])
-    return Record({TIME: t, **given, **seen, **{n + TRUE: true[n] for n in case.judged}})
+    return dict(zip(names, np.array(rows).T, strict=True))

@@ -12,7 +12,7 @@ from estimator.closeloop.evidence import Verdict
 from estimator.plant import between
 from fmus.drive.model import Drive
 from fmus.effects import EFFECTS
-from fmus.export.builders.pythonfmu import build_python
+from fmus.export.builders.native.build import build_native
 from fmus.host.fmu import Fmu
 from scenarios import close_loop
 from scenarios.closing.result import Result
@@ -175,6 +175,7 @@ def test_one_direction_of_rotation_cannot_tell_friction_from_a_constant_force(tm
     assert "changes its sign" in result.next_experiment
 
 
+@pytest.mark.slow
 def test_an_effect_that_sets_in_within_the_part_to_choose_is_found(tmp_path: Path) -> None:
     """The identify part of 18 s has pieces to choose at the end of each 3.6 s; one is from 10.1 to 10.8 s."""
     effects = single("step_force", "roller", step=-40.0, step_time=10.4)
@@ -237,8 +238,7 @@ def test_effects_of_the_truth_model_are_traced(
 def test_the_told_rig_records(name: str) -> None:
     told = json.loads((SHARED / "experiments" / "truth.json").read_text())[name]
     result = close_loop(SHARED / "experiments" / name, jobs=1)
-    in_library = {"rig-d": "unexplained"}  # its actuator saturation is not among the effects of the library
-    assert result.verdict == in_library.get(name, told["verdict"])
+    assert result.verdict == told["verdict"]
     if result.verdict == "traced":
         assert named(result) <= {tuple(a) for a in told["accept"]}
         assert min(result.gap_closed.values()) > 0.9
@@ -250,14 +250,13 @@ def test_the_measured_drive_shows_friction_and_an_offset(tmp_path: Path) -> None
     """EMPS: Janot, Gautier, Brunot 2019; published M 95.11, F_v 203.5, F_c 20.39, offset -3.165."""
     for file in (ROOT / "scenarios" / "shipped" / "emps").glob("*.toml"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
-    build_python(Drive(), tmp_path)
+    build_native(Drive(), tmp_path)
     result = close_loop(tmp_path, data_dir=SHARED / "benchmarks", jobs=1)
-    assert named(result) == {("coulomb_friction", "carriage"), ("constant_force", "carriage")}
-    found = {n: v for e in result.effects for n, (v, _) in e.parameters.items()}
-    found |= {n: v for n, (v, _) in result.calibrated.items()}
-    assert found["M"] == pytest.approx(95, abs=2.5)
-    assert found["F_v"] == pytest.approx(200, abs=15)
-    assert found["F_c"] == pytest.approx(20.4, abs=2)
-    assert found["F_0"] == pytest.approx(-3.2, abs=0.5)
+    assert named(result) >= {("coulomb_friction", "carriage"), ("constant_force", "carriage")}
+    assert result.verdict == "ambiguous"  # richer laws of friction lead by little; see docs/benchmarks.md
+    found = {effect.kind: effect.parameters for effect in result.effects}
+    assert result.calibrated["M"][0] == pytest.approx(95, abs=2.5)
+    assert found["coulomb_friction"]["F_c"][0] == pytest.approx(20.4, abs=2)
+    assert found["constant_force"]["F_0"][0] == pytest.approx(-3.2, abs=0.5)
     assert result.error["q_dot"]["before"] >= 14e-3
     assert result.error["q_dot"]["after"] <= 6.5e-3

@@ -3,7 +3,6 @@
 import contextlib
 import fcntl
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -11,13 +10,12 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from fmus.files import remove_left
 from fmus.host.master.recording import read_recording
 from scenarios.cli.supervision import FOLDER
-from tests.helpers.full_disk import whole
+from tests.helpers.interrupting import PATIENCE, SIGNALS, orphans
 from tests.helpers.misbehaving import EXPERIMENT, SCENARIO, Fault, bad_fmu, write_data
 from tests.helpers.paths import SHIPPED
 
@@ -29,19 +27,6 @@ SWALLOWS = """if t > 0.05:
         except BaseException:
             {then}
 self.x += dt * (self.u - self.k * self.x)"""
-PATIENCE = 120  # s, for a busy machine; a command that hangs is named
-MOMENTS = 15  # of each signal
-COMMANDS = {
-    "run": ["run", "scenario.toml"],
-    "estimate": ["estimate", "experiment.toml"],
-    "close-loop": ["close-loop", "experiment.toml", "--jobs", "2"],
-    "plan": ["plan", "experiment.toml"],
-    "inspect": ["inspect", "data.csv"],
-    "init": ["init", "bad.fmu", "data.csv"],
-    "conicity": ["conicity", "--wheel", "S1002", "--rail", "60E1", "--amplitude", "0.003"],
-    "build": ["build", "testrig", "--kind", "native"],
-}
-SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 
 def ended(
@@ -75,13 +60,7 @@ def locked(folder: Path) -> Iterator[None]:
 def assert_tidied(folder: Path) -> None:
     """No temporary file is left, and no process that had been given this folder for them."""
     assert list(folder.iterdir()) == []
-    mark = f"TMPDIR={folder}".encode()
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            environment = (process / "environ").read_bytes()
-        except OSError:  # it has ended, or belongs to another user
-            continue
-        assert mark not in environment, (process / "cmdline").read_bytes()
+    assert orphans(folder) == []
 
 
 @pytest.fixture
@@ -185,46 +164,6 @@ def test_the_next_command_tidies_up_after_a_killed_one(tmp_path):
         remove_left(tmp_path, FOLDER)
     assert not left.exists()
     assert used.exists()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
-def test_an_interrupt_at_any_moment_leaves_nothing(command, tmp_path, tmp_path_factory):
-    """At 30 moments: the exit code of the signal, no traceback, no part of a file, no process, no folder."""
-    bad_fmu(tmp_path, Fault("none", "none", ""), tmp_path_factory.mktemp("compiled"))
-    temporary, out = tmp_path / "temporary", tmp_path / "out"
-    temporary.mkdir()
-    arguments = [*COMMANDS[command], "--out", str(out)]
-    begun = time.monotonic()
-    code, said = interrupted(arguments, tmp_path, temporary, None, 0.0)
-    assert code in (0, 1), said
-    lasts = time.monotonic() - begun
-    rng = np.random.default_rng(1)
-    for number in MOMENTS * list(SIGNALS):
-        shutil.rmtree(out, ignore_errors=True)
-        code, said = interrupted(arguments, tmp_path, temporary, number, rng.uniform(0.05, lasts))
-        assert code in (0, 1, SIGNALS[number], -number), said  # finished, told, or not even begun
-        assert "Traceback" not in said
-        assert_tidied(temporary)
-        assert all(map(whole, (f for f in out.rglob("*") if f.is_file())))
-        assert not list(out.rglob(".writing_*"))
-
-
-def interrupted(
-    arguments: Sequence[str], folder: Path, temporary: Path, number: int | None, after: float
-) -> tuple[int, str]:
-    """Exit code and output of a command that got a signal after so many seconds, or none."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "scenarios.cli", *arguments], text=True, cwd=folder,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | {"TMPDIR": str(temporary)},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
-    if number is not None:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(after)
-        process.send_signal(number)
-    said, _ = process.communicate(timeout=PATIENCE)
-    return process.returncode, said
 
 
 @pytest.mark.slow

@@ -229,7 +229,7 @@ def test_with_its_form_open_friction_is_found_on_another_contact():
     task = friction.task(case, fmu_of("friction_ukf"))
     right, opened = task.known(record), task.with_form(record)
     true = case.truth("mu0", record.t)
-    assert covered(right, "mu0", true, 2.0) == 0.0  # a filter that takes the form for right is at its bound
+    assert covered(right, "mu0", true, 2.0) < 0.01  # its form is taken for right
     assert rmse(opened.value["mu0"], true) < 0.5 * rmse(right.value["mu0"], true)
     assert opened.nis == pytest.approx(4.0, abs=0.1)
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
+from fmus.errors import BadInput
 from scenarios.cli.app import loaded
 from scenarios.literature import ROWS
 from scenarios.literature import conicity as cone
@@ -23,6 +24,7 @@ from scenarios.literature.conicity_model import (
     Wheelset,
     equations,
 )
+from scenarios.literature.conicity_run import generic, response
 from scenarios.literature.conicity_table import Tabled
 from scenarios.literature.contact_force_judged import JUDGED, Judged, gathered
 from scenarios.literature.following import rmse
@@ -144,8 +146,63 @@ def test_an_irregularity_that_was_lost_is_found_again():
     assert rmse(found.value["d"][late], record.columns["y_irr"][late]) < cone.DEVIATION
 
 
+def stepped(height, length=3.0):
+    """Times, and the response to a step at 0.2 s."""
+    t = DT * np.arange(round(length / DT))
+    return t, response(np.where(t >= 0.2, height, 0.0))
+
+
+def test_the_response_to_a_step_is_the_second_programs_and_ends_on_the_new_centre_line():
+    case = case_of("conicity_step", "10 mm", duration=4.0)
+    outcome = ROWS["conicity_step"].rebuilt([(case, truth(case))], None, print)
+    assert outcome.aimed == 5
+    assert outcome.ok
+
+
+def test_a_step_to_the_other_side_is_answered_by_the_mirrored_motion():
+    (_, left), (_, right) = stepped(10e-3, 1.0), stepped(-10e-3, 1.0)
+    for name in ("y", "psi", "y_m"):
+        np.testing.assert_allclose(left[name], -right[name], atol=1e-15)
+    np.testing.assert_allclose(left["conicity"], right["conicity"])
+
+
+def test_a_small_step_is_answered_in_proportion_and_a_large_one_faster():
+    (t, small), (_, half), (_, large) = (stepped(height, 1.0) for height in (2e-4, 1e-4, 10e-3))
+    assert np.abs(small["y"] / 2e-4 - half["y"] / 1e-4).max() < 1e-2
+    reached = [t[np.argmax(y["y"] > h / 2)] for y, h in ((small, 2e-4), (large, 10e-3))]
+    assert reached[1] < 0.2 + 0.6 * (reached[0] - 0.2)  # the root of a flange steers harder than the tread
+
+
+def test_the_last_of_a_response_is_made_of_the_slow_modes_of_the_linear_equations():
+    _, found = stepped(1e-4)
+    rest = found["y"][round(1.2 / DT) :] - 1e-4
+    n = len(MOTION)
+    values = np.linalg.eigvals(equations(float(generic(np.zeros(1))[0]))[:n, :n])
+    slow = values[(values.real > -10) & (values.imag > 0)]
+    assert len(slow) == 2
+    turning = np.exp(np.outer(DT * np.arange(len(rest)), slow))
+    waves = np.hstack([turning.real, turning.imag])
+    part, *_ = np.linalg.lstsq(waves, rest, rcond=None)
+    assert rmse(waves @ part, rest) < 0.01 * np.sqrt(np.mean(rest**2))
+
+
+def test_a_row_with_equations_of_its_own_makes_its_records():
+    case = case_of("conicity", "generic", duration=2.0)
+    record = cone.own_record(case)
+    assert set(record.columns) == set(case.columns)
+    assert record.columns["y_irr"].std() == pytest.approx(cone.DEVIATION)
+    seen, true = record.columns["y_ddot"], record.columns["conicity" + TRUE]
+    assert np.isfinite(seen).all()
+    np.testing.assert_allclose(true, conicity(shift_of(record)), rtol=1e-9)
+
+
+def test_a_record_of_other_equations_is_asked_for():
+    with pytest.raises(BadInput, match="give records, or choose case 'generic'"):
+        cone.own_record(case_of("conicity", "S1002 on 60E1"))
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["contact_force_ekf", "conicity"])
+@pytest.mark.parametrize("name", ["contact_force_ekf", "conicity", "conicity_step"])
 def test_the_whole_row_meets_its_targets(tmp_path, name):
     from scenarios.literature import run_row
 

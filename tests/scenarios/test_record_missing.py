@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from estimator.filters import filters
 from estimator.record import Record
 from fmus.errors import BadInput
 from scenarios.estimating.estimating import estimate
@@ -172,7 +173,8 @@ alarms.mu = {above = 0.5, probability = 0.9}
 
 BAD_OPTIONS = [
     ("fliter = 'ekf'", "key 'estimate.options.fliter' is not known; did you mean 'filter'?"),
-    ("filter = 'kf'", "key 'estimate.options.filter' must be one of dual, ekf, ukf, not 'kf'"),
+    ("filter = 'kf'", f"key 'estimate.options.filter' must be one of {', '.join(filters())}, not 'kf'"),
+    ("filter = 'rbpf'\nsmooth = true", "[estimate.options] smooth does not work with filter = 'rbpf'"),
     ("alarms.mu = {abov = 1.0}", "key 'estimate.options.alarms.mu.abov' is not known; did you mean 'above'?"),
     ("alarms.mu = {}", "[estimate.options.alarms.mu] needs 'below' or 'above'"),
     ("alarms.mu0 = {below = 0.1}", "[estimate.options] alarms 'mu0' is not estimated; did you mean 'mu'?"),

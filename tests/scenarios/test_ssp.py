@@ -40,6 +40,7 @@ from tests.helpers.scenario_files import (
     GOOD,
     SHIPPED_FILES,
     VARIANTS,
+    loop_unknown,
     write,
 )
 
@@ -222,13 +223,20 @@ def test_shipped_scenarios_come_back(file, tmp_path):
         pytest.skip("is a scenario of a contact table without FMUs")
     name = next(iter(scenario.variants))
     run(file, tmp_path / "one")
-    package = export_ssp(file, tmp_path, "python", variant=name)
+    try:
+        package = export_ssp(file, tmp_path, "python", variant=name)
+    except BadInput as error:
+        if not loop_unknown(error):
+            raise
+        package = export_ssp(file, tmp_path, variant=name)
     result = run(import_ssp(package, tmp_path / "back"), tmp_path / "two")
     assert result.ok
     first, second = (
         read_recording(p).data for p in (tmp_path / "one" / f"{name}.parquet", tmp_path / "two/run.parquet")
     )
-    assert_the_same(first[list(second)], second)
+    chosen = scenario.variants[name].record.names  # SSP does not say what is recorded: all outputs are
+    both = list(chosen or second)
+    assert_the_same(first[both], second[both])
 
 
 def test_structure_and_values_obey_the_schema(ride, loop):

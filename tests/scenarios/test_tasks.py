@@ -224,6 +224,7 @@ def test_the_next_run_goes_on_after_a_killed_scheduler(whole, tmp_path, cluster)
     assert tables(tmp_path) == tables(whole)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path):
     found = done(tmp_path, 1, "--scheduler", "tcp://127.0.0.1:9")
     assert found.returncode == 2

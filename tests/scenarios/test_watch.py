@@ -14,6 +14,7 @@ from numpy.testing import assert_array_equal
 
 from estimator.monitoring.monitor import Settings
 from fmus import codec
+from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from scenarios.estimating.estimating import fmu_of
 from scenarios.estimating.findings import find
@@ -128,6 +129,16 @@ def test_every_filter_goes_on_from_a_checkpoint_to_the_bit(rig, tmp_path, kind):
         one.take(window), two.take(window)
     making.joint.close()
     assert state(one, rig.c) == state(two, rig.c)
+
+
+@pytest.mark.parametrize("kind", ["imm", "rbpf"])
+def test_a_filter_that_a_gap_would_break_is_refused(rig, kind):
+    options = rig.e.estimate.options.model_copy(update={"filter": kind})
+    e = rig.e.model_copy(update={"estimate": rig.e.estimate.model_copy(update={"options": options})})
+    making = Making(e, rig.c, rig.archive)
+    with pytest.raises(BadInput, match=f"filter = '{kind}' knows more than mean and covariance"):
+        making.carried()
+    making.joint.close()
 
 
 def lines(folder: Path) -> pd.DataFrame:

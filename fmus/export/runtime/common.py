@@ -170,12 +170,12 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         head, _, data = state.partition(b"\n")
         try:
             said = json.loads(head)
-            whole = said["sum"] == zlib.crc32(data)
+            origin, whole = said["of"], said["sum"] == zlib.crc32(data)
         except (ValueError, TypeError, KeyError):
             whole = False
         if not whole:
             return {"damage": "the bytes of the saved state are damaged; nothing was restored"}
-        if said["of"] != MODEL["guid"]:
+        if origin != MODEL["guid"]:
             return {"damage": "the saved state is not one of this FMU; nothing was restored"}
         return dict(json.loads(data))
 

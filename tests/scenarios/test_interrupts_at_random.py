@@ -1,0 +1,27 @@
+"""SIGINT and SIGTERM at random moments of every command, some of them twice, as an impatient user does."""
+
+import pytest
+
+from tests.helpers.interrupting import tried
+from tests.helpers.small_commands import EVERY_COMMAND, command_line, prepare
+
+SEED, MOMENTS = 1, 30  # of both signals together
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("inputs")
+    prepare(folder, tmp_path_factory.mktemp("compiled"))
+    return folder
+
+
+@pytest.mark.parametrize("command", EVERY_COMMAND)
+def test_every_command_has_a_small_input(command, tmp_path):
+    assert command_line(command, tmp_path)[0] == command
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", EVERY_COMMAND)
+def test_an_interrupt_at_any_moment_leaves_nothing(command, inputs):
+    """The exit code of the signal and one line; no traceback, no part of a file, no process, no folder."""
+    assert tried(command, SEED, MOMENTS, inputs) == []
