@@ -1,7 +1,7 @@
 """Simulation of an FMU through a record, and its response over one step from any state, by restarts."""
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from multiprocessing.util import Finalize
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from fmus.host.apart.room import close_rooms
 from fmus.host.fmu import Fmu
 
 PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
+TOGETHER = 1 << 28  # bytes of results that are simulated at once: those of eight rows of an hour do not fit
 
 
 class Plant:
@@ -48,12 +49,30 @@ class Plant:
         return (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
 
     def simulate_rows(
-        self, run: Run, starts: Sequence[Mapping[str, float]], finer: int = 1
+        self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = (), finer: int = 1
     ) -> list[Array] | None:
         """As `simulate` for each of several starts with the same names; None if the FMU does not offer it."""
         t, inputs, pieces = self._given(run, finer)
-        found = self.fmu.simulate_rows(t, inputs, self.outputs, starts)
+        found = self.fmu.simulate_rows(t, inputs, (*self.outputs, *more), starts)
         return None if found is None else [y[::pieces] for y in found]
+
+    def simulate_in_turn(
+        self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = ()
+    ) -> Iterator[Array]:
+        """As `simulate` for each of several starts with the same names, as many at once as `at_once` says."""
+        at_once = self.at_once(run, len(more))
+        for first in range(0, len(starts), at_once):
+            some = starts[first : first + at_once]
+            rows = self.simulate_rows(run, some, more)
+            yield from (self.simulate(run, start, more) for start in some) if rows is None else rows
+
+    def at_once(self, run: Run, more: int = 0) -> int:
+        """How many starts `simulate_rows` takes in the time of little more than one, if memory allows.
+
+        more: number of variables that are read beside the outputs.
+        """
+        size = 8 * len(run.t) * self._pieces(run.t) * (len(self.outputs) + more)
+        return max(1, min(self.fmu.at_once, TOGETHER // size))
 
     def _given(self, run: Run, finer: int) -> tuple[Array, dict[str, Array], int]:
         """Times and inputs of a run as set in the FMU, and the pieces of a step; cached for the run."""
@@ -70,15 +89,24 @@ class Plant:
             return 1
         return min(MOST, max(1, round(float(np.median(np.diff(t))) / PIECE)))
 
-    def response(self, x: Array, given: Mapping[str, float], dt: float) -> tuple[Array, Array]:
-        """The state (n,) after a step from state x, and the outputs (n_y,) before the step.
+    def responses(self, starts: Sequence[Mapping[str, float]], dt: float) -> tuple[Array, Array]:
+        """The states (k, n) after a step of dt, s, and the outputs (k, n_y) before it, from each of k starts.
 
-        given: inputs and parameters by name.
+        starts: states, inputs and parameters by name, the same names in each.
         """
-        self.fmu.restart(0.0, **{**given, **dict(zip(self.states, x.tolist(), strict=True))})
-        y = np.array(self.fmu.read(self.outputs))
+        n, names = len(self.states), (*self.states, *self.outputs)
+        rows = self.fmu.simulate_rows(np.array([0.0, dt]), {}, names, starts)
+        if rows is not None:
+            return rows[:, 1, :n], rows[:, 0, n:]
+        x, y = zip(*(self._response(start, dt) for start in starts), strict=True)
+        return np.array(x), np.array(y)
+
+    def _response(self, start: Mapping[str, float], dt: float) -> tuple[list[float], list[float]]:
+        """See `responses`; by a restart."""
+        self.fmu.restart(0.0, **start)
+        y = self.fmu.read(self.outputs)
         self.fmu.step(dt)
-        return np.array(self.fmu.read(self.states)), y
+        return self.fmu.read(self.states), y
 
 
 def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, dict[str, Array]]:

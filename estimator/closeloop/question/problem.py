@@ -103,7 +103,7 @@ class Problem:
     @property
     def at_once(self) -> int:
         """How many unknowns `identify_residuals` takes in the time of little more than one."""
-        return self.plant.fmu.at_once
+        return min(self.plant.at_once(run) for run in self.record.runs)
 
     @cached_property
     def measured_state(self) -> dict[str, int]:
@@ -191,7 +191,8 @@ class Problem:
 
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """Simulated outputs of a run for each of several unknowns; None if not all at once."""
-        rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas], self.finer)
+        starts = [self._start(run, theta) for theta in thetas]
+        rows = self.plant.simulate_rows(run, starts, finer=self.finer)
         if rows is None:
             return None
         return [faulty(y, run.t, self.record.outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
