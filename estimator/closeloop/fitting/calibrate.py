@@ -79,7 +79,8 @@ def _start_unknowns(problem: Problem) -> list[Unknown]:
         scale = error if np.isfinite(error) else 0.01 * (known[name].nominal or 1.0)
         unknowns.append(Unknown(name, value, value - error, value + error, float(scale)))
     moved = [{**start, u.name: u.start + u.scale} for u in unknowns]
-    as_guessed, *residuals = problem.several_residuals([start, *moved])
+    residuals = problem.several_residuals([start, *moved])
+    as_guessed = next(residuals)
     size = weights(problem.record, as_guessed)
     away = (float(np.sum(((r[0] - as_guessed[0]) / size) ** 2)) for r in residuals)
     return [u for u, square in zip(unknowns, away, strict=True) if square > SEEN]

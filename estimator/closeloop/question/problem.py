@@ -103,7 +103,7 @@ class Problem:
     @property
     def at_once(self) -> int:
         """How many unknowns `identify_residuals` takes in the time of little more than one."""
-        return min(self.plant.at_once(run) for run in self.record.runs)
+        return self.plant.fmu.at_once
 
     @cached_property
     def measured_state(self) -> dict[str, int]:
@@ -113,6 +113,10 @@ class Problem:
     def simulate(self, theta: Mapping[str, float], more: Sequence[str] = ()) -> list[Array]:
         """Simulate each run of the record: the outputs, then the variables `more`, (N, n_y + n_more) each."""
         return [self._run(run, theta, more) for run in self.record.runs]
+
+    def forget(self) -> None:
+        """Make the next simulations anew, for whoever measures how long one takes."""
+        PLANTS.kept.clear()
 
     def simulate_several(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
         """As `simulate` for each of several unknowns with the same names, some of them simulated at once."""
