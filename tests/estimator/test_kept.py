@@ -1,0 +1,261 @@
+"""A simulation that was made is not made again, and a changed one never gets the result of another."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from estimator.kept import KEPT, KEY, OF_ALL, Kept, bits, digest
+from estimator.plant import Plant, Plants
+from estimator.record import Run
+from fmus.host.fmu import Fmu
+from fmus.models import MODELS
+from fmus.variables import Input
+from tests.helpers.native import native
+from tests.helpers.runs import every_model, names, stirred
+
+N = 40  # samples of a run
+
+
+class Counted(Fmu):
+    """Counts the simulations that are really made."""
+
+    made = 0
+
+    def simulate_rows(self, t, inputs, outputs, starts):
+        """See Fmu."""
+        self.made += len(starts)
+        return super().simulate_rows(t, inputs, outputs, starts)
+
+
+class OneByOne(Counted):
+    """The same FMU without the call for many rows, as foreign ones are."""
+
+    at_once = 1
+
+    def simulate_rows(self, t, inputs, outputs, starts):
+        """See Fmu."""
+        return
+
+    def simulate(self, t, inputs, outputs, start, every=1):
+        """See Fmu."""
+        self.made += 1
+        return super().simulate(t, inputs, outputs, start, every)
+
+
+def driven(name, seed=0, dt=1e-3):
+    """A run of a model with inputs that move."""
+    model = MODELS[name]()
+    rows = stirred(model, np.random.default_rng(seed), N)
+    u = np.array([list(row.values()) for row in rows]).reshape(N, -1)
+    none = np.zeros(N, bool)
+    return Run(np.arange(N) * dt, u, np.zeros((N, 1)), ~none, none, none)
+
+
+def plant_of(fmu, name="testrig", kept=None, outputs=None):
+    """The FMU with three of its outputs, which keeps nothing by default."""
+    return Plant(fmu, names(MODELS[name](), Input), outputs or fmu.description.outputs[:3], kept)
+
+
+@pytest.fixture(params=[Counted, OneByOne])
+def fmu(request):
+    with request.param(native("testrig")) as opened:
+        yield opened
+
+
+@pytest.fixture
+def plant(fmu):
+    """The test rig with room for what was simulated."""
+    return plant_of(fmu, kept=Kept())
+
+
+START = {"omega_w": 12.0, "omega_r": 9.2, "mu0": 0.3}
+
+
+def alone(fmu, run, start, more=(), finer=1):
+    """The outputs by a plant that keeps nothing."""
+    return plant_of(fmu).simulate(run, start, more, finer=finer)
+
+
+def test_the_same_simulation_is_made_once(plant, fmu):
+    run = driven("testrig")
+    first = plant.simulate(run, START)
+    before = fmu.made
+    again = plant.simulate(run, dict(START))
+    assert fmu.made == before
+    assert_array_equal(again, first)
+    assert_array_equal(again, alone(fmu, run, START))
+
+
+def test_a_copy_of_the_run_is_the_same_run(plant, fmu):
+    run = driven("testrig")
+    plant.simulate(run, START)
+    before = fmu.made
+    plant.simulate(replace(run, t=run.t.copy(), u=np.asfortranarray(run.u), y=run.y + 1), START)
+    assert fmu.made == before
+
+
+def next_up(x):
+    return float(np.nextafter(x, np.inf))
+
+
+def moved(run, what):
+    """The run with one bit of a time or an input changed."""
+    samples = getattr(run, what).copy()
+    samples[-1] = np.nextafter(samples[-1], np.inf)
+    return replace(run, **{what: samples})
+
+
+CHANGED = {
+    "a parameter": lambda run: (run, START | {"mu0": next_up(0.3)}, {}),
+    "a state": lambda run: (run, START | {"omega_w": next_up(12.0)}, {}),
+    "one parameter more": lambda run: (run, START | {"k_A": 0.7}, {}),
+    "one less": lambda run: (run, {n: x for n, x in START.items() if n != "mu0"}, {}),
+    "an input": lambda run: (moved(run, "u"), START, {}),
+    "a time": lambda run: (moved(run, "t"), START, {}),
+    "fewer samples": lambda run: (run.part(0, N - 1), START, {}),
+    "later samples": lambda run: (run.part(1, N), START, {}),
+    "finer steps": lambda run: (run, START, {"finer": 2}),
+    "another variable": lambda run: (run, START, {"more": ("T_A",)}),
+}
+
+
+@pytest.mark.parametrize("what", CHANGED)
+def test_what_differs_by_a_bit_is_simulated(what, plant, fmu):
+    run = driven("testrig")
+    plant.simulate(run, START)
+    before = fmu.made
+    other, start, more = CHANGED[what](run)
+    found = plant.simulate(other, start, **more)
+    assert fmu.made > before
+    assert_array_equal(found, alone(fmu, other, start, **more))
+
+
+def test_another_fmu_and_other_outputs_are_simulated():
+    run, kept = driven("drive"), Kept()
+    with Counted(native("drive")) as one, Counted(native("drive")) as other:
+        some = one.description.outputs[:1]
+        results = [plant_of(f, "drive", kept, o).simulate(run, {}) for f, o in ((one, None), (other, some))]
+        assert (one.made, other.made) == (1, 1)
+    assert_array_equal(results[0][:, :1], results[1])
+
+
+def test_a_push_is_simulated_and_not_kept(plant, fmu):
+    run = driven("testrig")
+    free = plant.simulate(run, START)
+    pushed = [plant.simulate(run, START, push={"T_P": np.full(N, x)}) for x in (1.0, 2.0)]
+    assert not np.array_equal(*pushed)
+    assert_array_equal(plant.simulate(run, START), free)
+
+
+def test_variables_of_a_kept_simulation_are_read_from_it(plant, fmu):
+    run = driven("testrig")
+    whole = plant.simulate(run, START, ("omega_w", "omega_r"))
+    before, n = fmu.made, len(plant.outputs)
+    assert_array_equal(plant.simulate(run, START), whole[:, :n])
+    assert_array_equal(plant.simulate(run, START, ("omega_r",))[:, n], whole[:, n + 1])
+    assert fmu.made == before
+
+
+def test_a_result_may_be_overwritten_by_whoever_asked(plant, fmu):
+    run = driven("testrig")
+    expected = alone(fmu, run, START)
+    for _ in range(3):
+        found = plant.simulate(run, START)
+        assert_array_equal(found, expected)
+        found[:] = np.nan
+    [row] = plant.simulate_rows(run, [START])
+    row[:] = np.nan
+    assert_array_equal(plant.simulate(run, START), expected)
+
+
+def test_of_many_rows_only_the_new_ones_are_simulated():
+    run = driven("testrig")
+    with Counted(native("testrig")) as fmu:
+        plant = plant_of(fmu, kept=Kept())
+        starts = [START | {"mu0": 0.2 + 0.01 * i} for i in range(11)]
+        plant.simulate_rows(run, starts[3:6])
+        found = plant.simulate_rows(run, starts)
+        assert fmu.made == len(starts)
+        plant.simulate_rows(run, starts[::-1])
+        assert fmu.made == len(starts)
+        for start, y in zip(starts, found, strict=True):
+            assert_array_equal(y, alone(fmu, run, start))
+        refused = [*starts, START | {"mu0": -1.0}]
+        assert plant.simulate_rows(run, refused) is None
+
+
+@every_model
+def test_starts_in_turn_give_what_each_gives_alone(name):
+    run = driven(name, dt=MODELS[name]().step_size)
+    with Fmu(native(name)) as fmu:
+        plant, known = plant_of(fmu, name), fmu.description.variables
+        tried = [n for n in fmu.description.parameters if known[n].start and known[n].max is None][:9]
+        starts = [{}, *({n: (known[n].start or 0.0) * 1.0001} for n in tried)]
+        states = fmu.description.states[:2]
+        for start, y in zip(starts, plant.simulate_in_turn(run, starts, states), strict=True):
+            assert_array_equal(y, plant.simulate(run, start, states))
+
+
+KEYS = st.integers(0, 9)
+
+
+@settings(max_examples=200)
+@given(st.lists(st.tuples(KEYS, st.integers(1, 60), st.booleans())))
+def test_memory_stays_within_its_bound_and_results_are_those_that_were_put(steps):
+    kept, put = Kept(4 * KEY), {}
+    for key, n, asks in steps:
+        if asks:
+            found = kept.get(key, ("y",))
+            assert found is None or np.array_equal(found, put[key])
+        else:
+            there = kept.get(key, ("y",)) is not None
+            kept.put(key, ("y",), np.full((n, 1), float(n)))
+            if not there and kept.room_for(8 * n):
+                put[key] = np.full((n, 1), float(n))
+                assert kept.get(key, ("y",)) is not None
+        held = [result for _, result in kept._found.values()]
+        assert kept.size == sum(r.nbytes + KEY for r in held) <= kept.most
+
+
+def test_what_was_not_asked_for_longest_goes_first():
+    one = np.zeros((KEY // 8, 1))
+    kept = Kept(2 * OF_ALL * KEY)  # of results with their keys, as many as a long one takes parts
+    for key in range(OF_ALL):
+        kept.put(key, ("y",), one)
+    kept.get(0, ("y",))
+    kept.put("new", ("y",), one)
+    assert [key for key in (*range(OF_ALL), "new") if kept.get(key, ("y",)) is None] == [1]
+
+
+def test_a_long_result_is_not_kept():
+    kept = Kept()
+    long = np.zeros((KEPT // OF_ALL // 8, 1))
+    kept.put("long", ("y",), long)
+    assert kept.get("long", ("y",)) is None and kept.size == 0
+    kept.put("fits", ("y",), long[: -KEY // 8])
+    assert kept.get("fits", ("y",)) is not None
+    assert kept.size == KEPT // OF_ALL
+
+
+def test_the_sign_of_zero_and_a_missing_value_are_told_apart():
+    assert bits({"a": 0.0}) != bits({"a": -0.0})
+    assert bits({"a": np.nan}) == bits({"a": np.nan})
+    assert bits({"a": 1.0}) != bits({"b": 1.0})
+    run = driven("testrig")
+    flat = replace(run, t=np.zeros(4), u=np.zeros((4, 2)))
+    assert digest(flat) != digest(replace(flat, u=np.zeros((4, 1))))
+    assert digest(flat) != digest(replace(flat, u=-np.zeros((4, 2))))
+
+
+def test_closed_plants_leave_nothing_behind():
+    plants, run = Plants(), driven("testrig")
+    inputs = tuple(names(MODELS["testrig"](), Input))
+    plant = plants.get(native("testrig"), inputs, ("omega_w",))
+    plant.simulate(run, START)
+    assert plants.kept.size == 8 * N + KEY
+    plants.close()
+    assert plants.kept.size == 0
