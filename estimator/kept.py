@@ -6,7 +6,7 @@ last bit, and its result is a copy of the first one.
 """
 
 from collections import OrderedDict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from hashlib import blake2b
 
 import numpy as np
@@ -31,6 +31,10 @@ class Kept:
     def room_for(self, size: int) -> bool:
         """Whether a result of so many bytes is kept; those of a long record are not."""
         return size + KEY <= self.most // OF_ALL
+
+    def room_for_all(self, sizes: Sequence[int]) -> bool:
+        """Whether results of so many bytes each are kept until all of them are."""
+        return all(map(self.room_for, sizes)) and sum(sizes) + KEY * len(sizes) <= self.most
 
     def get(self, key: Hashable, names: tuple[str, ...]) -> Array | None:
         """A copy of these variables, since residuals are computed in their place; None if one is not kept."""

@@ -65,14 +65,14 @@ class Plant:
     def simulate_rows(
         self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = (), finer: int = 1
     ) -> list[Array] | None:
-        """As `simulate` for each of several starts with the same names; None if the FMU does not offer it."""
+        """As `simulate` for each of several starts; None if the FMU does not offer it."""
         names = (*self.outputs, *more)
         keys = [self._key(run, start, names, finer) for start in starts]
         kept = [None if key is None else self._kept.get(key, names) for key in keys]
         if not (new := [start for start, y in zip(starts, kept, strict=True) if y is None]):
             return [y for y in kept if y is not None]
         t, inputs, pieces = self._given(run, finer)
-        if (rows := self.fmu.simulate_rows(t, inputs, names, new)) is None:
+        if (rows := self.fmu.simulate_rows(t, inputs, names, self._alike(new))) is None:
             return None
         made = iter(rows)
         found = [next(made)[::pieces] if y is None else y for y in kept]
@@ -85,13 +85,35 @@ class Plant:
         self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = ()
     ) -> Iterator[Array]:
         """As `simulate` for each of several starts, as many at once as `at_once` says."""
-        at_once, known = self.at_once(run, len(more)), self.fmu.description.variables
-        named = {name: known[name].start or 0.0 for start in starts for name in start}
+        at_once = self.at_once(run, len(more))
         for first in range(0, len(starts), at_once):
             some = starts[first : first + at_once]
-            # what a start does not name has its start value, in rows as in an instance
-            rows = self.simulate_rows(run, [{**named, **start} for start in some], more)
+            rows = self.simulate_rows(run, some, more)
             yield from (self.simulate(run, start, more) for start in some) if rows is None else rows
+
+    def simulate_ahead(
+        self, runs: Sequence[Run], asked: Sequence[Sequence[Mapping[str, float]]], finer: int
+    ) -> None:
+        """Simulate what will be asked for one by one, all starts of a run at once, if all that can be kept.
+
+        asked: the starts for each of the runs.
+        """
+        sizes = [
+            8 * len(run.t) * len(self.outputs)
+            for run, starts in zip(runs, asked, strict=True)
+            for _ in starts
+        ]
+        if self.fmu.at_once > 1 and self._kept.room_for_all(sizes):
+            for run, starts in zip(runs, asked, strict=True):
+                self.simulate_rows(run, starts, finer=finer)
+
+    def _alike(self, starts: Sequence[Mapping[str, float]]) -> Sequence[Mapping[str, float]]:
+        """The starts with the same names: what one does not name has its start value, as in an instance."""
+        if all(start.keys() == starts[0].keys() for start in starts):
+            return starts
+        known = self.fmu.description.widened.variables
+        every = {n: known[n].start or 0.0 for start in starts for n in start if n in known}
+        return [{**every, **start} for start in starts]
 
     def at_once(self, run: Run, more: int = 0) -> int:
         """How many starts `simulate_rows` takes in the time of little more than one, if memory allows.

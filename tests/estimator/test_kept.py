@@ -235,7 +235,8 @@ def test_a_long_result_is_not_kept():
     kept = Kept()
     long = np.zeros((KEPT // OF_ALL // 8, 1))
     kept.put("long", ("y",), long)
-    assert kept.get("long", ("y",)) is None and kept.size == 0
+    assert kept.get("long", ("y",)) is None
+    assert kept.size == 0
     kept.put("fits", ("y",), long[: -KEY // 8])
     assert kept.get("fits", ("y",)) is not None
     assert kept.size == KEPT // OF_ALL

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,9 +13,10 @@ from estimator.closeloop.fitting.fit import REFUSED, fit
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
-from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.question.problem import Problem, Unknown, simulate_ahead
 from estimator.record import Array
 from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
@@ -110,12 +112,12 @@ class Fitter:
         """
         problem, weighting = self.baseline.problem, self.baseline.noise.weighting
         others = self.baseline.hypothesis.fit.unknowns if unknowns is None else unknowns
-        where = together(problem, promises)
+        pairs = list(zip(together(problem, promises), promises, strict=True))
         tasks = (
-            delayed(hypothesis)(here, others, p, weighting, evaluations, known, guess, step)
-            for here, p in zip(where, promises, strict=True)
+            delayed(_hypotheses)(some, others, weighting, evaluations, known, guess, step)
+            for some in ([pairs] if self.jobs == 1 else ([pair] for pair in pairs))
         )
-        found = [h for h in Parallel(n_jobs=self.jobs)(tasks) if h is not None]
+        found = [h for some in Parallel(n_jobs=self.jobs)(tasks) for h in some if h is not None]
         # processes return copies of the derivatives that were known
         return best_by_label(replace(h, fit=h.fit.sharing(known)) if known else h for h in found)
 
@@ -135,10 +137,43 @@ def hypothesis(
     known, guess, step: see `fit`. Returns None if the FMU cannot be simulated with the fitted values or its
     simulation diverges.
     """
-    here = built(problem, promise.candidates)
-    own = [u for c in promise.candidates for u in c.unknowns]
-    others = _doubting(problem, promise.candidates, unknowns)
-    found = fit(here, [*others, *own], weighting, promise.start, None, evaluations, known, guess, step=step)
+    [found] = _hypotheses([(problem, promise)], unknowns, weighting, evaluations, known, guess, step)
+    return found
+
+
+def _hypotheses(
+    asked: Sequence[tuple[Problem, Promise]],
+    unknowns: Sequence[Unknown],
+    weighting: Weighting,
+    evaluations: int,
+    known: Columns | None,
+    guess: Columns | None,
+    step: float,
+) -> list[Hypothesis | None]:
+    """As `hypothesis` for each of several promises and its problem.
+
+    The fitted values of those that share an FMU are simulated at once, over the whole record.
+    """
+    fitted: list[tuple[Problem, Promise, Fit]] = []
+    for problem, p in asked:
+        here, own = built(problem, p.candidates), [u for c in p.candidates for u in c.unknowns]
+        every = [*_doubting(problem, p.candidates, unknowns), *own]
+        found = fit(here, every, weighting, p.start, None, evaluations, known, guess, step=step)
+        fitted.append((here, p, found))
+    sharing = defaultdict(list)
+    for i, (here, _, _) in enumerate(fitted):
+        sharing[here.effects].append(i)
+    made: dict[int, Hypothesis | None] = {}
+    for same in sharing.values():
+        at_once = fitted[same[0]][0].at_once
+        for some in (same[i : i + at_once] for i in range(0, len(same), at_once)):
+            simulate_ahead([(fitted[i][0], fitted[i][2].theta) for i in some])
+            made |= {i: _shown(*fitted[i], weighting) for i in some}
+    return [made[i] for i in range(len(fitted))]
+
+
+def _shown(here: Problem, promise: Promise, found: Fit, weighting: Weighting) -> Hypothesis | None:
+    """The hypothesis of a fit, with its residuals; None as for `hypothesis`."""
     try:
         residuals = here.residuals(found.theta)
     except FmuError:

@@ -214,6 +214,18 @@ class Problem:
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
 
 
+def simulate_ahead(asked: Sequence[tuple[Problem, Mapping[str, float]]]) -> None:
+    """Simulate problems with their unknowns at once, for whoever asks for their residuals next.
+
+    The problems differ in declared values only.
+    """
+    [(problem, _), *others] = asked
+    if others:
+        runs = problem.record.runs
+        starts = [[p._start(run, theta) for p, theta in asked] for run in runs]
+        problem.plant.simulate_ahead(runs, starts, problem.finer)
+
+
 def smooth_start(t: Array, y: Array, limits: StartPolicy) -> tuple[float, float]:
     """Value at the first of the samples y (N,) at times t (N,), and the scatter of the samples used.
 
