@@ -8,12 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from estimator.closeloop.fitting.calibrate import calibrate
+from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.kept import KEPT, KEY, OF_ALL, Kept, bits, digest
-from estimator.plant import Plant, Plants
+from estimator.plant import PLANTS, Plant, Plants
 from estimator.record import Run
+from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
 from fmus.variables import Input
+from tests.helpers.carriage import coulomb, problem, record, to_and_fro
 from tests.helpers.native import native
 from tests.helpers.runs import every_model, names, stirred
 
@@ -198,6 +206,70 @@ def test_starts_in_turn_give_what_each_gives_alone(name):
         states = fmu.description.states[:2]
         for start, y in zip(starts, plant.simulate_in_turn(run, starts, states), strict=True):
             assert_array_equal(y, plant.simulate(run, start, states))
+
+
+def test_what_is_simulated_ahead_is_not_simulated_when_it_is_asked_for():
+    """Starts may name different variables, in which another instance has its start values."""
+    runs = [driven("testrig", seed) for seed in range(2)]
+    starts = [START, {"omega_w": 11.0, "k_A": 0.9}, {}]
+    with Counted(native("testrig")) as fmu:
+        plant = plant_of(fmu, kept=Kept())
+        plant.simulate_ahead(runs, [starts] * 2, 1)
+        before = fmu.made
+        assert before == 6
+        found = [plant.simulate(run, start) for run in runs for start in starts]
+        assert fmu.made == before
+        expected = [alone(fmu, run, start) for run in runs for start in starts]
+        assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("kind", [Counted, OneByOne])
+def test_nothing_is_simulated_ahead_that_would_be_simulated_again(kind):
+    """Neither what is too much to be kept, nor what takes as long as one by one."""
+    run, size = driven("testrig"), 3 * 8 * N + KEY
+    with kind(native("testrig")) as fmu:
+        fmu.made = 0
+        for most, starts in ((OF_ALL * size - 1, 3), (OF_ALL * size, OF_ALL + 1), (OF_ALL * size, OF_ALL)):
+            kept = Kept(most)
+            asked = [START | {"mu0": 0.2 + 0.01 * i} for i in range(starts)]
+            plant_of(fmu, kept=kept).simulate_ahead([run], [asked], 1)
+            made = OF_ALL if starts == OF_ALL and fmu.at_once > 1 else 0
+            assert (fmu.made, kept.size) == (made, made * size)
+
+
+def hypotheses_of(folder, jobs, kept):
+    """Fits of the effects of a carriage, and how many simulations of its FMUs they took."""
+    asked = problem(ModelBuilder("drive", folder), record(to_and_fro(), coulomb(20.0), 1))
+    base = calibrate(asked)[1:]
+    baseline = Baseline(asked, *base)
+    kinds = ("viscous_damping", "coulomb_friction", "quadratic_damping", "parameter_offset")
+    offered = [(kind, at) for kind, at in asked.builder.offers if kind in kinds]
+    forces = missing_forces(asked, base[0].fit.theta, base[1].std)
+    candidates = physical_candidates(offered, asked.builder.outside(), asked.record, forces)
+    promises = [Promise((c,), 0.0, {u.name: u.start for u in c.unknowns}) for c in candidates]
+    PLANTS.kept.most = kept
+    return Fitter(baseline, jobs).fitted(promises, 2)
+
+
+def test_hypotheses_that_are_simulated_together_are_those_of_each_alone(tmp_path, monkeypatch):
+    calls = []
+    rows = Fmu.simulate_rows
+    monkeypatch.setattr(Fmu, "simulate_rows", lambda *a: (calls.append(len(a[4])), rows(*a))[1])
+    monkeypatch.setattr(PLANTS, "kept", Kept())
+    found = {}
+    for kept in (KEPT, 0):
+        PLANTS.close()
+        calls.clear()
+        found[kept] = hypotheses_of(tmp_path, 1, kept), len(calls)
+    PLANTS.close()
+    (together, few), (apart, many) = found[KEPT], found[0]
+    assert few < many
+    assert len(together) == len(apart) >= 4
+    for one, other in zip(together, apart, strict=True):
+        assert one.key == other.key
+        assert one.theta == other.theta
+        assert_array_equal(one.residuals, other.residuals)
+        assert_array_equal(one.fit.covariance, other.fit.covariance)
 
 
 KEYS = st.integers(0, 9)
