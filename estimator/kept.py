@@ -38,7 +38,9 @@ class Kept:
 
     def get(self, key: Hashable, names: tuple[str, ...]) -> Array | None:
         """A copy of these variables, since residuals are computed in their place; None if one is not kept."""
-        there, result = self._found.get(key, ((), np.empty((0, 0))))
+        if key not in self._found:
+            return None
+        there, result = self._found[key]
         if not set(names) <= set(there):
             return None
         self._found.move_to_end(key)
