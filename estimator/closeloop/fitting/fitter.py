@@ -152,24 +152,26 @@ def _hypotheses(
 ) -> list[Hypothesis | None]:
     """As `hypothesis` for each of several promises and its problem.
 
-    The fitted values of those that share an FMU are simulated at once, over the whole record.
+    Those that share an FMU come one after the other, for each FMU is opened once then. Their fitted values
+    are simulated at once, over the whole record.
     """
-    fitted: list[tuple[Problem, Promise, Fit]] = []
-    for problem, p in asked:
-        here, own = built(problem, p.candidates), [u for c in p.candidates for u in c.unknowns]
-        every = [*_doubting(problem, p.candidates, unknowns), *own]
-        found = fit(here, every, weighting, p.start, None, evaluations, known, guess, step=step)
-        fitted.append((here, p, found))
+    where = [built(problem, p.candidates) for problem, p in asked]
     sharing = defaultdict(list)
-    for i, (here, _, _) in enumerate(fitted):
+    for i, here in enumerate(where):
         sharing[here.effects].append(i)
     made: dict[int, Hypothesis | None] = {}
     for same in sharing.values():
-        at_once = fitted[same[0]][0].at_once
+        at_once = where[same[0]].at_once
         for some in (same[i : i + at_once] for i in range(0, len(same), at_once)):
-            simulate_ahead([(fitted[i][0], fitted[i][2].theta) for i in some])
-            made |= {i: _shown(*fitted[i], weighting) for i in some}
-    return [made[i] for i in range(len(fitted))]
+            fits = {}
+            for i in some:
+                problem, p = asked[i]
+                own = [u for c in p.candidates for u in c.unknowns]
+                every = [*_doubting(problem, p.candidates, unknowns), *own]
+                fits[i] = fit(where[i], every, weighting, p.start, None, evaluations, known, guess, step=step)
+            simulate_ahead([(where[i], fits[i].theta) for i in some])
+            made |= {i: _shown(where[i], asked[i][1], fits[i], weighting) for i in some}
+    return [made[i] for i in range(len(asked))]
 
 
 def _shown(here: Problem, promise: Promise, found: Fit, weighting: Weighting) -> Hypothesis | None:
