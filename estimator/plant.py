@@ -1,28 +1,37 @@
 """Simulation of an FMU through a record, and its response over one step from any state, by restarts."""
 
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from multiprocessing.util import Finalize
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from estimator.kept import Kept, bits, digest
 from estimator.record import Array, Run
 from fmus.host.apart.isolation import Isolation
 from fmus.host.apart.room import close_rooms
 from fmus.host.fmu import Fmu
 
 PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
+TOGETHER = 1 << 28  # bytes of results that are simulated at once: those of eight rows of an hour do not fit
 
 
 class Plant:
-    """An FMU instance with chosen inputs and outputs, by the names in its description."""
+    """An FMU instance with chosen inputs and outputs, by the names in its description.
 
-    def __init__(self, fmu: Fmu, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    kept: results of simulations, which may be shared with other plants; by default none are kept.
+    """
+
+    def __init__(
+        self, fmu: Fmu, inputs: Sequence[str], outputs: Sequence[str], kept: Kept | None = None
+    ) -> None:
         self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
         self.states = tuple(fmu.description.states)
+        self._kept = Kept(0) if kept is None else kept
         self._fine: tuple[Run, Array, dict[str, Array], int] | None = None  # refined inputs of the last run
+        self._seen: tuple[Run, bytes] | None = None  # the last run and its digest
 
     def simulate(
         self,
@@ -38,22 +47,91 @@ class Plant:
         of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic. finer:
         parts into which each step is divided further.
         """
+        names = (*self.outputs, *more)
+        key = None if push else self._key(run, start, names, finer)
+        if key is not None and (found := self._kept.get(key, names)) is not None:
+            return found
         t, inputs, pieces = self._given(run, finer)
         if push:
             inputs = dict(inputs)
             for name, samples in push.items():
                 inputs[name] = inputs.get(name, 0.0) + np.interp(t, run.t, samples)
-        names = (*self.outputs, *more)
         alone = self.fmu.simulate_rows(t, inputs, names, [start])  # half the time of a loop over steps
-        return (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
+        y = (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
+        if key is not None:
+            self._kept.put(key, names, y)
+        return y
 
     def simulate_rows(
-        self, run: Run, starts: Sequence[Mapping[str, float]], finer: int = 1
+        self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = (), finer: int = 1
     ) -> list[Array] | None:
-        """As `simulate` for each of several starts with the same names; None if the FMU does not offer it."""
+        """As `simulate` for each of several starts; None if the FMU does not offer it."""
+        names = (*self.outputs, *more)
+        keys = [self._key(run, start, names, finer) for start in starts]
+        kept = [None if key is None else self._kept.get(key, names) for key in keys]
+        if not (new := [start for start, y in zip(starts, kept, strict=True) if y is None]):
+            return [y for y in kept if y is not None]
         t, inputs, pieces = self._given(run, finer)
-        found = self.fmu.simulate_rows(t, inputs, self.outputs, starts)
-        return None if found is None else [y[::pieces] for y in found]
+        if (rows := self.fmu.simulate_rows(t, inputs, names, self._alike(new))) is None:
+            return None
+        made = iter(rows)
+        found = [next(made)[::pieces] if y is None else y for y in kept]
+        for key, y in zip(keys, found, strict=True):
+            if key is not None:
+                self._kept.put(key, names, y)
+        return found
+
+    def simulate_in_turn(
+        self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = ()
+    ) -> Iterator[Array]:
+        """As `simulate` for each of several starts, as many at once as `at_once` says."""
+        at_once = self.at_once(run, len(more))
+        for first in range(0, len(starts), at_once):
+            some = starts[first : first + at_once]
+            rows = self.simulate_rows(run, some, more)
+            yield from (self.simulate(run, start, more) for start in some) if rows is None else rows
+
+    def simulate_ahead(
+        self, runs: Sequence[Run], asked: Sequence[Sequence[Mapping[str, float]]], finer: int
+    ) -> None:
+        """Simulate what will be asked for one by one, all starts of a run at once, if all that can be kept.
+
+        asked: the starts for each of the runs.
+        """
+        sizes = [
+            8 * len(run.t) * len(self.outputs)
+            for run, starts in zip(runs, asked, strict=True)
+            for _ in starts
+        ]
+        if self.fmu.at_once > 1 and self._kept.room_for_all(sizes):
+            for run, starts in zip(runs, asked, strict=True):
+                self.simulate_rows(run, starts, finer=finer)
+
+    def _alike(self, starts: Sequence[Mapping[str, float]]) -> Sequence[Mapping[str, float]]:
+        """The starts with the same names: what one does not name has its start value, as in an instance."""
+        if all(start.keys() == starts[0].keys() for start in starts):
+            return starts
+        known = self.fmu.description.widened.variables
+        every = {n: known[n].start or 0.0 for start in starts for n in start if n in known}
+        return [{**every, **start} for start in starts]
+
+    def at_once(self, run: Run, more: int = 0) -> int:
+        """How many starts `simulate_rows` takes in the time of little more than one, if memory allows.
+
+        more: number of variables that are read beside the outputs.
+        """
+        size = 8 * len(run.t) * self._pieces(run.t) * (len(self.outputs) + more)
+        return max(1, min(self.fmu.at_once, TOGETHER // size))
+
+    def _key(
+        self, run: Run, start: Mapping[str, float], names: tuple[str, ...], finer: int
+    ) -> Hashable | None:
+        """All that variables of a simulation depend on; None if these, by name, are too long to be kept."""
+        if not self._kept.room_for(8 * len(run.t) * len(names)):
+            return None
+        if self._seen is None or self._seen[0] is not run:
+            self._seen = run, digest(run)
+        return self, self._seen[1], finer, bits(start)
 
     def _given(self, run: Run, finer: int) -> tuple[Array, dict[str, Array], int]:
         """Times and inputs of a run as set in the FMU, and the pieces of a step; cached for the run."""
@@ -97,10 +175,13 @@ def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, 
 
 
 class Plants:
-    """The open FMUs of this process; those that were not used for the longest time are closed."""
+    """The open FMUs of this process; those that were not used for the longest time are closed.
+
+    They share one room for the results of their last simulations.
+    """
 
     def __init__(self, most: int = 24) -> None:
-        self.most = most
+        self.most, self.kept = most, Kept()
         self._open: OrderedDict[tuple[Path, tuple[str, ...], tuple[str, ...], Isolation | None], Plant] = (
             OrderedDict()
         )
@@ -113,7 +194,7 @@ class Plants:
         if key not in self._open:
             if len(self._open) >= self.most:
                 self._open.popitem(last=False)[1].fmu.close()
-            self._open[key] = Plant(Fmu(fmu, isolation), inputs, outputs)
+            self._open[key] = Plant(Fmu(fmu, isolation), inputs, outputs, self.kept)
         self._open.move_to_end(key)
         return self._open[key]
 
@@ -121,6 +202,7 @@ class Plants:
         """Close all, and the processes in which foreign ones run."""
         while self._open:
             self._open.popitem()[1].fmu.close()
+        self.kept.clear()
         close_rooms()
 
 

@@ -246,12 +246,14 @@ def _in_fine_steps(
 ) -> tuple[Screened, list[Hypothesis]]:
     """The problem in steps that are fine enough for the new members of an answer, and those to be profiled.
 
-    If the steps become finer, these are all members, since hypotheses are compared in the same steps.
+    If the steps become finer, these are all members, since hypotheses are compared in the same steps. If they
+    stay as they are, so does the screening, with the onset that was found for it.
     """
     before = shown.baseline
     finer = in_fine_steps(fitter, new)
-    again = new if finer.finer == before.problem.finer else members
-    return replace(shown, baseline=before.asked(finer)), list(again)
+    if finer.finer == before.problem.finer:
+        return shown, list(new)
+    return replace(shown, baseline=before.asked(finer)), list(members)
 
 
 def _with_rivals(

@@ -21,7 +21,8 @@ def fitter(clock, takes=0.0, jobs=1):
         clock[0] += takes
 
     fit = SimpleNamespace(unknowns=["a", "b"], theta={"a": 1.0, "b": 2.0})
-    problem, hypothesis = SimpleNamespace(simulate=simulate, at_once=1), SimpleNamespace(fit=fit)
+    problem = SimpleNamespace(simulate=simulate, forget=lambda: None, at_once=1)
+    hypothesis = SimpleNamespace(fit=fit)
     baseline = SimpleNamespace(problem=problem, hypothesis=hypothesis, policy=DEFAULT)
     return SimpleNamespace(baseline=baseline, jobs=jobs)
 

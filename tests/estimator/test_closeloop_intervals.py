@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
@@ -19,8 +20,10 @@ from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.pipeline import _in_fine_steps
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.search.screened import Screened
 from estimator.record import Array, Run
 from estimator.weighting import Weighting
 from fmus.effects.timing import RISE
@@ -280,3 +283,17 @@ def test_a_slope_at_a_bound_is_taken_to_one_side():
     held = replace(h, fit=replace(h.fit, unknowns=(replace(a, high=float(h.fit.values[0])), b)))
     found = within_error(asked, held, Weighting.white(SIZE)).fit.jacobian
     assert found[:, 0] == pytest.approx(asked.jacobian(*h.fit.values)[:, 0], rel=1e-6)
+
+
+@pytest.mark.parametrize("true", [1, 4])
+def test_a_screening_is_done_again_only_if_the_steps_become_finer(true):
+    """What was found of its onset and its twins belongs to its steps."""
+    slope = Unknown("slope", 1.0, -10.0, 10.0, 1.0)
+    c = Candidate("viscous_damping", "here", (slope,))
+    fitter = Refitter(baseline(Held(0.1, true_finer=true), noise=SIZE))
+    [h] = fitter.finished([Promise((c,), 0.0, {})])
+    shown = Screened(fitter.baseline, None, h.fit, [], [], Stages())
+    after, again = _in_fine_steps(fitter, shown, [h], [h, h])
+    assert (after is shown) == (true == 1)
+    assert after.problem.finer == true
+    assert len(again) == (1 if true == 1 else 2)

@@ -74,12 +74,13 @@ def _start_unknowns(problem: Problem) -> list[Unknown]:
         return []
     known = problem.plant.fmu.description.variables
     start = {name: value for name, (value, _) in guess.items()}
-    as_guessed = problem.residuals(start)
-    size = weights(problem.record, as_guessed)
-    found = []
+    unknowns = []
     for name, (value, error) in guess.items():
         scale = error if np.isfinite(error) else 0.01 * (known[name].nominal or 1.0)
-        moved = problem.residuals({**start, name: value + scale})[0] - as_guessed[0]
-        if np.sum((moved / size) ** 2) > SEEN:
-            found.append(Unknown(name, value, value - error, value + error, float(scale)))
-    return found
+        unknowns.append(Unknown(name, value, value - error, value + error, float(scale)))
+    moved = [{**start, u.name: u.start + u.scale} for u in unknowns]
+    residuals = problem.several_residuals([start, *moved])
+    as_guessed = next(residuals)
+    size = weights(problem.record, as_guessed)
+    away = (float(np.sum(((r[0] - as_guessed[0]) / size) ** 2)) for r in residuals)
+    return [u for u, square in zip(unknowns, away, strict=True) if square > SEEN]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,9 +13,10 @@ from estimator.closeloop.fitting.fit import REFUSED, fit
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
-from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.question.problem import Problem, Unknown, simulate_ahead
 from estimator.record import Array
 from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
@@ -110,12 +112,12 @@ class Fitter:
         """
         problem, weighting = self.baseline.problem, self.baseline.noise.weighting
         others = self.baseline.hypothesis.fit.unknowns if unknowns is None else unknowns
-        where = together(problem, promises)
+        pairs = list(zip(together(problem, promises), promises, strict=True))
         tasks = (
-            delayed(hypothesis)(here, others, p, weighting, evaluations, known, guess, step)
-            for here, p in zip(where, promises, strict=True)
+            delayed(_hypotheses)(some, others, weighting, evaluations, known, guess, step)
+            for some in ([pairs] if self.jobs == 1 else ([pair] for pair in pairs))
         )
-        found = [h for h in Parallel(n_jobs=self.jobs)(tasks) if h is not None]
+        found = [h for some in Parallel(n_jobs=self.jobs)(tasks) for h in some if h is not None]
         # processes return copies of the derivatives that were known
         return best_by_label(replace(h, fit=h.fit.sharing(known)) if known else h for h in found)
 
@@ -135,10 +137,45 @@ def hypothesis(
     known, guess, step: see `fit`. Returns None if the FMU cannot be simulated with the fitted values or its
     simulation diverges.
     """
-    here = built(problem, promise.candidates)
-    own = [u for c in promise.candidates for u in c.unknowns]
-    others = _doubting(problem, promise.candidates, unknowns)
-    found = fit(here, [*others, *own], weighting, promise.start, None, evaluations, known, guess, step=step)
+    [found] = _hypotheses([(problem, promise)], unknowns, weighting, evaluations, known, guess, step)
+    return found
+
+
+def _hypotheses(
+    asked: Sequence[tuple[Problem, Promise]],
+    unknowns: Sequence[Unknown],
+    weighting: Weighting,
+    evaluations: int,
+    known: Columns | None,
+    guess: Columns | None,
+    step: float,
+) -> list[Hypothesis | None]:
+    """As `hypothesis` for each of several promises and its problem.
+
+    Those that share an FMU come one after the other, for each FMU is opened once then. Their fitted values
+    are simulated at once, over the whole record.
+    """
+    where = [built(problem, p.candidates) for problem, p in asked]
+    sharing = defaultdict(list)
+    for i, here in enumerate(where):
+        sharing[here.effects].append(i)
+    made: dict[int, Hypothesis | None] = {}
+    for same in sharing.values():
+        at_once = where[same[0]].at_once
+        for some in (same[i : i + at_once] for i in range(0, len(same), at_once)):
+            fits = {}
+            for i in some:
+                problem, p = asked[i]
+                own = [u for c in p.candidates for u in c.unknowns]
+                every = [*_doubting(problem, p.candidates, unknowns), *own]
+                fits[i] = fit(where[i], every, weighting, p.start, None, evaluations, known, guess, step=step)
+            simulate_ahead([(where[i], fits[i].theta) for i in some])
+            made |= {i: _shown(where[i], asked[i][1], fits[i], weighting) for i in some}
+    return [made[i] for i in range(len(asked))]
+
+
+def _shown(here: Problem, promise: Promise, found: Fit, weighting: Weighting) -> Hypothesis | None:
+    """The hypothesis of a fit, with its residuals; None as for `hypothesis`."""
     try:
         residuals = here.residuals(found.theta)
     except FmuError:

@@ -114,6 +114,10 @@ class Problem:
         """Simulate each run of the record: the outputs, then the variables `more`, (N, n_y + n_more) each."""
         return [self._run(run, theta, more) for run in self.record.runs]
 
+    def forget(self) -> None:
+        """Make the next simulations anew, for whoever measures how long one takes."""
+        PLANTS.kept.clear()
+
     def simulate_several(self, thetas: Sequence[Mapping[str, float]]) -> Iterator[list[Array]]:
         """As `simulate` for each of several unknowns with the same names, some of them simulated at once."""
         for first in range(0, len(thetas), self.at_once):
@@ -191,7 +195,8 @@ class Problem:
 
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """Simulated outputs of a run for each of several unknowns; None if not all at once."""
-        rows = self.plant.simulate_rows(run, [self._start(run, theta) for theta in thetas], self.finer)
+        starts = [self._start(run, theta) for theta in thetas]
+        rows = self.plant.simulate_rows(run, starts, finer=self.finer)
         if rows is None:
             return None
         return [faulty(y, run.t, self.record.outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
@@ -207,6 +212,18 @@ class Problem:
         """Start values of the FMU: the declared ones, and those in theta that are variables of the FMU."""
         known = self.plant.fmu.description.variables
         return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
+
+
+def simulate_ahead(asked: Sequence[tuple[Problem, Mapping[str, float]]]) -> None:
+    """Simulate problems with their unknowns at once, for whoever asks for their residuals next.
+
+    The problems differ in declared values only.
+    """
+    [(problem, _), *others] = asked
+    if others:
+        runs = problem.record.runs
+        starts = [[p._start(run, theta) for p, theta in asked] for run in runs]
+        problem.plant.simulate_ahead(runs, starts, problem.finer)
 
 
 def smooth_start(t: Array, y: Array, limits: StartPolicy) -> tuple[float, float]:

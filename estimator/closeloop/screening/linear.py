@@ -128,10 +128,11 @@ def influences(
     }
     run, start = problem.record.runs[0].part(0, keep[-1] + 1), problem.start(theta)
     n_y, n = len(plant.outputs), len(plant.states)
-    before = plant.simulate(run, start, plant.states)[keep]
-    for name in (n for n in levers if n not in found):
-        h = LEVER_NUDGE * _size(known[name], start)
-        after = plant.simulate(run, {**start, name: _value(known[name], start) + h}, plant.states)[keep]
+    sizes = {name: LEVER_NUDGE * _size(known[name], start) for name in levers if name not in found}
+    moved = [{**start, name: _value(known[name], start) + h} for name, h in sizes.items()]
+    kept = (y[keep] for y in plant.simulate_in_turn(run, [start, *moved], plant.states))
+    before = next(kept)
+    for (name, h), after in zip(sizes.items(), kept, strict=True):
         dy, dx = np.split((after - before) / h, (n_y,), axis=1)
         steps, shown = np.empty((len(keep), n)), np.empty((len(keep), n_y))
         for rows in blocks(len(keep), 8 * n * (n + n_y)):

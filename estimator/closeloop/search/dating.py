@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from joblib import Parallel, delayed
 
-from estimator.closeloop.fitting.fit import weighted
+from estimator.closeloop.fitting.fit import in_turn
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import onsets_near
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
@@ -40,6 +40,7 @@ def _onset(problem: Problem, h: Hypothesis, weighting: Weighting) -> float | Non
     [name, *_] = h.onset_names
     here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
     inside = [t for t in onsets_near(now, length) if 0.0 < t < length and t != now]
-    squares = [float(np.sum(weighted(here, {**h.theta, name: t}, weighting) ** 2)) for t in inside]
+    tried = in_turn(here, [{**h.theta, name: t} for t in inside], weighting)
+    squares = [float(np.sum(residual**2)) for residual in tried]
     best = int(np.argmin(squares)) if squares else 0
     return inside[best] if squares and squares[best] < cost(h) else None

@@ -34,6 +34,7 @@ def simulations(fitter: Fitter, promises: Sequence[Promise]) -> int:
 
 def _one_simulation(fitter: Fitter) -> float:
     """Wall time of a simulation of the record by the calibrated FMU, s."""
+    fitter.baseline.problem.forget()
     begun = monotonic()
     fitter.baseline.problem.simulate(fitter.baseline.hypothesis.fit.theta)
     return monotonic() - begun
