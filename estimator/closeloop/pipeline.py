@@ -247,7 +247,7 @@ def _in_fine_steps(
     """The problem in steps that are fine enough for the new members of an answer, and those to be profiled.
 
     If the steps become finer, these are all members, since hypotheses are compared in the same steps. If they
-    stay as they are, so does the screening, with the onset that was found for it.
+    stay as they are, so does the screening.
     """
     before = shown.baseline
     finer = in_fine_steps(fitter, new)

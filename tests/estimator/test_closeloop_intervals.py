@@ -287,13 +287,14 @@ def test_a_slope_at_a_bound_is_taken_to_one_side():
 
 @pytest.mark.parametrize("true", [1, 4])
 def test_a_screening_is_done_again_only_if_the_steps_become_finer(true):
-    """What was found of its onset and its twins belongs to its steps."""
+    """The onset that was found with it stays all the same, as it does where it is read from a checkpoint."""
     slope = Unknown("slope", 1.0, -10.0, 10.0, 1.0)
     c = Candidate("viscous_damping", "here", (slope,))
     fitter = Refitter(baseline(Held(0.1, true_finer=true), noise=SIZE))
     [h] = fitter.finished([Promise((c,), 0.0, {})])
-    shown = Screened(fitter.baseline, None, h.fit, [], [], Stages())
+    shown = Screened(fitter.baseline, None, h.fit, [], [], Stages(), lambda: None)
     after, again = _in_fine_steps(fitter, shown, [h], [h, h])
     assert (after is shown) == (true == 1)
+    assert after.came is shown.came
     assert after.problem.finer == true
     assert len(again) == (1 if true == 1 else 2)

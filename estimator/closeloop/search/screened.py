@@ -1,8 +1,8 @@
 """Screens all candidates against the residual of the calibrated FMU."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.model_form import form_of
@@ -28,6 +28,8 @@ class Screened:
     """A problem with its calibrated FMU, and the promises of all candidates; see Outcome.
 
     fit: the screening's fit without the unknowns held by a bound; change: each candidate with its changes.
+    came: the share before the onset and the fit to it, if an effect sets in (see `onset`), found when it is
+    first asked for, with the baseline of the screening, also where that has changed since.
     """
 
     baseline: Baseline
@@ -36,6 +38,7 @@ class Screened:
     change: list[tuple[Candidate, Array]]
     promises: list[Promise]
     stages: Stages
+    came: Callable[[], tuple[float, Fit] | None]
 
     @property
     def beyond_noise(self) -> float:
@@ -65,14 +68,7 @@ class Screened:
     @property
     def began(self) -> bool:
         """Whether a residual that could be a form error begins during the record."""
-        return self.open_to_form and self.came is not None
-
-    @cached_property
-    def came(self) -> tuple[float, Fit] | None:
-        """The share before the onset and the fit to it, if an effect sets in; see `onset`."""
-        limits = self.baseline.policy.search
-        least = limits.sets_in_times_open if self.open_to_form else limits.sets_in_times
-        return self.stages.done("onset", lambda: onset(self.baseline, least))
+        return self.open_to_form and self.came() is not None
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual; False if the noise is not declared."""
@@ -90,4 +86,12 @@ def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress,
     # with a form error, a calibrated parameter at its bound says nothing about effects
     fit = loose(screening.fit) if form_of(baseline).exact else screening.fit
     promises = screen(fit, [((c,), g) for c, g in change])
-    return Screened(baseline, screening, fit, change, promises, stages)
+
+    @cache
+    def came() -> tuple[float, Fit] | None:
+        limits = baseline.policy.search
+        least = limits.sets_in_times_open if found.open_to_form else limits.sets_in_times
+        return stages.done("onset", lambda: onset(baseline, least))
+
+    found = Screened(baseline, screening, fit, change, promises, stages, came)
+    return found

@@ -168,10 +168,11 @@ class Search:
         """Promises of effects that may have set in at the onset, and brief fits of the leading ones."""
         s = self.screened
         limits = s.problem.policy.search
-        if not s.came:
+        came = s.came()
+        if not came:
             return [], []
         physical = [c for c, _ in self._single if not c.is_fault]
-        promises = since(self.fitter, s.came, physical)
+        promises = since(self.fitter, came, physical)
         return promises, self.fitter.briefly(promises[: limits.sudden], known=False)
 
     def _replaced(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
