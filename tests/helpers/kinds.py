@@ -1,12 +1,7 @@
 """FMUs in C with arrays, whole numbers, truths and events; see the equations in their files."""
 
-import subprocess
-import zipfile
-from pathlib import Path
+from tests.helpers.packed_fmu import FOLDER, build_packed
 
-import fmpy
-
-FOLDER = Path(__file__).parent / "c"
 DESCRIPTION_3 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="Kinds" instantiationToken="{kinds}">
   <CoSimulation modelIdentifier="kinds_fmi3" canHandleVariableCommunicationStepSize="true"
@@ -113,13 +108,4 @@ NAMES = {"kinds_fmi3": "Kinds.fmu", "kinds_fmi2": "Counted.fmu", "events_fmi3": 
 
 def build_kinds(compiler, folder, name):
     """Compile and pack the FMU of the C file of that name; its path."""
-    library = folder / f"{name}{fmpy.sharedLibraryExtension}"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC", "-I", headers]
-    subprocess.run([compiler, *strict, FOLDER / f"{name}.c", "-o", library, "-lm"], check=True)
-    path = folder / NAMES[name]
-    place = fmpy.platform_tuple if name.endswith("3") else fmpy.platform
-    with zipfile.ZipFile(path, "w") as packed:
-        packed.writestr("modelDescription.xml", DESCRIPTIONS[name])
-        packed.write(library, f"binaries/{place}/{library.name}")
-    return path
+    return build_packed(compiler, FOLDER / f"{name}.c", DESCRIPTIONS[name], folder / NAMES[name])

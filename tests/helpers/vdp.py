@@ -1,16 +1,13 @@
 """An FMI 3.0 FMU in C of the van der Pol oscillator, and the same in Python."""
 
-import subprocess
-import zipfile
-from pathlib import Path
-
-import fmpy
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from tests.helpers.packed_fmu import FOLDER, build_packed
+
 OUTPUTS = ["x0", "x1", "x1_dot"]
 ERROR = 1e-9  # of Runge-Kutta steps of 1 ms over some seconds, against the solution
-SOURCE = Path(__file__).parent / "c" / "vdp_fmi3.c"
+SOURCE = FOLDER / "vdp_fmi3.c"
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="VanDerPol" instantiationToken="{vdp-of-the-tests}">
   <CoSimulation modelIdentifier="vdp" canHandleVariableCommunicationStepSize="true"
@@ -53,16 +50,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 def build_vdp(compiler, folder, source=SOURCE):
     """Compile and pack it; the path of the FMU."""
-    library = folder / f"vdp{fmpy.sharedLibraryExtension}"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2"]
-    made = [compiler, *strict, "-shared", "-fPIC", "-I", headers, source, "-o", library, "-lm"]
-    subprocess.run(made, check=True)
-    path = folder / "VanDerPol.fmu"
-    with zipfile.ZipFile(path, "w") as packed:
-        packed.writestr("modelDescription.xml", DESCRIPTION)
-        packed.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
-    return path
+    return build_packed(compiler, source, DESCRIPTION, folder / "VanDerPol.fmu")
 
 
 def stirred(t):

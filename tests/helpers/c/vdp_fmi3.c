@@ -164,26 +164,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 t, fmi3Float64 dt, fmi3
     return fmi3OK;
 }
 
-fmi3GetFMUStateTYPE fmi3GetFMUState;
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state) {
-    if (!*state) *state = malloc(sizeof(State));
-    memcpy(*state, &((Vdp *)instance)->now, sizeof(State));
-    return fmi3OK;
-}
-
-fmi3SetFMUStateTYPE fmi3SetFMUState;
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state) {
-    memcpy(&((Vdp *)instance)->now, state, sizeof(State));
-    return fmi3OK;
-}
-
-fmi3FreeFMUStateTYPE fmi3FreeFMUState;
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state) {
-    (void)instance;
-    free(*state);
-    *state = NULL;
-    return fmi3OK;
-}
+typedef Vdp Instance;
+#include "states_fmi3.h"
 
 fmi3SerializedFMUStateSizeTYPE fmi3SerializedFMUStateSize;
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState state, size_t *size) {
