@@ -44,7 +44,9 @@ class Exchanged(Instance):
         """No compiled loop steps it."""
         return status
 
-    def _stepper(self) -> Callable[[float, float], int]:
+    def stepper(self) -> Callable[[float, float], int]:
+        """A raw step; see Instance."""
+
         def step(t: float, dt: float) -> int:
             self.ready()
             if self._update():

@@ -92,7 +92,9 @@ class Fmi2Instance(Instance):
         n, raw = len(references), self._slave.dll.fmi2GetReal
         return partial(raw, self._slave.component, references, n, values)
 
-    def _stepper(self) -> Callable[[float, float], int]:
+    def stepper(self) -> Callable[[float, float], int]:
+        """A raw step; see Instance."""
+
         raw, component = self._slave.dll.fmi2DoStep, self._slave.component
 
         def step(t: float, dt: float) -> int:

@@ -80,7 +80,9 @@ class Fmi3Instance(Instance):
         n, raw = len(references), self._slave.dll.fmi3GetFloat64
         return partial(raw, self._slave.component, references, n, values, n)
 
-    def _stepper(self) -> Callable[[float, float], int]:
+    def stepper(self) -> Callable[[float, float], int]:
+        """A raw step; see Instance."""
+
         raw, component = self._slave.dll.fmi3DoStep, self._slave.component
         event, ends, early, reached = c_bool(), c_bool(), c_bool(), c_double()
         told = [byref(value) for value in (event, ends, early, reached)]

@@ -119,8 +119,8 @@ class Instance(ABC):
         """A raw call that reads variables into a C array and returns its status."""
 
     @abstractmethod
-    def _stepper(self) -> Callable[[float, float], int]:
-        """A raw step from t by dt that returns its status; AskedToEnd where it does not come to its end."""
+    def stepper(self) -> Callable[[float, float], int]:
+        """A raw step from t by dt, s, that returns its status; AskedToEnd where it does not reach its end."""
 
     @abstractmethod
     def stopped(self, t: float, dt: float, status: int) -> int:
@@ -159,7 +159,7 @@ class Instance(ABC):
         """Advance from t by dt, s; AskedToEnd where the FMU wants no further step."""
         self.ready()
         PAGE.stepping(self.who, t)
-        self._succeeded(self._stepper()(t, dt), self._named("doStep"))
+        self._succeeded(self.stepper()(t, dt), self._named("doStep"))
 
     def initialise(self, references: Sequence[int], values: Sequence[float], t0: float) -> None:
         """Reset, set the values, go through initialisation at t0."""
@@ -216,10 +216,6 @@ class Instance(ABC):
             return status if status > WARNING else max(status, get_others())
 
         return values, pull
-
-    def stepper(self) -> Callable[[float, float], int]:
-        """A raw step from t by dt, s, that returns its status."""
-        return self._stepper()
 
     def whole(self, references: Sequence[int]) -> list[int]:
         """Which of them take whole numbers only."""

@@ -99,7 +99,7 @@ def test_an_old_reason_is_not_given_for_a_new_failure(drive, monkeypatch):
         with pytest.raises(FmuError, match="M = nan"):
             fmu.step(0.1)
         fmu.restart()
-        monkeypatch.setattr(fmu._instance, "_stepper", lambda: lambda *_: 3)
+        monkeypatch.setattr(fmu._instance, "stepper", lambda: lambda *_: 3)
         with pytest.raises(FmuError) as refused:
             fmu.step(0.1)
         assert str(refused.value) == "Drive.fmu: fmi2DoStep failed with status 3 (error)"
@@ -119,7 +119,7 @@ def test_no_call_is_made_after_a_fatal_failure(drive, monkeypatch):
     with Fmu(drive) as fmu:
         fmu.restart()
         slave = fmu._instance._slave
-        monkeypatch.setattr(fmu._instance, "_stepper", lambda: lambda *_: 4)
+        monkeypatch.setattr(fmu._instance, "stepper", lambda: lambda *_: 4)
         for name in ("reset", "getReal", "setReal", "freeInstance"):
             monkeypatch.setattr(slave, name, failing(AssertionError(f"{name} was called")))
         with pytest.raises(FmuError, match="status 4"):
