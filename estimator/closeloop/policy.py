@@ -279,14 +279,6 @@ class SearchPolicy:
         "movement of an unknown of an answer by halved steps of the simulation, above which they are halved",
         "derivation: a bias of half of an error adds 12 % to it, as `noise_share`",
     )
-    bent: float = limit(
-        0.15,
-        "share of a residual's change",
-        "share by which the slopes of an answer may miss the change of its residual at the end of a 95 % "
-        "interval; else the likelihood profile is followed to the end",
-        "D. M. Bates, D. G. Watts, Nonlinear Regression Analysis (1988), 7.3: a curvature of 0.3, which "
-        "departs from the tangent by half of it",
-    )
     parts_of_a_step: int = limit(
         4,
         "parts",
@@ -356,6 +348,27 @@ class SearchPolicy:
         CHALLENGE,
     )
     lookalikes: int = limit(3, "laws", "laws similar to the best one that are fitted in its place", CHALLENGE)
+
+
+@dataclass(frozen=True)
+class IntervalPolicy:
+    """Limits of the 95 % intervals: how they are confirmed, and when they lead to another optimum."""
+
+    bent: float = limit(
+        0.15,
+        "share of a residual's change",
+        "share by which the slopes of an answer may miss the change of its residual at the end of a 95 % "
+        "interval; else the likelihood profile is followed to the end",
+        "D. M. Bates, D. G. Watts, Nonlinear Regression Analysis (1988), 7.3: a curvature of 0.3, which "
+        "departs from the tangent by half of it",
+    )
+    deeper: float = limit(
+        4.0,
+        "sum of squares, in units of the noise",
+        "reduction at a place that an interval holds, above which the answer is fitted again from there",
+        "derivation: the interval ends where the sum of squares has risen by 1.96 squared; a place as much "
+        "lower means that the interval does not hold the optimum",
+    )
 
 
 @dataclass(frozen=True)
@@ -513,12 +526,13 @@ class PriorPolicy:
 
 @dataclass(frozen=True)
 class Policy:
-    """All limits, grouped by start states, inputs, detection, search, decision and priors."""
+    """All limits, grouped by start states, inputs, detection, search, intervals, decision and priors."""
 
     start: StartPolicy = StartPolicy()
     inputs: InputPolicy = InputPolicy()
     detection: DetectionPolicy = DetectionPolicy()
     search: SearchPolicy = SearchPolicy()
+    interval: IntervalPolicy = IntervalPolicy()
     decision: DecisionPolicy = DecisionPolicy()
     prior: PriorPolicy = PriorPolicy()
 

@@ -13,7 +13,7 @@ import numpy as np
 from estimator.closeloop.fitting.fit import in_turn
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
-from estimator.closeloop.fitting.profile_trace import DEEPER, WIDTH, ends
+from estimator.closeloop.fitting.profile_trace import WIDTH, ends
 from estimator.closeloop.fitting.refined import lower, refined
 from estimator.closeloop.fitting.resolution import in_divided_steps
 from estimator.closeloop.fitting.slopes_within_error import within_error
@@ -109,7 +109,7 @@ def _when(here: Problem, h: Hypothesis, i: int, weighting: Weighting) -> tuple[f
         [float(np.sum((r - others @ (others.T @ r)) ** 2)) for r in in_turn(here, asked, weighting)]
     )
     rises = (squares[1:] - squares[0]) / usual
-    if rises.min() < -DEEPER:
+    if rises.min() < -here.policy.interval.deeper:
         return 0.0, {name: float(tried[np.argmin(rises)])}
     return max(_reach(np.abs(tried - now)[side], rises[side]) for side in (tried > now, tried < now)), {}
 

@@ -30,7 +30,6 @@ from fmus.aside import set_aside
 WIDTH = 1.96  # standard errors: 95 %
 MOVES = 20  # largest number of simulations for one end of an interval
 HIGHER = 2.0  # times the width of an interval: a move to a place as far from the optimum is taken back
-DEEPER = 4.0  # reduction of the sum of squares at a place, above which the hypothesis is fitted from there
 
 
 def ends(
@@ -42,10 +41,10 @@ def ends(
     that hold near it; leave: whether to stop where the sum of squares is much lower than at the optimum. The
     second result holds the values of such a place, by name.
     """
-    start, limit = Optimum(h.fit), built.policy.search.bent
+    start, policy = Optimum(h.fit), built.policy.interval
     fixed = {n: v for n, v in h.theta.items() if n not in h.fit.theta}
     sought = [i for i, u in enumerate(h.fit.unknowns) if u.name in names]
-    waiting = [Trace(start, i, side, limit) for i in sought for side in (-1.0, 1.0)]
+    waiting = [Trace(start, i, side, policy.bent) for i in sought for side in (-1.0, 1.0)]
     moving: list[Trace] = []
     places = [start.x]
     while waiting or moving:
@@ -54,7 +53,7 @@ def ends(
         moves = [t.move() for t in moving]
         asked = [fixed | start.named(t.x + d) for t, d in zip(moving, moves, strict=True)]
         for t, d, r in zip(moving, moves, in_turn(built, asked, weighting), strict=True):
-            if leave and float(r @ r) < start.fit.cost - DEEPER * t.unit**2:
+            if leave and float(r @ r) < start.fit.cost - policy.deeper * t.unit**2:
                 return np.array(places) * start.scale, start.named(t.x + d)
             t.arrived(d, r)
             places += [t.x] if t.within else []
