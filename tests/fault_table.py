@@ -59,8 +59,8 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
             told = (
                 "exit code of the signal, one line; no traceback, part of a file, process or folder is left"
             )
-            what = f"{number.name} at {test_interrupts_at_random.MOMENTS // len(SIGNALS)} random moments"
-            yield what, command, told, _file(test_interrupts_at_random)
+            times = test_interrupts_at_random.MOMENTS[command] // len(SIGNALS)
+            yield f"{number.name} at {times} random moments", command, told, _file(test_interrupts_at_random)
     for name in targets():
         told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
         yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)

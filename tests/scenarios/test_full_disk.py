@@ -20,7 +20,7 @@ CASES = {  # command, arguments, and at how many of its changes the disk fails
     "import-ssp": (["import-ssp", "bad.ssp"], 20),
     "build": (["build", "testrig"], 10),
     "close-loop --dry-run": (["close-loop", "--dry-run", "experiment.toml"], 10),
-    "plan": (["plan", "experiment.toml"], 20),
+    "plan": (["plan", "experiment.toml"], 8),
     "close-loop": (["close-loop", "experiment.toml", "--jobs", "1"], 12),
     "row": (["row", "conicity_step"], 4),
     "conicity-norm": (["conicity-norm", "--pair", "A", "--draws", "1"], 10),
