@@ -9,12 +9,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from typing import Any
+
+from joblib.externals.loky import ProcessPoolExecutor  # sends plans, which hold functions
 
 from benchmarks.challenge.draw import Plan
 from benchmarks.challenge.make import make
@@ -43,9 +45,10 @@ class Challenge:
         """The truth of a record; record and truth are made if they do not exist."""
         return make(plan, self.seed, self.folder / "records", self.folder / "truth", WAYS[self.way])
 
-    def one(self, plan: Plan) -> tuple[Truth, Kept]:
-        """Truth and answer of a record."""
-        return self.truth(plan), self.answer(plan)
+    def one(self, plan: Plan, makers: Executor | None = None) -> tuple[Truth, Kept]:
+        """Truth and answer of a record; makers: processes that make records that do not exist."""
+        truth = makers.submit(self.truth, plan).result() if makers else self.truth(plan)
+        return truth, self.answer(plan)
 
     def answer(self, plan: Plan) -> Kept:
         """The answer to a record: the kept one, else that of close-loop, or the reason of its failure."""
@@ -122,10 +125,13 @@ def _end(process: subprocess.Popen[str]) -> None:
 def run(
     challenge: Challenge, plans: Sequence[Plan], jobs: int, tell: Tell = print
 ) -> list[tuple[Truth, Kept]]:
-    """Truth and answer of each plan, in their order; records with an answer are not closed again."""
+    """Truth and answer of each plan, in their order; records with an answer are not closed again.
+
+    Records are made in processes of their own: Python's threads would make one at a time.
+    """
     found: dict[int, tuple[Truth, Kept]] = {}
-    with ThreadPoolExecutor(jobs) as pool:
-        waiting = {pool.submit(challenge.one, plan): plan for plan in plans}
+    with ThreadPoolExecutor(jobs) as pool, ProcessPoolExecutor(max_workers=jobs) as makers:
+        waiting = {pool.submit(challenge.one, plan, makers): plan for plan in plans}
         try:
             for number, done in enumerate(as_completed(waiting), 1):
                 plan = waiting[done]
@@ -133,6 +139,7 @@ def run(
                 tell(f"{number} of {len(plans)}  {plan.name}  {found[plan.index][1]['seconds']} s")
         except BaseException:
             STOP.set()
+            makers.shutdown(wait=False, kill_workers=True)
             pool.shutdown(cancel_futures=True)
             raise
     return [found[plan.index] for plan in plans]
