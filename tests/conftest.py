@@ -28,14 +28,6 @@ DEMO = SHIPPED / "demo" / "rig-drag"
 Built = Callable[..., Path]
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The tests of a file are run by one process, a slow one by any that is free."""
-    for item in items:
-        if not item.get_closest_marker("slow"):
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
-
-
 @pytest.fixture(autouse=True)
 def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     """No lines of progress beside what a command says: whether there are any depends on the machine."""
