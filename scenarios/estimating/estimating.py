@@ -163,12 +163,18 @@ def _notes(found: Findings) -> list[str]:
 
 
 def _notes_on_form(found: Findings) -> Iterator[str]:
-    """What the estimate would be with each choice of the model's form."""
+    """What the estimate would be with each choice of the model's form, and what that form lets wander."""
     for form in found.forms:
         choice = ", ".join(f"{name} = {value:g}" for name, value in form.choice.items())
         values = ", ".join(f"{name} = {value:.4g}" for name, value in form.values.items())
         counts = "" if form.consistent else "; this filter is not consistent with the record"
         yield f"with {choice}: {values}, log likelihood {form.log_likelihood:.1f}{counts}"
+    for p in found.setup.parameters:
+        if p.walk and p.name not in found.setup.options.walk:
+            yield (
+                f"'{p.name}' may wander by {p.walk:.2g} in a second, the most that the record "
+                "does not reject, since no constant makes up for what the model's form leaves open"
+            )
     if sum(form.consistent for form in found.forms) > 1:
         yield "the scatter between the consistent choices of the model's form is part of the standard errors"
 

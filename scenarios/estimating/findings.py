@@ -12,7 +12,7 @@ from estimator.filters.estimator import (
     Estimate,
     Gate,
 )
-from estimator.filters.history import History, Steps, filtered
+from estimator.filters.history import History, Samples, Steps, filtered
 from estimator.filters.identifiability import (
     Identifiability,
     afterwards,
@@ -28,7 +28,16 @@ from estimator.record import Array
 from fmus.aside import all_set_aside
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
-from scenarios.estimating.form import LEARNT, Form, begun_again, consistent, leading, widened
+from scenarios.estimating.form import (
+    LEARNT,
+    Form,
+    begun_again,
+    consistent,
+    largest_wandering,
+    leading,
+    wandering,
+    widened,
+)
 from scenarios.estimating.setup import Setup, finely
 from scenarios.experiment.estimated import Options
 
@@ -123,12 +132,14 @@ def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | Non
     if s.form:
         tell("learning where the parameters of the model's form begin")
         s = _begun_again(s, archive, share or 0.0)
+        tell("finding how far the model's form lets the parameters wander")
+        s = _wandering(s, archive, share or 0.0)
     return s, share
 
 
 def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
     """With start values from a first run over the beginning of the record, if the filter gets through it."""
-    first = s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + LEARNT)))
+    first = _learnt_from(s)
     with s.joint(archive, share) as joint:
         try:
             history = filtered(filter_of(s, joint, joint.start(float(first.t[0]))), first)
@@ -137,6 +148,24 @@ def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
         if history.broken:
             return s
         return replace(s, parameters=begun_again(s.parameters, s.form, joint, history))
+
+
+def _wandering(s: Setup, archive: Archive, share: float) -> Setup:
+    """With the random walk of the parameters for which the beginning of the record is likeliest.
+
+    Parameters whose walk is declared keep it.
+    """
+    first, names = _learnt_from(s), [name for name in s.asked if name not in s.options.walk]
+
+    def walking(size: float) -> Setup:
+        return replace(s, parameters=wandering(s.parameters, names, size))
+
+    return walking(largest_wandering(lambda size: _log_likelihood(walking(size), archive, share, first)))
+
+
+def _learnt_from(s: Setup) -> Samples:
+    """The beginning of the record, from which a filter with an open form learns where to begin."""
+    return s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + LEARNT)))
 
 
 def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
@@ -157,16 +186,19 @@ def request(o: Options, noise: Array, dt: float, u: Array) -> Request:
 def _noise_share(s: Setup, archive: Archive) -> float:
     """By maximum likelihood over the first samples."""
     first = s.samples.first(LEARNT_FROM)
+    return likeliest(lambda part: _log_likelihood(s, archive, part, first))
 
-    def log_likelihood(part: float) -> float:
-        with s.joint(archive, part) as joint:
-            try:
-                found = filtered(filter_of(s, joint, joint.start(float(first.t[0]))), first)
-            except Diverged:
-                return -np.inf
-            return -np.inf if found.broken else found.log_likelihood
 
-    return likeliest(log_likelihood)
+def _log_likelihood(s: Setup, archive: Archive, share: float, samples: Samples) -> float:
+    """Of samples, by the filter of a setup with this share of the states' motion as noise; -inf if it
+    diverges.
+    """
+    with s.joint(archive, share) as joint:
+        try:
+            found = filtered(filter_of(s, joint, joint.start(float(samples.t[0]))), samples)
+        except Diverged:
+            return -np.inf
+        return -np.inf if found.broken else found.log_likelihood
 
 
 def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:

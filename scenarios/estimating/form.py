@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -19,6 +19,8 @@ from scenarios.experiment.experiment import Experiment
 
 LEARNT = 30.0  # s of the record from which a second run of the filter takes its start values
 WIDER = 10.0  # times the standard errors of the first run: start deviation of the second
+WANDERINGS = 0.01, 0.03, 0.1, 0.3  # start deviations in a second: walks that are compared
+REJECTED = 1.92  # log units below the largest likelihood: half of 3.84, for one unknown with 95 %
 INSIDE = 0.02  # share of the width between the bounds that a start value keeps from them
 
 
@@ -77,6 +79,30 @@ def moved(p: UnknownParameter, value: float, std: float) -> UnknownParameter:
 
 def _inside(low: float, high: float) -> tuple[float, float]:
     return low + INSIDE * (high - low), high - INSIDE * (high - low)
+
+
+def wandering(
+    parameters: Sequence[UnknownParameter], names: Sequence[str], size: float
+) -> tuple[UnknownParameter, ...]:
+    """The parameters, the named ones with a random walk of this size, in start deviations in a second.
+
+    What the form of a model leaves open differs from one motion to another. The constants that fit best then
+    change along the record, and a filter that holds them constant knows their mean too well. Some walk is
+    always allowed, for with none the errors shrink without end, below what any form is accurate to.
+    """
+    return tuple(replace(p, walk=size * p.std) if p.name in names else p for p in parameters)
+
+
+def largest_wandering(log_likelihood: Callable[[float], float]) -> float:
+    """The size of the largest random walk that a record does not reject; see `wandering`.
+
+    Among walks that the record cannot tell apart, a smaller one than the true one makes the filter too sure,
+    while a larger one only costs some information. log_likelihood: function of that size for a filter with
+    that walk; -inf if the filter diverges.
+    """
+    found = {size: value for size in WANDERINGS if (value := log_likelihood(size)) > -np.inf}
+    best = max(found.values(), default=0.0)
+    return max((size for size, value in found.items() if value >= best - REJECTED), default=0.0)
 
 
 def consistent(h: History) -> bool:

@@ -15,7 +15,7 @@ from estimator.filters.unknown_input import Shaped
 from fmus.model import declared
 from fmus.models import model_class
 from scenarios.estimating.form import LEARNT as FORM_LEARNT
-from scenarios.estimating.form import moved
+from scenarios.estimating.form import largest_wandering, moved
 from scenarios.literature.case import Record
 from scenarios.literature.following import Followed, follow
 
@@ -72,14 +72,20 @@ class Task:
         return replace(best, std=wider, seconds=sum(f.seconds for f in found))
 
     def _of_scales(self, record: Record) -> Followed:
-        """With the scales of the form unknown; a first run over the first seconds finds where they start.
+        """With the scales of the form unknown; the first seconds tell where they start, and how far the
+        parameter wanders.
 
         A filter that begins with wide uncertainties becomes surer than its linearisation allows.
         """
-        scales = scales_of_form()
-        first = self.known(_first(record, FORM_LEARNT), scales)
+        scales, beginning = scales_of_form(), _first(record, FORM_LEARNT)
+        first = self.known(beginning, scales)
         again = [moved(p, *(float(x[p.name][-1]) for x in (first.value, first.std))) for p in scales]
-        return self.known(record, again)
+        size = largest_wandering(lambda size: self._walking(size).known(beginning, again).log_likelihood)
+        return self._walking(size).known(record, again)
+
+    def _walking(self, size: float) -> "Task":
+        """With a random walk of the parameter of this size, in start deviations in a second."""
+        return replace(self, parameter=replace(self.parameter, walk=size * self.parameter.std))
 
     def along(self, record: Record, shape: Shaped) -> Followed:
         """Run the filter on the outputs alone, with the alignment estimated as well."""

@@ -223,13 +223,15 @@ def test_friction_is_found_from_the_outputs_alone_and_the_alignment_with_it():
 
 
 @pytest.mark.slow
-def test_with_its_form_open_friction_is_found_on_another_contact():
-    case = case_of("friction_ukf", "dry", duration=40.0)
+@pytest.mark.parametrize("condition", ["dry", "wet"])
+def test_with_its_form_open_friction_is_found_on_another_contact(condition):
+    case = case_of("friction_ukf", condition, duration=40.0)
     record = truth(case, OTHER)
     task = friction.task(case, fmu_of("friction_ukf"))
     right, opened = task.known(record), task.with_form(record)
     true = case.truth("mu0", record.t)
-    assert covered(right, "mu0", true, 2.0) < 0.01  # its form is taken for right
+    assert covered(right, "mu0", true, 2.0) < 0.5  # its form is taken for right
+    assert covered(opened, "mu0", true, 2.0) > 0.9
     assert rmse(opened.value["mu0"], true) < 0.5 * rmse(right.value["mu0"], true)
     assert opened.nis == pytest.approx(4.0, abs=0.1)
 
