@@ -19,7 +19,7 @@ from scenarios.experiment.experiment import Experiment
 
 LEARNT = 30.0  # s of the record from which a second run of the filter takes its start values
 WIDER = 10.0  # times the standard errors of the first run: start deviation of the second
-WANDERINGS = 0.01, 0.03, 0.1, 0.3  # start deviations in a second: walks that are compared
+WANDERINGS = 0.03, 0.1, 0.3  # start deviations in a second: walks that are compared
 REJECTED = 1.92  # log units below the largest likelihood: half of 3.84, for one unknown with 95 %
 INSIDE = 0.02  # share of the width between the bounds that a start value keeps from them
 

@@ -84,8 +84,9 @@ class Task:
         return self._walking(size).known(record, again)
 
     def _walking(self, size: float) -> "Task":
-        """With a random walk of the parameter of this size, in start deviations in a second."""
-        return replace(self, parameter=replace(self.parameter, walk=size * self.parameter.std))
+        """With a random walk of the parameter of this size or its own, in start deviations in a second."""
+        p = self.parameter
+        return replace(self, parameter=replace(p, walk=max(p.walk, size * p.std)))
 
     def along(self, record: Record, shape: Shaped) -> Followed:
         """Run the filter on the outputs alone, with the alignment estimated as well."""
