@@ -12,6 +12,7 @@ from scenarios.closing.result import Result
 
 FOLDER = Path(__file__).parent
 SEED, COUNT = 20, 24  # of the challenge that the records are from
+ROUNDED = 1e-3  # relative; a standard error differed by 1.5e-4 between processors with and without AVX-512
 CHALLENGE = (7, 12, 15, 20)  # a sensor's fault, a class of two, an effect, and nothing
 
 
@@ -46,7 +47,7 @@ def read(name: str) -> dict[str, Any]:
 
 
 def alike(found: Any, kept: Any, at: str = "") -> None:
-    """Assert that what was found is what was kept, but for what other compilers and libraries round."""
+    """Assert that what was found is what was kept, but for what other compilers and processors round."""
     if isinstance(kept, dict):
         assert found.keys() == kept.keys(), at
         for key in kept:
@@ -56,6 +57,6 @@ def alike(found: Any, kept: Any, at: str = "") -> None:
         for i, (a, b) in enumerate(zip(found, kept, strict=True)):
             alike(a, b, f"{at}[{i}]")
     elif isinstance(kept, float):
-        assert found == pytest.approx(kept, rel=1e-4, abs=1e-9), at
+        assert found == pytest.approx(kept, rel=ROUNDED, abs=1e-9), at
     else:
         assert found == kept, at
