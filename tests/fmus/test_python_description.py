@@ -17,10 +17,15 @@ from numpy.testing import assert_allclose
 import fmus
 from fmus.drive.model import Drive
 from fmus.export.builders.native.build import build_native
+from fmus.export.builders.native.table import table
 from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container.coupled import build_coupled
 from fmus.host.archive import problems
+from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
-from fmus.model import Model
+from fmus.host.master.connections import Connection
+from fmus.host.master.master import Master
+from fmus.model import Model, equations
 from fmus.models import MODELS
 from fmus.units import base_exponents
 from fmus.variables import (
@@ -114,6 +119,43 @@ def test_description_offers_what_the_build_does(built, name):
         assert "documentation/index.html" in packed.namelist()
         page = packed.read("documentation/index.html").decode()
     assert all(f"<code>{v.get('name')}</code>" in page for v in root.iter("ScalarVariable"))
+
+
+@every_model
+def test_dependencies_are_those_of_the_native_build(built, name):
+    """Of an output on the inputs alone at a communication point, and on all that can be set at the start."""
+    model, structure = MODELS[name](), xml_of(built(name)).find("ModelStructure")
+    known = table(model, equations(model))
+    inputs = range(known.sizes[0], sum(known.sizes[:2]))
+    computed = range(sum(known.sizes[:3]), sum(known.sizes))
+    for kind, unknowns, among in (
+        ("Outputs", known.outputs, inputs),
+        ("InitialUnknowns", [u for u in known.initial if u.reference in computed], range(computed.start)),
+    ):
+        found = {
+            int(n.get("index")) - 1: [int(i) - 1 for i in n.get("dependencies").split()]
+            for n in structure.findall(f"{kind}/Unknown")
+        }
+        assert found == {u.reference: [i for i in u.depends_on if i in among] for u in unknowns}
+    assert structure.findall("Outputs/Unknown")
+
+
+def test_rigs_in_a_ring_are_no_algebraic_loop(built):
+    """A rig's asynchronous motor follows the supply, not the torque that the other rig sets."""
+    links = [Connection("a.T_A", "b.T_P"), Connection("b.T_A", "a.T_P")]
+    rigs = {name: built("testrig") for name in "ab"}
+    with Master(rigs, links, step=1e-3, record=["a.omega_w", "b.T_A"]) as master:
+        data = master.run(0.01).data
+    assert np.isfinite(data.to_numpy()).all()
+    assert np.ptp(data["a.omega_w"].to_numpy()) > 0
+
+
+def test_an_fmu_that_carries_another_leaves_open_on_what_its_outputs_depend(built, tmp_path):
+    """Nothing stated means all inputs: the laws read what the carried FMU gives."""
+    ports = (PortNames("port", "F_ext", "q_dot", "q"),)
+    path = build_coupled(built("drive"), ports, [("viscous_damping", "port")], tmp_path / "carrying.fmu")
+    assert not any("dependencies" in node.attrib for node in xml_of(path).iter("Unknown"))
+    assert problems(path) == []
 
 
 class Decay(Model):

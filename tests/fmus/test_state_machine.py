@@ -1,11 +1,7 @@
 """Our hosts make no call that FMI's state machine forbids, tried on an FMU that allows nothing else."""
 
 import shutil
-import subprocess
-import zipfile
-from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
@@ -23,9 +19,10 @@ from fmus.host.grading.bench import Bench
 from fmus.host.grading.trials import TRIALS
 from fmus.host.master.connections import Connection
 from fmus.host.master.master import Master
+from tests.helpers.packed_fmu import FOLDER, build_packed
 
-SOURCE = Path(__file__).parents[1] / "helpers" / "c" / "strict_fmi2.c"
-DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+DESCRIPTIONS = {
+    2: """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Strict" guid="{strict}" variableNamingConvention="flat">
   <CoSimulation modelIdentifier="strict" canHandleVariableCommunicationStepSize="true"
     canGetAndSetFMUstate="true" canSerializeFMUstate="true"/>
@@ -43,24 +40,37 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
     <InitialUnknowns><Unknown index="4"/></InitialUnknowns>
   </ModelStructure>
 </fmiModelDescription>
-"""
+""",
+    3: """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="Strict" instantiationToken="{strict}">
+  <CoSimulation modelIdentifier="strict" canHandleVariableCommunicationStepSize="true"
+    canGetAndSetFMUState="true" canSerializeFMUState="true"/>
+  <DefaultExperiment startTime="0" stopTime="1" stepSize="0.01"/>
+  <ModelVariables>
+    <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+    <Float64 name="x" valueReference="1" causality="output" initial="exact" start="1"/>
+    <Float64 name="u" valueReference="2" causality="input" start="0"/>
+    <Float64 name="p" valueReference="3" causality="parameter" variability="tunable" start="0.5"/>
+    <Float64 name="y" valueReference="4" causality="output"/>
+  </ModelVariables>
+  <ModelStructure>
+    <Output valueReference="1"/><Output valueReference="4"/>
+    <InitialUnknown valueReference="4"/>
+  </ModelStructure>
+</fmiModelDescription>
+""",
+}
 T = np.arange(6) * 0.01
 
 
-@pytest.fixture(scope="module")
-def strict(tmp_path_factory):
+@pytest.fixture(scope="module", params=DESCRIPTIONS, ids=lambda fmi: f"fmi{fmi}")
+def strict(request, tmp_path_factory):
     compiler = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
     if compiler is None:
         pytest.skip("no C compiler")
-    folder = tmp_path_factory.mktemp("strict")
-    library = folder / f"strict{fmpy.sharedLibraryExtension}"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-I", headers]
-    subprocess.run([compiler, *flags, SOURCE, "-o", library, "-lm"], check=True)
-    with zipfile.ZipFile(folder / "strict.fmu", "w") as packed:
-        packed.writestr("modelDescription.xml", DESCRIPTION)
-        packed.write(library, f"binaries/{fmpy.platform}/{library.name}")
-    return folder / "strict.fmu"
+    source = FOLDER / f"strict_fmi{request.param}.c"
+    path = tmp_path_factory.mktemp("strict") / "strict.fmu"
+    return build_packed(compiler, source, DESCRIPTIONS[request.param], path)
 
 
 @pytest.fixture
@@ -72,16 +82,16 @@ def breaches(tmp_path, monkeypatch):
 
 
 def test_the_strict_fmu_is_strict(strict, breaches):
-    with Fmu(strict) as fmu:
-        slave = fmu.instance._slave
-        for call in (slave.reset, slave.exitInitializationMode, lambda: slave.getReal([0])):
+    expected = []
+    for name in ("reset", "exitInitializationMode", "get"):
+        with Fmu(strict) as fmu:
+            three = fmu.instance.FMI3
+            name = {"get": "getFloat64" if three else "getReal"}.get(name, name)
+            arguments = [[1]] if name.startswith("get") else []
             with pytest.raises(FMICallException):
-                call()
-        assert [line.partition(":")[0] for line in breaches()] == [
-            "fmi2Reset",
-            "fmi2ExitInitializationMode",
-            "fmi2GetReal",
-        ]
+                getattr(fmu.instance._slave, name)(*arguments)
+            expected.append(f"fmi{3 if three else 2}{name[0].upper()}{name[1:]}")
+    assert [line.partition(":")[0] for line in breaches()] == expected
 
 
 def test_one_fmu_from_its_start_to_its_end(strict, breaches, monkeypatch):

@@ -93,6 +93,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         """Make the step, or leave the state as it was and answer False."""
         raise RuntimeError("a build defines this")
 
+    def needed(self) -> list[list[int]] | None:
+        """For each output, what it is computed from, by place in the description; None where nobody knows."""
+        return None
+
     def fail(self, reason: str) -> None:
         """Log a reason; the instance refuses to step until it is reset or restored."""
         self.failure = reason
@@ -207,11 +211,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         root.insert(place, units_xml())
         for node, v in zip(root.iter("ScalarVariable"), VARIABLES, strict=True):
             complete(node, v)
+        structure = root.findall("ModelStructure")[0]
         computed = range(SETTABLE, len(VARIABLES))
         if computed:
-            unknowns = SubElement(root.findall("ModelStructure")[0], "InitialUnknowns")
+            unknowns = SubElement(structure, "InitialUnknowns")
             for i in computed:
                 SubElement(unknowns, "Unknown", index=str(i + 1))
+        needed = self.needed()
+        if needed is not None:
+            state_dependencies(structure, needed)
         return root
 
 
@@ -234,6 +242,19 @@ def complete(node: Element, v: dict[str, Any]) -> None:
     for key in ("min", "max", "nominal", "start"):
         if v[key] is not None and (key != "start" or v["starts"]):
             real.set(key, repr(float(v[key])))
+
+
+def state_dependencies(structure: Element, needed: list[list[int]]) -> None:
+    """Write into <ModelStructure> what each output depends on: at a communication point the inputs alone.
+
+    A state is none of them: it is free at the start and its value is kept.
+    """
+    inputs = range(SIZES[0], SIZES[0] + SIZES[1])
+    for kind, known in (("Outputs", inputs), ("InitialUnknowns", range(SETTABLE))):
+        for unknown in structure.findall(f"{kind}/Unknown"):
+            place = int(unknown.attrib["index"]) - 1
+            of = needed[place - SETTABLE] if place >= SETTABLE else []
+            unknown.set("dependencies", " ".join(str(i + 1) for i in of if i in known))
 
 
 def units_xml() -> Element:

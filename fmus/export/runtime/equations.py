@@ -51,6 +51,11 @@ class Equations:
         entry = self._entries[name]
         return entry.given, entry.found
 
+    def needed(self, name: str) -> list[list[int]] | None:
+        """For each number that a function gives, which of those that it takes are in it; see Entry.needed."""
+        found: list[list[int]] | None = self._entries[name].needed()
+        return found
+
     def on_memory(self, name: str, arguments: Sequence[Any], results: Sequence[Any]) -> Callable[[], None]:
         """A call of a function that reads and writes memory of doubles, which it keeps."""
         call: Callable[[], None] = self._entries[name].on_memory(arguments, results)
@@ -79,6 +84,10 @@ class Entry:
                 first += len(part)
 
         return call
+
+    def needed(self) -> list[list[int]] | None:
+        """None: only CasADi knows what is in a result, and it is there where FMUs are built."""
+        return None
 
 
 def _entries(code: Any) -> dict[str, Entry]:

@@ -43,6 +43,10 @@ class Slave(common.Slave):
         if hasattr(self, "compute"):
             IDLE.append((self.values, self.stepper, self.compute))
 
+    def needed(self) -> list[list[int]] | None:
+        """For each output, the states, inputs and parameters in it."""
+        return EQUATIONS.needed("outputs")
+
     def refresh(self) -> None:
         """Compute the outputs from states, inputs and parameters."""
         self.compute()

@@ -72,6 +72,18 @@ class Entry:
         """See Equations.on_memory."""
         return on_memory(self.function, arguments, results)
 
+    def needed(self) -> list[list[int]] | None:
+        """For each number of the results, those of the arguments that are in it, both counted through."""
+        found: list[list[int]] = []
+        for result, size in enumerate(self.found):
+            part: list[list[int]] = [[] for _ in range(size)]
+            for argument, first in enumerate(accumulate(self.given[:-1], initial=0)):
+                there = self.function.jac_sparsity(result, argument).get_triplet()
+                for row, column in zip(*there, strict=True):
+                    part[row].append(first + column)
+            found += part
+        return found
+
 
 def kept(function: cs.Function) -> cs.Function:
     """The function, which is never destroyed.
