@@ -11,10 +11,10 @@ import numpy as np
 from estimator.filters.algebra import (
     factorise,
     finite,
-    match,
     there,
     weigh,
 )
+from estimator.filters.matching import matched
 from estimator.record import Array, BoolArray
 
 Covariance = Array | Callable[[float], Array]  # constant, or a function of the step length [s]
@@ -105,10 +105,11 @@ class Adaptation:
 class Adapted:
     """The internal state of the gate and the adaptation."""
 
-    scatter: Array  # (m,) mean square of the innovations
+    scatter: Array  # (m,) mean square of the innovations over their predicted variances
     R: Array  # (m,) ratios of the variances to the declared ones
     Q: float  # factor of the process noise
     rejected: Array  # (m,) number of successive samples that were gated
+    counts: Array  # (m,) number of samples that changed the ratios
 
 
 # fields of an Estimate: innovation, S, used, gated, log_likelihood, nis
@@ -139,7 +140,7 @@ class Filter(ABC):
         self._deviations, self._patience = (float(gate.deviations), gate.patience) if gate else (inf, 0)
         self._L, self._factored = np.empty((len(system.names),) * 2), NONE
         m = len(self.R)
-        self._memory: Adapted = start.memory or Adapted(np.full(m, np.nan), np.ones(m), 1.0, np.zeros(m))
+        self._memory: Adapted = start.memory or _unadapted(m)
         self.factored(start.x, start.P, start.t)
 
     def factored(self, x: Array, P: Array, t: float) -> Array:
@@ -219,13 +220,19 @@ class Filter(ABC):
         return Q * self._memory.Q if self.adapt and self.adapt.process else Q
 
     def _adapt(self, a: Adaptation, innovation: Array, S: Array, R: Array, used: BoolArray) -> None:
-        """Covariance matching: scatter of the innovations beyond that of the predicted outputs is noise."""
+        """What the innovations scatter more than is predicted raises the noise, and less lowers it."""
         m, share = self._memory, 1 / a.samples
-        scatter, r, q = m.scatter.copy(), m.R.copy(), m.Q
-        excess = match(innovation, S, R, self.R, used, share, a.limits, scatter, r)
+        scatter, r, q, counts = m.scatter.copy(), m.R.copy(), m.Q, m.counts.copy()
+        excess = matched(innovation, S, R, used, share, scatter, r, counts)
         if a.process:
             q = float(np.clip(q * (1 + share * (excess - 1)), *a.limits))
-        self._memory = Adapted(scatter, r if a.measurement else m.R, q, m.rejected)
+        r = np.clip(r, *a.limits) if a.measurement else m.R
+        self._memory = Adapted(scatter, r, q, m.rejected, counts)
+
+
+def _unadapted(m: int) -> Adapted:
+    """The state at the start, for m channels."""
+    return Adapted(np.ones(m), np.ones(m), 1.0, np.zeros(m), np.zeros(m))
 
 
 def checked(x: Array, P: Array, names: Sequence[str], t: float) -> Array:

@@ -24,6 +24,7 @@ class Case:
     true: parameters that differ from the declared ones; later: new values of parameters that jump at `when`
     in s; further: jumps after that one.
     judged: outputs whose true values the record must also contain, as NAME_true.
+    resolution: of all sensors, to which they round what they measure; 0 rounds nothing.
     lead: time in s for which the model has run before the record begins; 0 for a start from rest.
     speed: m/s, or on the rig Hz of the supply. All else, such as the track, is chosen by the truth model.
     """
@@ -41,6 +42,7 @@ class Case:
     further: tuple[tuple[float, Mapping[str, float]], ...] = ()
     judged: tuple[str, ...] = ()
     lead: float = 0.0  # s
+    resolution: float = 0.0
     seed: int = 1
 
     @property
@@ -58,6 +60,11 @@ class Case:
     def times(self) -> Array:
         """Times of the samples (N,), s."""
         return np.arange(round(self.duration / self.dt) + 1, dtype=np.float64) * self.dt
+
+    def sensed(self, name: str, true: Array, rng: np.random.Generator) -> Array:
+        """What the sensor of an output makes of its true values (N,): with noise, and rounded."""
+        seen: Array = true + rng.normal(0.0, self.noise[name], len(true))
+        return np.round(seen / self.resolution) * self.resolution if self.resolution else seen
 
     def truth(self, name: str, t: Array) -> Array:
         """A true parameter at times t (N,)."""

@@ -1,7 +1,7 @@
 """Wheelset of Mal et al. 2020 on its cone (eq. 3 to 13, Table 1): lateral and yaw motion, a yaw spring alone.
 
-The print holds no readable equations. These follow from its text, its symbols and its Table 1. The axes are
-those of ISO 8855: x forward, y left; the left wheel has the upper sign.
+Its equations are pictures that were not at hand. These follow from its text, its symbols and its Table 1. The
+axes are those of ISO 8855: x forward, y left; the left wheel has the upper sign.
 """
 
 from collections.abc import Mapping

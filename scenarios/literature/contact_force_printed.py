@@ -126,8 +126,8 @@ def judged(case: Case, way: str, t: Array, seen: Seen, true: Seen, reason: str) 
 
 
 NOTES = (
-    "The print holds no readable equations. The five states, the Euler steps of 50 us, R and Q are as "
-    "printed; the rates of creep, friction and force are those of its eq. 6, 9 and 8 by the chain rule.",
+    "The source's equations are pictures that were not at hand. The five states, the Euler steps of 50 us, R "
+    "and Q are as printed; the rates of creep, friction and force are its eq. 6, 9 and 8 by the chain rule.",
     "It prints no speed, no patch, no start covariance, and not whether its filter is told the alignment.",
     "All know A, B, k_A and k_S of the first condition; the printed one knows mu0 too, ours estimates it.",
 )

@@ -1,8 +1,9 @@
 """The extended Kalman filter of Mal et al. 2020 with creep, friction and force as states (eq. 18 to 36).
 
-The print holds no readable equations. What its text says is kept: the five states lateral velocity, yaw rate,
-creep, friction coefficient and creep force; equal creep on both wheels (eq. 19); forward Euler steps of
-50 us (eq. 25 to 29); accelerometer and gyro; the Jacobian matrices (eq. 35 and 36); R and Q (eq. 37 to 40).
+Its equations are pictures that were not at hand. What its text says is kept: the five states lateral
+velocity, yaw rate, creep, friction coefficient and creep force; equal creep on both wheels (eq. 19); forward
+Euler steps of 50 us (eq. 25 to 29); accelerometer and gyro; the Jacobian matrices (eq. 35 and 36); R and Q
+(eq. 37 to 40).
 The rates of creep, friction and force (eq. 22 to 24) are those of its eq. 6, 9 and 8 by the chain rule.
 """
 

@@ -119,7 +119,7 @@ def _error(case: Case, t: Array, mu0: Array) -> float:
 
 NOTES = (
     "The source names both and prints neither: no window, no rule by which noise adapts, no result.",
-    "The adaptation is that of estimate: scatter of the innovations beyond the predicted one is noise.",
+    "The adaptation is that of estimate: innovations that scatter more than predicted raise the noise.",
     "As printed, with Q per second. At the step all Polach parameters change, which no filter knows.",
 )
 

@@ -55,7 +55,7 @@ def twin(fmu: Path) -> Source:
                 found.append(y[min(i, 1) :])
                 start |= dict(zip(states, y[-1, -len(states) :].tolist(), strict=True))
         y = np.vstack(found)
-        seen = {n: y[:, i] + rng.normal(0.0, std, len(t)) for i, (n, std) in enumerate(case.noise.items())}
+        seen = {n: case.sensed(n, y[:, i], rng) for i, n in enumerate(case.noise)}
         at = len(case.noise)
         true = {n + TRUE: y[:, at + i] for i, n in enumerate(case.judged)}
         return Record({TIME: t, **inputs, **seen, **true})

@@ -1,4 +1,4 @@
-"""The page on the sources: every item has a status, what proves it or why it is missing, and is counted."""
+"""The page on the sources: every item has a status, a proof that runs or a reason, and is counted."""
 
 import re
 from collections import Counter
@@ -22,8 +22,13 @@ def test_an_item_has_a_proof_or_a_reason(item):
     assert status in ("full", "partly", "absent")
     assert bool(proof) == (status != "absent")
     assert bool(missing) == (status != "full")
-    named = set(re.findall(r"`railfmi row (\w+)`", proof))
-    assert named <= set(ROWS)
+    rows = set(re.findall(r"`railfmi row (\w+)`", proof))
+    assert rows <= set(ROWS)
+    files = re.findall(r"`([\w/]+\.\w+)`", proof)
+    assert all((ROOT / file).is_file() for file in files)
+    if status == "full":
+        run = [f for f in files if re.fullmatch(r"tests/(\w+/)*test_\w+\.py|scenarios/shipped/\w+\.toml", f)]
+        assert rows or run
 
 
 def test_the_count_is_that_of_the_tables():

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from estimator.filters import algebra
+from estimator.filters import algebra, matching
 from estimator.filters.consistency import mean_band, squares
 from estimator.filters.dual import Dual
 from estimator.filters.ekf import Ekf
@@ -262,6 +262,27 @@ def test_noise_that_was_declared_wrong_is_found():
     assert pytest.approx(25.0, rel=0.4) == right.now.memory.Q
 
 
+@pytest.mark.parametrize("process", [False, True])
+def test_what_is_not_known_at_the_start_is_not_taken_for_noise(process):
+    rng = np.random.default_rng(10)
+    made, start, Q, R = system(rng)
+    _, u, Y = record(made, start, Q, R, rng, n=200)
+    unsure = Estimate(0.0, start.x, 1e4 * start.P)
+    adapt = Adaptation(samples=500.0, measurement=not process, process=process)
+    for found in run(Ukf(made, unsure, Q, R, DT, adapt=adapt), u, Y):
+        assert_allclose([*found.memory.R, found.memory.Q], 1.0, atol=0.7)  # 0.16 is a standard deviation
+
+
+def test_an_outlier_is_not_taken_for_noise():
+    rng = np.random.default_rng(11)
+    made, start, Q, R = system(rng)
+    _, u, Y = record(made, start, Q, R, rng, n=400)
+    Y[200, 0] += 1e3 * np.sqrt(R[0, 0])
+    found = run(Ukf(made, start, Q, R, DT, adapt=Adaptation(samples=500.0)), u, Y)
+    assert found[200].memory.R[0] < 2.5
+    assert_allclose(found[199].memory.R, 1.0, atol=0.4)
+
+
 def test_least_squares_are_least_squares():
     rng = np.random.default_rng(8)
     phi, theta = rng.standard_normal((400, 1, 2)), np.array([1.5, -0.7])
@@ -371,8 +392,9 @@ def test_compiled_and_plain_algebra_agree():
         "weigh": (*weighed[0], np.inf, 0, *weighed[1]),
         "weigh with a gate": (*weighed[0], 0.9, 2, *weighed[1]),
         "match": (Y[0], S, 0.1 * S, 0.2 * S, one, 0.1, (0.5, 2.0), np.array([np.nan, 1.0]), np.ones(2)),
+        "matched": (Y[0], S, 0.1 * S, one, 0.01, np.ones(2), np.ones(2), np.ones(2)),
     }.items():  # fmt: skip
-        function = getattr(algebra, name.split(" ")[0])
+        function = getattr(matching if name == "matched" else algebra, name.split(" ")[0])
         for a, b in zip(_made(function, arguments), _made(function.py_func, arguments), strict=True):
             assert_allclose(a, b, rtol=1e-12, atol=1e-13)
 

@@ -57,7 +57,7 @@ def truth(case: Case, form: Form = SAME) -> Record:
 
 def noisy(case: Case, true: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
     """What the sensors of a case make of true outputs."""
-    return {n: true[n] + rng.normal(0.0, std, len(true[n])) for n, std in case.noise.items()}
+    return {n: case.sensed(n, true[n], rng) for n in case.noise}
 
 
 def of_wheelset(case: Case, form: Form = SAME) -> Record:
@@ -91,8 +91,9 @@ def of_rig(case: Case) -> Record:
         for i, share in enumerate((0.5, -0.5, 1.0, 0.7))
     )
     inputs = Inputs(t, np.asarray(torque), np.full_like(t, case.speed))
-    parameters = replace(rig.Rig(), **WRONG_PATCH, **dict(case.true))
-    omega_w, omega_r = rig.simulate(inputs, parameters)
+    true = dict(case.true)
+    acting = replace(inputs, T_P=inputs.T_P - true.pop("T_w_ext", 0.0))  # braking is positive
+    omega_w, omega_r = rig.simulate(acting, replace(rig.Rig(), **WRONG_PATCH, **true))
     seen = noisy(case, {"omega_w": omega_w, "omega_r": omega_r}, rng)
     return Record({TIME: t, "T_P": inputs.T_P, "f_sync": inputs.f_sync, **seen})
 

@@ -178,9 +178,13 @@ def test_wrong_input_is_one_line(tmp_path, capsys, given, words):
     assert not out.exists()
 
 
-def test_a_table_without_its_columns_is_refused(tmp_path):
-    (tmp_path / "WheelARailA_conicity.csv").write_text("amplitude_mm,conicity\n1.0,0.1\n")
-    with pytest.raises(BadInput, match="has no column 'low'"):
+@pytest.mark.parametrize(
+    ("table", "missing"),
+    [("amplitude_mm,conicity\n1.0,0.1\n", "low"), ("amplitude_mm,low,high\n1.0,0.1,0.2\n", "conicity")],
+)
+def test_a_table_without_its_columns_is_refused(tmp_path, table, missing):
+    (tmp_path / "WheelARailA_conicity.csv").write_text(table)
+    with pytest.raises(BadInput, match=f"has no column '{missing}'"):
         step_1(references(["A"])[0], tmp_path)
 
 

@@ -291,6 +291,18 @@ def test_the_radius_is_found_with_a_wrong_patch(start):
     assert rmse(found.value["r_w"][late], np.full(late.sum(), radius.TRUE)) < 1e-4
 
 
+def test_a_wrong_roller_makes_the_wheel_wrong_in_proportion_and_drag_and_rounding_do_not():
+    case = case_of("rolling_radius", "15 km/h, rough", duration=14.0)
+    record = truth(case)
+    steps = record.columns["omega_w"] / radius.RESOLUTION
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    found = radius.followed(record, case, radius.STARTS["from 320 mm"], fmu_of("rolling_radius"))
+    declared = 0.45215  # m, of the roller
+    wrong = radius.TRUE * declared / radius.ROUGH["r_r"]
+    assert wrong < radius.TRUE - 3e-4
+    assert rmse(found.value["r_w"][found.t > 1.0], wrong) < 1e-4
+
+
 def test_the_primary_springs_filter_finds_the_patch_as_its_source_does():
     """By virtual penetration, as the record has it; with Hertz's patch the record is far less likely."""
     case = case_of("primary_stiffness", "static", duration=4.0)
@@ -359,7 +371,7 @@ def test_the_profile_is_found_bin_by_bin_and_gauge_blurs_it():
     for name in ("alignment", "gauge too"):
         case = case_of("profile_rls", name, duration=16.0)
         outcome = profile.rebuilt([(case, truth(case))], fmu=None, tell=print)
-        alone = [f for f in outcome.findings if not f.what.startswith("gauge known")]
+        alone = [f for f in outcome.findings if f.what.startswith(profile.COMBINATIONS)]
         errors[name] = [f.ours for f in alone if "RMSE" in f.what]
     sums_of_radii, differences, _, angles = zip(*errors.values(), strict=True)
     for alone, blurred in (sums_of_radii, differences, angles):
@@ -376,6 +388,20 @@ def test_with_its_gauge_known_the_sum_of_the_radii_stays_in_the_region_and_that_
     assert share["r_L + r_R"] < 0.7
     assert share["gauge known, delta_L + delta_R"] < 0.5
     assert share["gauge known, r_L - r_R"] == share["gauge known, delta_L - delta_R"] == 1.0
+
+
+def test_the_regressors_as_printed_find_the_differences_and_lose_the_sums_by_the_gauge():
+    """With free coefficients the equations share no combination, so that the sums are less certain."""
+    true, errors = profile.geometry(), []
+    for name in ("alignment", "gauge too"):
+        found = profile.as_printed(truth(case_of("profile_rls", name, duration=16.0)))
+        used = np.abs(found.shift) <= profile.FLANGE
+        wanted = np.column_stack([np.interp(found.shift[used], true.shift, x) for x in true.value.T])
+        errors.append([rmse(a, b) / np.ptp(b) for a, b in zip(found.value[used].T, wanted.T, strict=True)])
+    alone, blurred = errors
+    assert max(alone[1], alone[3]) < 0.005
+    assert alone[0] < 0.5
+    assert blurred[0] > 5 * alone[0]
 
 
 def test_what_the_gauge_does_is_nothing_where_there_is_none():

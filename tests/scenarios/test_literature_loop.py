@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from fmus.contact import contact_table
-from scenarios.literature import ROWS
+from scenarios.literature import ROWS, run_row
 from scenarios.literature import conicity as cone
 from scenarios.literature import friction_tuning as tuning
 from scenarios.literature import friction_ukf as friction
@@ -206,6 +206,13 @@ def test_noise_that_is_declared_too_small_is_found_while_the_filter_runs():
     assert found[tuning.WRONG].nis > 50.0  # of 4
     assert found[tuning.WRONG_ADAPTIVE].nis < 15.0
     assert found[tuning.WRONG_ADAPTIVE].std["mu0"][-1] > 2 * found[tuning.WRONG].std["mu0"][-1]
+
+
+@pytest.mark.slow
+def test_noise_that_adapts_from_a_tenth_costs_next_to_nothing_in_the_whole_row(tmp_path):
+    outcome = run_row("friction_tuning", tmp_path, truth, native("wheelset"))
+    assert outcome.aimed == 3
+    assert outcome.ok
 
 
 def test_a_filter_without_adaptation_is_that_of_the_friction_row():

@@ -3,18 +3,22 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from fmus.contact import equivalent_conicity
 from scenarios.literature import ROWS, run_row
 from scenarios.literature import wear_library as wear
 from scenarios.literature.twin import twin
 from scenarios.track.statistics import CHOCEN_DOBRIKOV
 from tests.helpers.native import native
 from tests.helpers.rows import truth
+from tests.helpers.rows_bogie import HOLLOW
 from tests.truth.bogie import felt_behind
+from tests.truth.wheelset_contact import contacts
 from tests.truth.wheelset_track import random_alignment
 
 
@@ -69,6 +73,22 @@ def test_the_faster_run_is_over_the_same_places():
     assert there == pytest.approx(np.interp(10.0, t, track[:, 0]), abs=1e-6)
     slope = np.gradient(fast[:, 0], wear.DT)[: len(t) // 2]
     assert_allclose(slope, fast[: len(t) // 2, 1], atol=0.02 * np.abs(slope).max())
+
+
+def test_a_third_of_the_depth_is_not_a_third_of_the_way_to_the_worn_conicity():
+    """What docs/rows.md says of the missed target, by the truth's own contacts."""
+    amplitudes = np.array([1e-3, 1.5e-3, 2e-3])
+
+    def table(hollow):
+        c = contacts(hollow=HOLLOW * hollow)
+        radii = {"r_left": 0.46 + c.growth, "r_right": 0.46 + np.interp(-c.y, c.y, c.growth)}
+        return pd.DataFrame(radii, index=c.y)
+
+    new, third, worn = (table(share) for share in (0.0, 1 / 3, 1.0))
+    at = [np.asarray(equivalent_conicity(t, amplitudes)) for t in (new, third, worn, new + (worn - new) / 3)]
+    assert at[1][0] > 1.5 * max(at[0][0], at[2][0])
+    assert_allclose((at[1] - at[0])[1:] / (at[2] - at[0])[1:], [0.92, 0.51], atol=0.02)
+    assert_allclose(at[3] / at[1] - 1, [-0.43, -0.25, -0.11], atol=0.02)
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ RADIUS, SMALLER = 0.46, 0.459  # m, half of 920 and 918 mm
 REACH = 0.010  # m, of the shifts
 ABSOLUTE, SHARE = 0.05, 0.5  # of the tolerance
 SHIFTED = 1e-4  # m, by which an amplitude may be off in the extended window
-COLUMNS = {"dr": ("y_mm", "delta_r_mm"), "conicity": ("amplitude_mm", "low", "high")}
+COLUMNS = {"dr": ("y_mm", "delta_r_mm"), "conicity": ("amplitude_mm", "conicity", "low", "high")}
 
 
 @dataclass(frozen=True)
