@@ -25,7 +25,7 @@ PAGES = (
 LINK = re.compile(r"\]\(([^)#\s]+)")
 INTERFACE = """# Python interface
 
-What `import railfmi` offers. Everything is loaded on first use. The rooms behind these names, `fmus`,
+What `import railfmi` offers. Everything is loaded on first use. The packages behind these names, `fmus`,
 `estimator` and `scenarios`, are described in [CONTRIBUTING](CONTRIBUTING.md).
 
 """

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fmus.contact import contact_table, creep_forces, equivalent_conicity, hertz, kalker
     from fmus.errors import BadInput
-    from fmus.host.fmu import Fmu, FmuError
+    from fmus.host.fmu import FmuError
+    from railfmi.fmu import Fmu
     from scenarios.campaign.campaign import campaign
     from scenarios.closing.closing import close_loop
     from scenarios.closing.several import close_loops
+    from scenarios.comparing.comparing import compare
     from scenarios.estimating.estimating import estimate
     from scenarios.experiment.experiment import load_experiment
     from scenarios.fleet.fleet import fleet
@@ -21,17 +23,19 @@ if TYPE_CHECKING:
     from scenarios.preparing.inspecting import inspect
     from scenarios.preparing.trial import dry_run
     from scenarios.reporting.report import report
+    from scenarios.simulating.run import run
     from scenarios.watching.watching import watch
 
     __version__: str
 
 _HOMES = {
     "BadInput": "fmus.errors",
-    "Fmu": "fmus.host.fmu",
+    "Fmu": "railfmi.fmu",
     "FmuError": "fmus.host.fmu",
     "campaign": "scenarios.campaign.campaign",
     "close_loop": "scenarios.closing.closing",
     "close_loops": "scenarios.closing.several",
+    "compare": "scenarios.comparing.comparing",
     "contact_table": "fmus.contact",
     "creep_forces": "fmus.contact",
     "dry_run": "scenarios.preparing.trial",
@@ -45,13 +49,14 @@ _HOMES = {
     "load_experiment": "scenarios.experiment.experiment",
     "plan": "scenarios.planning.planning",
     "report": "scenarios.reporting.report",
+    "run": "scenarios.simulating.run",
     "watch": "scenarios.watching.watching",
 }
 
 __all__ = [
     "BadInput", "Fmu", "FmuError", "__version__", "campaign", "close_loop", "close_loops",
-    "contact_table", "creep_forces", "dry_run", "equivalent_conicity", "estimate", "fleet", "hertz",
-    "init", "inspect", "kalker", "load_experiment", "plan", "report", "watch",
+    "compare", "contact_table", "creep_forces", "dry_run", "equivalent_conicity", "estimate", "fleet",
+    "hertz", "init", "inspect", "kalker", "load_experiment", "plan", "report", "run", "watch",
 ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""`railfmi build`: FMUs of the models."""
+"""`railfmi build`: build FMUs of the models of railfmi, with or without effects."""
 
 from collections.abc import Callable
 from pathlib import Path

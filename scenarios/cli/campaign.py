@@ -1,4 +1,4 @@
-"""`railfmi campaign`: a scenario at many points, and what its results depend on."""
+"""`railfmi campaign`: simulate a scenario at many points, and say what its results depend on."""
 
 from pathlib import Path
 from typing import Annotated

@@ -14,6 +14,7 @@ from scenarios.cli.console import (
     RunLimit,
     Trust,
     app,
+    declared,
     interrupted,
     show,
     will_write,
@@ -57,6 +58,7 @@ def close_loop(
     from fmus.host.apart.isolation import Isolation
 
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
+    experiments = [declared(e) for e in experiments]
     if dry_run:
         _try(experiments, out, data, jobs, isolation)
         return
@@ -135,9 +137,12 @@ def _try(
     """Show for each experiment what a run would do."""
     from scenarios.preparing.trial import dry_run as tried
 
+    trials = []
     for experiment in experiments:
         with progress("simulating the record once"):
             folder = out if len(experiments) == 1 else out / experiment.stem
             trial = tried(experiment, folder, data, jobs, isolation)
+        trials.append({"experiment": experiment, **trial.result()})
         for line in trial.lines():
             echo(line)
+    found(trials[0] if len(trials) == 1 else trials)

@@ -1,4 +1,4 @@
-"""`railfmi compare`: the outputs of two FMUs for the same inputs and parameters."""
+"""`railfmi compare`: compare the outputs of two FMUs for the same inputs and parameters."""
 
 from pathlib import Path
 from typing import Annotated

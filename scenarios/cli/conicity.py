@@ -1,4 +1,4 @@
-"""`railfmi conicity`: the radius difference and the equivalent conicity of a wheel-rail pair by EN 15302."""
+"""`railfmi conicity`: radius difference and equivalent conicity of a wheel-rail pair by EN 15302."""
 
 import shlex
 import sys

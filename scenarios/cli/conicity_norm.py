@@ -1,4 +1,4 @@
-"""`railfmi conicity-norm`: the test of EN 15302 with exact profiles and measured points of its pairs."""
+"""`railfmi conicity-norm`: test the calculation of conicity by the reference pairs of EN 15302."""
 
 import shlex
 import sys
@@ -9,7 +9,7 @@ import typer
 
 from fmus import limits
 from scenarios.cli.console import RESULTS, Out, app, will_write
-from scenarios.cli.voice import echo, progress
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command("conicity-norm")
@@ -57,6 +57,7 @@ def conicity_norm(
     report = NormReport(exact, measured, instrument, reader or f"our own, smoothing {how}")
     with written_at_once(folder) as part:
         report.write(part, shlex.join(["railfmi", *sys.argv[1:]]))
+    found(report.result())
     for line in report.lines():
         echo(line)
     echo(f"page: {folder / 'norm.html'}")

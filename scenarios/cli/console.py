@@ -9,10 +9,12 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
+from fmus.errors import BadInput
 from scenarios.cli.supervision import INTERRUPTED, STOPPED
 from scenarios.cli.voice import VOICE, said
 from scenarios.output import replaced
 
+EXPERIMENT = "an experiment.toml; 'railfmi init MODEL.fmu RECORD' drafts one from an FMU and a record"
 LOUDNESS = {  # options of every command, by what they set
     "quiet": typer.Option("-q", "--quiet", help="say nothing but the answer and errors"),
     "verbose": typer.Option("-v", "--verbose", help="tell each step of the progress in a line of its own"),
@@ -74,6 +76,13 @@ def railfmi(
     ] = False,
 ) -> None:
     """Keeps one command that is loaded alone a command."""
+
+
+def declared(file: Path, what: str = EXPERIMENT) -> Path:
+    """A file of declarations; BadInput where it is a file of another kind, such as a record or an FMU."""
+    if file.is_file() and file.suffix.lower() != ".toml":
+        raise BadInput(f"{file}: is no file of TOML; give {what}")
+    return file
 
 
 def interrupted(sentence: str) -> typer.Exit:

@@ -1,4 +1,4 @@
-"""`railfmi estimate`: states, parameters and unknown inputs."""
+"""`railfmi estimate`: estimate states, parameters and unknown inputs of an FMU from a record."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +14,7 @@ from scenarios.cli.console import (
     RunLimit,
     Trust,
     app,
+    declared,
     show,
     will_write,
 )
@@ -39,7 +40,7 @@ def estimate(
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
     with progress("reading the experiment") as status:
-        result = filtered(experiment, out, data, tell=status.update, isolation=isolation, show=show)
+        result = filtered(declared(experiment), out, data, tell=status.update, isolation=isolation, show=show)
     found(result)
     for line in result.lines():
         echo(line)

@@ -7,7 +7,7 @@ import typer
 
 from fmus.errors import BadInput
 from scenarios.cli.console import RESULTS, app
-from scenarios.cli.voice import echo, progress
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command("export-ssp")
@@ -37,4 +37,5 @@ def export_scenario(
             platform or (),
             status.update,
         )
+    found(package)
     echo(package)

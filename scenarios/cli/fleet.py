@@ -1,4 +1,4 @@
-"""`railfmi fleet`: thousands of records of many vehicles, on many processes."""
+"""`railfmi fleet`: estimate and close the loop on thousands of records of many vehicles."""
 
 from pathlib import Path
 from typing import Annotated

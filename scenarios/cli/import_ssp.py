@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import RESULTS, Out, app
-from scenarios.cli.voice import echo, progress
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command("import-ssp")
@@ -18,4 +18,5 @@ def import_package(
 
     with progress("reading the package") as status:
         scenario = import_ssp(package, out, status.update)
+    found(scenario)
     echo(scenario)

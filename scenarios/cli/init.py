@@ -2,13 +2,14 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from scenarios.cli.console import Out, Trust, app
-from scenarios.cli.voice import echo
+from scenarios.cli.voice import echo, found, progress, rows_of
 
 
 @app.command("init")
@@ -33,7 +34,10 @@ def init(
     from scenarios.preparing.initialising import init as drafted
 
     asks = sys.stdin.isatty() and sys.stdout.isatty()
-    made = drafted(fmu, data, out, time, _ask if asks else None, force, None if trust_fmu else ISOLATED)
+    isolation = None if trust_fmu else ISOLATED
+    made = drafted(fmu, data, out, time, _ask if asks else None, force, isolation, progress)
+    ports = [asdict(port) for port in made.draft.ports]
+    found({"experiment": made.file, "variables": rows_of(made.to_frame()), "ports": ports})
     for line in made.lines():
         echo(line)
     echo(f"experiment: {made.file}; look at it, then: railfmi close-loop {made.file} --dry-run")

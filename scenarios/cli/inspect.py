@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import RESULTS, Out, app
-from scenarios.cli.voice import echo, progress
+from scenarios.cli.voice import echo, found, progress, rows_of
 
 
 @app.command("inspect")
@@ -19,6 +19,8 @@ def inspect(
     from scenarios.preparing.inspecting import inspect as looked_at
 
     with progress("reading the file"):
-        found = looked_at(file, out, time)
-    for line in found.lines():
+        seen = looked_at(file, out, time)
+    table = seen.to_frame()
+    found({"file": file, f"{table.index.name}s": rows_of(table)})
+    for line in seen.lines():
         echo(line)

@@ -1,4 +1,4 @@
-"""`railfmi plan`: what a record could tell apart, before it is taken."""
+"""`railfmi plan`: say what a record could tell apart, before it is taken."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +14,7 @@ from scenarios.cli.console import (
     RunLimit,
     Trust,
     app,
+    declared,
     show,
     will_write,
 )
@@ -43,7 +44,7 @@ def plan(
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
     with progress("reading the experiment") as status:
-        result = planned(experiment, out, data, status.update, show, isolation=isolation)
+        result = planned(declared(experiment), out, data, status.update, show, isolation=isolation)
     found(result)
     for line in table_of(result):
         echo(line)

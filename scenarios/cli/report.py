@@ -1,4 +1,4 @@
-"""`railfmi report`: all results of a folder on one page."""
+"""`railfmi report`: list all results of a folder on one page."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import app
-from scenarios.cli.voice import echo, found
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command()
@@ -21,7 +21,8 @@ def report(
     from scenarios.reporting.report import report as gathered
 
     where = folder if out is None else out
-    summary = gathered(folder, where)
+    with progress("reading the results"):
+        summary = gathered(folder, where)
     found(summary)
     for line in summary.lines():
         echo(line)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.console import RESULTS, Out, app, will_write
-from scenarios.cli.voice import echo, said
+from scenarios.cli.voice import echo, found, progress
 
 
 @app.command("row")
@@ -27,11 +27,14 @@ def rebuild(
     from scenarios.literature import ROWS, run_row
 
     if name is None:
+        found([{"name": row.name, "title": row.title, "source": row.source} for row in ROWS.values()])
         for row in ROWS.values():
             echo(f"{row.name:<22} {row.title} ({row.source})")
         return
     will_write(out)
-    outcome = run_row(name, out, records, cases=case, tell=lambda line: said.print(line, markup=False))
+    with progress(f"row {name}") as status:
+        outcome = run_row(name, out, records, cases=case, tell=status.update)
+    found(outcome.result())
     for miss in outcome.missed:
         echo(f"not met: {miss.case}: {miss.what} = {miss.ours:.4g}, target {miss.wanted}")
     echo(f"{outcome.met} of {outcome.aimed} targets met; table: {out / 'table.md'}")

@@ -14,6 +14,7 @@ from scenarios.cli.console import (
     RunLimit,
     Trust,
     app,
+    declared,
     interrupted,
     will_write,
 )
@@ -24,7 +25,9 @@ from scenarios.cli.voice import echo, found, progress
 def run_scenarios(
     scenarios: Annotated[list[Path], typer.Argument(help="scenario files; several get a contact sheet")],
     out: Out = RESULTS / "run",
-    watch: Annotated[bool, typer.Option("--watch", help="show the simulated time and its speed")] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="show the simulated time and its speed in the progress")
+    ] = False,
     trust_fmu: Trust = False,
     call_limit: CallLimit = limits.CALL,
     run_limit: RunLimit = limits.RUN,
@@ -34,24 +37,25 @@ def run_scenarios(
     from fmus.host.apart.isolation import Isolation
     from scenarios.simulating import Result, run_all
 
-    def done(result: Result) -> None:
-        held = sum(finding.holds for finding in result.expectations)
-        if result.interrupted_at is not None:
-            echo(f"{result.id}: interrupted at {result.interrupted_at:g} s; the recording up to then is kept")
-        else:
-            took = f"{result.wall_seconds:.1f} s"
-            echo(f"{result.id}: {held} of {len(result.expectations)} expectations met ({took})")
-        for name, ran in result.runs.items():
-            if ran.ended:
-                which = f" of variant '{name}'" if len(result.runs) > 1 else ""
-                echo(f"  the run{which} ended early: {ran.ended}")
-        for finding in result.failed:
-            echo(f"  not met: {finding.sentence}; {finding.because}")
+    finished: list[str] = []
 
+    def told(line: str) -> str:
+        """A line of progress; of several scenarios, without --watch, how many are done."""
+        if watch or len(scenarios) == 1:
+            return line
+        return f"scenarios, {len(finished)} of {len(scenarios)} are done; now {line.partition(',')[0]}"
+
+    def done(result: Result) -> None:
+        finished.append(result.id)
+        for line in result.lines():
+            echo(line)
+
+    for file in scenarios:
+        declared(file, "a scenario, such as scenarios/shipped/alignment_step.toml")
     will_write(out)
     with progress("reading the scenarios") as status:
         isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
-        results = run_all(scenarios, out, status.update if watch else (lambda _: None), done, isolation)
+        results = run_all(scenarios, out, lambda line: status.update(told(line)), done, isolation)
     found(results)
     echo(f"results: {out}")
     if any(r.interrupted_at is not None for r in results):

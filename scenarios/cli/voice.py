@@ -9,12 +9,15 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.text import Text
 
-COUNT = re.compile(r"(\d+) of (\d+)")
+if TYPE_CHECKING:
+    import pandas as pd
+
+COUNT = re.compile(r"(?<![\d.])(\d+(?:\.\d+)?) of (\d+(?:\.\d+)?)")
 PATIENCE = 2.0  # s, from which on progress is told
 INTERVAL = 10.0  # s, between two lines of progress where there is no terminal, at first;
 SHARE = 0.1  # later as a share of the time that has passed, since a log of hours is not read line by line
@@ -81,6 +84,11 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
+def rows_of(table: "pd.DataFrame") -> list[dict[str, Any]]:
+    """The rows of a table by the names of its columns and of its index, for --json."""
+    return [{str(name): x for name, x in row.items()} for row in table.reset_index().to_dict("records")]
+
+
 class Progress:
     """The step that a command is at, with its count, the elapsed and the expected time.
 
@@ -91,11 +99,11 @@ class Progress:
         self._clock = clock
         self._begin = self._since = clock()
         self._text = text
-        self._first = 0
+        self._first = 0.0
 
     def update(self, text: str) -> None:
         """The step has changed, or its count."""
-        if COUNT.sub("", text) != COUNT.sub("", self._text):
+        if step_of(text) != step_of(self._text):
             self._since = self._clock()
             self._first = _count(text)[0]
         self._text = text
@@ -115,10 +123,16 @@ class Progress:
         return f"{self._text} ({span(now - self._begin)}{left})"
 
 
-def _count(text: str) -> tuple[int, int]:
-    """The count in a text such as 'fitting, 3 of 40'; zeros without one."""
+def step_of(text: str) -> str:
+    """What a text of progress says before its count, which stays the same while the count rises."""
     counted = COUNT.search(text)
-    return (int(counted[1]), int(counted[2])) if counted else (0, 0)
+    return text[: counted.start()] if counted else text
+
+
+def _count(text: str) -> tuple[float, float]:
+    """The count in a text such as 'fitting, 3 of 40' or 'simulating, 2.50 of 10 s'; zeros without one."""
+    counted = COUNT.search(text)
+    return (float(counted[1]), float(counted[2])) if counted else (0.0, 0.0)
 
 
 def span(seconds: float) -> str:
@@ -158,7 +172,7 @@ def _tell(shown: Progress, over: threading.Event) -> None:
     while not over.wait(TICK):
         now, text = time.monotonic(), shown._text
         interval = max(INTERVAL, SHARE * shown.elapsed)
-        due = now - last >= interval or (VOICE.verbose and COUNT.sub("", text) != COUNT.sub("", step))
+        due = now - last >= interval or (VOICE.verbose and step_of(text) != step_of(step))
         if due:
             said.print(f"... {shown}", markup=False, soft_wrap=True)
             last, step = now, text

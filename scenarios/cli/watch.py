@@ -1,4 +1,4 @@
-"""`railfmi watch`: a stream of windows through one filter, and alarms when the model no longer holds."""
+"""`railfmi watch`: filter a stream of windows, and raise an alarm when the model no longer holds."""
 
 from pathlib import Path
 from typing import Annotated

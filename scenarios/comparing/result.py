@@ -5,9 +5,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scenarios.output import written
+from scenarios.shown import Shown, axes_or_new
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 SMALLEST = 1e-6  # share of the nominal value below which an output is rounding error at rest
 
@@ -42,8 +47,8 @@ class Mismatch:
     b: str | float | None
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
     """The result of compare; `outputs` is sorted by the relative difference, the largest first."""
 
     experiment: str
@@ -70,8 +75,27 @@ class Comparison:
         text = json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False)
         written(file, f"{text}\n")
 
-    def lines(self) -> Iterator[str]:
-        """Lines to print: the verdict, then each output, then other differences."""
+    def lines(self) -> list[str]:
+        """The verdict, then each output, then other differences."""
+        return [*self._lines()]
+
+    def to_frame(self) -> "pd.DataFrame":
+        """A row for each common output; `largest` and `rms` in its unit, `time` in s."""
+        import pandas as pd  # takes longer to load than what needs no table
+
+        rows = {name: asdict(d) for name, d in self.outputs.items()}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("output")
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """The largest difference of each output over its rms, and the tolerance."""
+        drawn = axes_or_new(ax)
+        sizes = {name: max(d.relative or 0.0, 1e-17) for name, d in self.outputs.items()}
+        drawn.barh(list(sizes), list(sizes.values()))
+        drawn.axvline(max(self.tolerance, 1e-17), color="0.3", linestyle="--")
+        drawn.set(xscale="log", xlabel="largest difference over the output's rms")
+        return drawn
+
+    def _lines(self) -> Iterator[str]:
         bad = sum(not d.agrees for d in self.outputs.values()) + len(self.not_compared)
         total = len(self.outputs) + len(self.not_compared)
         verdict = f"{bad} of {total} common outputs differ" if bad else f"all {total} common outputs agree"

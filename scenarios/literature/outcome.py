@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from scenarios.drawing.sheet import Plot
 from scenarios.output import writable, written_at_once
@@ -70,12 +70,15 @@ class Outcome:
         """Whether every target is met."""
         return not self.missed
 
+    def result(self) -> dict[str, Any]:
+        """The contents of result.json."""
+        found = [{**vars(f), "met": f.met} for f in self.findings]
+        return {"row": self.row, "ok": self.ok, "findings": found, "notes": list(self.notes)}
+
     def write(self, folder: Path) -> None:
         """Write result.json, table.md and the figures; none is if one cannot be written."""
-        found = [{**vars(f), "met": f.met} for f in self.findings]
-        whole = {"row": self.row, "ok": self.ok, "findings": found, "notes": list(self.notes)}
         with written_at_once(writable(folder)) as part:
-            (part / "result.json").write_text(json.dumps(whole, indent=1), encoding="utf-8")
+            (part / "result.json").write_text(json.dumps(self.result(), indent=1), encoding="utf-8")
             (part / "table.md").write_text(table(self.findings), encoding="utf-8")
             for plot in self.plots:
                 plot.write(part)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,8 +17,8 @@ from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import unwritten, writable
 from scenarios.preparing.clocks import with_clocks
-from scenarios.preparing.draft import Draft, doubtful, draft, sure, with_column
-from scenarios.preparing.survey import survey
+from scenarios.preparing.draft import Draft, Signal, doubtful, draft, sure, with_column
+from scenarios.preparing.survey import Raster, survey
 from scenarios.preparing.text import toml_of
 from scenarios.shown import Shown, axes_or_new
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 NONE = "-"  # the answer that leaves a variable without a column
 # question, answers, default -> answer
 Ask = Callable[[str, Sequence[str], str], str]
+During = Callable[[str], AbstractContextManager[object]]
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,18 +42,22 @@ class Initialised(Shown):
     def lines(self) -> list[str]:
         """The mapping as a table, and what was found beside it."""
         d = self.draft
+        lines = [r.span + _by_name(r) for r in (d.raster, *d.others)]
+        lines += [said for r in (d.raster, *d.others) for said in r.left_out]
         rows = [("FMU variable", "", "column", "unit", "unit in the FMU", "how sure")]
         rows += [
-            (s.variable.name, str(s.variable.causality), d.column_of(s), s.unit or "not stated",
+            (s.variable.name, str(s.variable.causality), d.column_of(s), _stated(s),
              s.variable.unit or f"{s.model_unit or 'not stated'} (guess)",
              f"{sure(s.likeness)}, {s.likeness:.0%}")
             for s in d.signals
         ]  # fmt: skip
-        lines = aligned(rows)
+        lines += aligned(rows)
         for r in d.others:
             clock = d.clock(r)
             said = (
-                f"offset = {clock.offset!r} s, {clock.found}" if clock.found else "offset not found; say it"
+                f"offset = {clock.offset!r} s, {clock.found}"
+                if clock.found
+                else "offset not found; write it into the file"
             )
             lines.append(
                 f"clock of {d.name(r)} ({1 / r.step:.4g} Hz; record {1 / d.raster.step:.4g} Hz): {said}"
@@ -89,6 +95,18 @@ class Initialised(Shown):
         return drawn
 
 
+def _by_name(r: Raster) -> str:
+    """What was guessed of how a file is to be read."""
+    above = f"; {r.options['skiprows']} lines above the names are left out" if r.options else ""
+    return (f", in {r.time_unit} by its name" if r.time_unit else "") + above
+
+
+def _stated(s: Signal) -> str:
+    """The unit of a column as its file states it, and whether it is known."""
+    stated = s.channel.unit
+    return s.unit or (f"{stated} (not known)" if stated else "not stated")
+
+
 def init(
     fmu: str | Path,
     data: str | Path | Sequence[str | Path],
@@ -97,6 +115,7 @@ def init(
     ask: Ask | None = None,
     force: bool = False,
     isolation: Isolation | None = ISOLATED,
+    during: During = nullcontext,
 ) -> Initialised:
     """Write a commented experiment.toml that `close-loop` accepts.
 
@@ -104,7 +123,8 @@ def init(
     apart is found by their dates or by a simulation, and written as a guess. out: folder of the file.
     time: the time column of the first file, by default it is looked for. ask: asks a user about what is not
     sure; None takes the likeliest. force: whether an existing experiment.toml may be replaced. isolation:
-    limits of the process in which a foreign FMU is simulated.
+    limits of the process in which a foreign FMU is simulated. during: makes a context in which work is done
+    that may take seconds, of a text that says what it is.
     Raises BadInput if nothing in the record looks like an output of the FMU.
     """
     model, folder = Path(fmu), Path(out).absolute()
@@ -113,7 +133,8 @@ def init(
     if file.exists() and not force:
         raise BadInput(f"{file}: exists already; give another --out, or --force to replace it")
     description = describe(model)
-    rasters = [r for i, record in enumerate(records) for r in survey(record, None if i else time)]
+    with during("reading the record"):
+        rasters = [r for i, record in enumerate(records) for r in survey(record, None if i else time)]
     made = draft(model, description, rasters)
     if ask is not None:
         made = _asked(made, ask)
@@ -123,7 +144,8 @@ def init(
             f"({', '.join(description.outputs)}); the columns are {', '.join(made.columns)}; rename one, or "
             "run the command on a terminal, where it asks"
         )
-    made = with_clocks(made, isolation)
+    with during("finding how far the clocks of the files are apart"):
+        made = with_clocks(made, isolation)
     text = toml_of(made, writable(folder))
     part = file.with_name(f".{file.name}.{os.getpid()}")
     try:

@@ -122,12 +122,8 @@ def inspect(file: str | Path, out: str | Path | None = None, time: str | None = 
 
 
 def _of_raster(r: Raster) -> Iterator[str]:
-    rate = 1 / r.step
-    yield (
-        f"{r.file.name}: {r.t.size} rows from {r.t[0]:.9g} to {r.t[-1]:.9g} s, {rate:.6g} Hz, time in column "
-        f"'{r.time}'"
-    )
-    for remark in r.remarks:
+    yield r.span
+    for remark in (*r.remarks, *r.left_out):
         yield f"  {remark}"
     rows = [("channel", "unit", "least", "greatest", "noise", f"{MOST_POWER:.0%} of power below", "remarks")]
     for c in r.channels:
@@ -200,7 +196,7 @@ def _of_fmu(path: Path, d: FmuDescription) -> Iterator[str]:
     if unused := d.widened.unused:
         yield f"not used, or by their elements only: {', '.join(unused)}"
     if whole := [v.name for v in _shown(d) if v.whole]:
-        yield f"whole numbers and truths, which are set and read but not estimated: {', '.join(whole)}"
+        yield f"integers and Booleans, which are set and read but not estimated: {', '.join(whole)}"
     yield from _access(d)
     found = problems(path)
     if found:

@@ -7,6 +7,7 @@ from math import sqrt
 from pathlib import Path
 
 from scenarios.preparing.draft import AROUND, IDENTIFY, Draft, Signal, bounds_of, is_factor, sure, uncertain
+from scenarios.preparing.survey import Raster
 
 CALIBRATED = 6  # parameters; with more the user has to choose
 
@@ -24,9 +25,16 @@ def _head(made: Draft, folder: Path) -> Iterator[str]:
     yield "# Correct what is wrong, then run: railfmi close-loop experiment.toml --dry-run"
     yield f"id = {_text(made.fmu.stem.lower())}"
     yield f"fmu = {_text(_path(made.fmu, folder))}"
-    yield f"data = {_text(_path(r.file, folder))}"
+    if not r.options:
+        yield f"data = {_text(_path(r.file, folder))}"
     yield f"time = {_text(r.time)}"
+    yield from _time_unit(r)
     yield ""
+    if r.options:
+        yield "[data]"
+        yield f"file = {_text(_path(r.file, folder))}"
+        yield from _options(r)
+        yield ""
     yield f"[split]  # the record runs from {r.t[0]:.9g} to {r.t[-1]:.9g} s"
     if made.late and made.settling:
         yield f"# a simulation forgets the FMU's start values in {made.settling:.3g} s, which are left out"
@@ -34,6 +42,16 @@ def _head(made: Draft, folder: Path) -> Iterator[str]:
         yield "# a simulation begins with the FMU's own start values and does not forget them: mind the begin"
     yield f"identify = [{begin!r}, {middle!r}]  # the first {IDENTIFY:.0%}: effects are fitted to it"
     yield f"test = [{middle!r}, {end!r}]  # the rest: errors are reported on it"
+
+
+def _time_unit(r: Raster) -> Iterator[str]:
+    if r.time_unit:
+        yield f"time_unit = {_text(r.time_unit)}  # a guess, by the name of the column"
+
+
+def _options(r: Raster) -> Iterator[str]:
+    for name, value in r.options.items():
+        yield f"{name} = {value!r}  # lines above the names of the columns"
 
 
 def _clocks(made: Draft, folder: Path) -> Iterator[str]:
@@ -45,8 +63,13 @@ def _clocks(made: Draft, folder: Path) -> Iterator[str]:
         if raster.file != made.raster.file:
             yield f"file = {_text(_path(raster.file, folder))}"
         yield f"time = {_text(raster.time)}"
+        yield from _time_unit(raster)
+        yield from _options(raster)
         clock = made.clock(raster)
-        said = clock.found or "not found; say what has to be added to its times to have those of the record"
+        said = (
+            clock.found
+            or "not found; write here what has to be added to its times to have those of the record"
+        )
         yield f"offset = {clock.offset!r}  # s, {said}"
 
 
@@ -92,7 +115,7 @@ def _signals(made: Draft) -> Iterator[str]:
         if s.raster is not made.raster:
             yield f"file = {_text(made.name(s.raster))}"
         unit = s.unit or s.variable.unit or s.model_unit or "1"
-        yield f"unit = {_text(unit)}" + ("" if s.unit else "  # a guess, the record states none")
+        yield f"unit = {_text(unit)}" + ("" if s.unit else f"  # a guess: the record states {_other(s)}")
         if not s.variable.unit:
             yield f"model_unit = {_text(s.model_unit or unit)}  # a guess: the FMU states no unit"
         thinned = sqrt(min(1.0, s.raster.step / made.raster.step))  # what a filter leaves of white noise
@@ -100,6 +123,10 @@ def _signals(made: Draft) -> Iterator[str]:
     if made.unused:
         yield ""
         yield f"# columns that are not used: {', '.join(made.unused)}"
+
+
+def _other(s: Signal) -> str:
+    return f"{_text(s.channel.unit)}, which is not known" if s.channel.unit else "none"
 
 
 def _why(s: Signal) -> str:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -52,6 +52,21 @@ class Trial(Shown):
     pictures: tuple[Path, ...] = ()
     remarks: tuple[str, ...] = ()
 
+    def result(self) -> dict[str, Any]:
+        """Cost and fit of the first simulation by name; times in s."""
+        low, high = self.expected
+        return {
+            "candidates": self.candidates, "seconds_of_simulation": self.seconds, "jobs": self.jobs,
+            "expected_seconds": [low, high], "outputs": self.to_frame().to_dict("index"),
+            "remarks": self.remarks, "pictures": self.pictures,
+        }  # fmt: skip
+
+    @property
+    def expected(self) -> tuple[float, float]:
+        """Between which times a run is expected to take, s."""
+        low, high = (n * self.candidates * self.seconds / self.jobs for n in RUNS_PER_CANDIDATE)
+        return low, high
+
     def lines(self) -> list[str]:
         """The mapping, the fit of the first simulation, and the expected cost."""
         return [*conversion_lines(self.problem.record), *self._outputs(), *self.remarks, *self._cost()]
@@ -97,7 +112,7 @@ class Trial(Shown):
                 )
 
     def _cost(self) -> Iterator[str]:
-        low, high = (n * self.candidates * self.seconds / self.jobs for n in RUNS_PER_CANDIDATE)
+        low, high = self.expected
         effects = f"{self.candidates} candidates (effects at their locations, faults of sensors)"
         yield f"{effects}; one simulation of the record takes {duration(self.seconds)}"
         yield f"expected: {duration(low)} to {duration(high)} in {self.jobs} processes"
@@ -124,6 +139,7 @@ def dry_run(
         try:
             theta = {**problem.declared, **_first_states(problem)}
             problem.simulate(theta)  # the first one also builds and loads the FMU
+            problem.forget()  # the second one is to be made, not remembered
             begun = time.perf_counter()
             [simulated, *_] = problem.simulate(theta)
             seconds = time.perf_counter() - begun

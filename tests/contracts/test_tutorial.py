@@ -72,3 +72,4 @@ def test_the_tutorial_comes_to_the_right_answer(begun):
     assert abs(value - 0.012) < 4 * error
     assert error < 0.1 * value
     assert "traced: coulomb_friction@shaft accounts for the residual" in PAGE.read_text(encoding="utf-8")
+    assert "traced: coulomb_friction@shaft" in follow(STEPS[ANSWER + 1 :], folder)  # the same from Python

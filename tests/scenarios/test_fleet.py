@@ -216,8 +216,12 @@ def loop(verdict: str, size: float | None, visible: float | None) -> Answer:
 
 @pytest.fixture
 def answered_fleet(tmp_path) -> tuple[Plan, Store]:
+    return six_vehicles(tmp_path)
+
+
+def six_vehicles(folder: Path) -> tuple[Plan, Store]:
     """Six vehicles: v0 drifts, v1 has drag, v2 and v3 would show it, v4 would not, v5 is not decided."""
-    plan, store = plan_of(written(tmp_path), ISOLATED), Store(tmp_path / "store")
+    plan, store = plan_of(written(folder), ISOLATED), Store(folder / "store")
     for job in plan.jobs:
         assert job.task is not None
         if job.record is None:

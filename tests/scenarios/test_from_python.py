@@ -18,6 +18,7 @@ from fmus.errors import BadInput
 from fmus.host.fmu import Fmu
 from scenarios.closing.result import Effect, Result
 from scenarios.closing.several_results import Results
+from scenarios.comparing.result import Comparison, Difference
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.given import given
 from scenarios.experiment.record import load_record
@@ -178,3 +179,41 @@ def test_results_of_the_way_in_and_of_several_show_themselves(built, tmp_path):
     assert both.to_frame().loc["again", "before"] == 5.0
     first.write(tmp_path / "result.json")
     assert_shown(railfmi.report(tmp_path))
+
+
+SCENARIO = """
+id = "push"
+question = "How far does a force move a carriage?"
+duration = 1.0
+step = 0.01
+fmus.drive.fmu = "{fmu}"
+inputs."drive.F" = 95.0
+
+[[expect]]
+that = "last(drive.q) > 0"
+because = "it is pushed forward"
+
+[[expect]]
+that = "last(drive.q) < 0"
+because = "it is not pulled back"
+"""
+
+
+@pytest.mark.usefixtures("_no_screen")
+def test_a_run_and_a_comparison_are_tables(built, tmp_path):
+    (tmp_path / "push.toml").write_text(SCENARIO.format(fmu=built("drive")))
+    result = railfmi.run(tmp_path / "push.toml", tmp_path / "out")
+    assert_shown(result)
+    assert result.lines()[0].startswith("push: 1 of 2 expectations met (")
+    assert "it is not pulled back" in result.lines()[1]
+    assert list(result.to_frame()["holds"]) == [True, False]
+    table = result.recording()
+    assert (table.index.name, table.index[-1]) == ("time", 1.0)
+    assert table.attrs["units"]["drive.q"] == "m"
+    assert table["drive.q"].is_monotonic_increasing
+    with pytest.raises(BadInput, match="no variant 'wet' was run"):
+        result.recording("wet")
+    one = Difference("m", 2e-9, 0.5, 1e-9, 3e-9, 2e-9, None, False)
+    both = Comparison("x", "a", "b", "0", "1", 1e-9, {"q": one}, (), (), (), ())
+    assert_shown(both)
+    assert both.to_frame().loc["q", "relative"] == 3e-9

@@ -119,7 +119,8 @@ def test_a_clock_that_is_not_found_is_left_to_the_user(drive, truth, tmp_path):
         init(drive, files, tmp_path)
     assert "\n" not in str(refused.value)
     assert (
-        "offset = 0.0  # s, not found; say what has to be added" in (tmp_path / "experiment.toml").read_text()
+        "offset = 0.0  # s, not found; write here what has to be added"
+        in (tmp_path / "experiment.toml").read_text()
     )
 
 

@@ -1,5 +1,6 @@
 """How loudly commands speak: --json, -q, -v, progress with counts and times, completion."""
 
+import ast
 import json
 import math
 import os
@@ -19,6 +20,7 @@ from scenarios.cli.app import COMMANDS, loaded, run_safely
 from scenarios.cli.voice import Progress, plain, progress, span
 from tests.helpers.paths import ROOT, SHIPPED
 
+CLI = ROOT / "scenarios" / "cli"
 RECORD = str(SHIPPED / "demo" / "rig-drag" / "data.csv")
 
 
@@ -34,6 +36,14 @@ def test_progress_tells_elapsed_and_expected_time():
     shown.update("drawing, 1 of 2")  # another step: what the last one took says nothing of it
     assert str(shown) == "drawing, 1 of 2 (23 s)"
     assert span(59.6) == "1 min 00 s"
+
+
+def test_a_count_may_be_a_time_with_more_behind_it():
+    now = [0.0]
+    shown = Progress("a: its run, 0.00 of 10 s, 0.0 times real time", lambda: now[0])
+    now[0] = 5.0
+    shown.update("a: its run, 2.50 of 10 s, 0.5 times real time")
+    assert str(shown).endswith("(5 s, about 15 s left in this step)")
 
 
 @pytest.mark.parametrize(("quiet", "verbose"), [(False, False), (True, False), (False, True)])
@@ -94,6 +104,20 @@ def test_json_holds_the_result(tmp_path, capsys):
     assert run_safely(["check", made, "--json"]) == 0
     checks = json.loads(capsys.readouterr().out)["result"]["checks"]
     assert {c["passed"] for c in checks} <= {True, None}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_tells_its_progress_and_what_its_answer_is_made_of(name):
+    tree = ast.parse((CLI / f"{COMMANDS[name]}.py").read_text())
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    assert {"found", "progress"} <= names or "carried_out" in names
+
+
+@pytest.mark.parametrize("arguments", [["row"], ["inspect", RECORD]], ids=["row", "inspect"])
+def test_json_has_a_result(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_safely([*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["result"]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -33,17 +34,24 @@ class NormReport:
         """Whether all that could be judged is inside its window."""
         return all(row.passed for row in self.exact) and all(row.passed for row in self.measured)
 
-    def write(self, folder: Path, command: str) -> None:
-        """Write norm.json, step1.csv, step2.csv and norm.html into a folder."""
-        settings = {name: getattr(self.instrument, name) for name in ("random", "grid", "spacing", "seed")}
-        steps = {
+    @property
+    def steps(self) -> dict[str, list[dict[str, Any]]]:
+        """The rows of both steps by the names of their files."""
+        return {
             "step1": [{**asdict(row), "passed": row.passed} for row in self.exact],
             "step2": [{**asdict(row), "passed": row.passed} for row in self.measured],
         }
-        table = {"ok": self.ok, "reader": self.reader, **settings, **steps}
-        text = json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False)
+
+    def result(self) -> dict[str, Any]:
+        """The contents of norm.json."""
+        settings = {name: getattr(self.instrument, name) for name in ("random", "grid", "spacing", "seed")}
+        return {"ok": self.ok, "reader": self.reader, **settings, **self.steps}
+
+    def write(self, folder: Path, command: str) -> None:
+        """Write norm.json, step1.csv, step2.csv and norm.html into a folder."""
+        text = json.dumps(self.result(), indent=1, ensure_ascii=False, allow_nan=False)
         written(folder / "norm.json", f"{text}\n")
-        for name, rows in steps.items():
+        for name, rows in self.steps.items():
             if rows:
                 written(folder / f"{name}.csv", pd.DataFrame(rows).to_csv(index=False, float_format="%.6g"))
         page = rendered(
