@@ -6,12 +6,14 @@ from pathlib import Path
 from tests.contracts import test_fuzzed_files
 from tests.helpers.fuzzing import targets
 from tests.helpers.interrupting import SIGNALS
-from tests.helpers.misbehaving import DEATHS, ENDLESS, HARMLESS
+from tests.helpers.misbehaving import AT_THE_END, DEATHS, ENDLESS, HARMLESS, NOT_FINITE, REFUSALS
 from tests.helpers.small_commands import EVERY_COMMAND
 from tests.scenarios import (
     test_command_line,
     test_full_disk,
+    test_hostile_xml,
     test_interrupts_at_random,
+    test_links,
     test_misbehaving,
     test_output,
     test_trials_before,
@@ -40,6 +42,13 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
     for fault in ENDLESS:
         what = "ended after --call-limit, " + SENTENCE + KEPT * (fault.call == "late")
         yield f"`{fault.what}` in {fault.call}", every, what, file
+    for fault in REFUSALS:
+        what = "one sentence with FMU, call and status, exit code 2" + KEPT * (fault.call == "late")
+        yield f"`{fault.what}` in {fault.call}", "run", what, file
+    for fault in AT_THE_END:
+        yield f"`{fault.what}` in {fault.call}", "run", f"no result, {SENTENCE}{KEPT}", file
+    for fault in NOT_FINITE:
+        yield f"outputs that are `{fault.what}`", "run", "no expectation over them is met, exit code 1", file
     for fault in HARMLESS:
         yield f"`{fault.what}` in {fault.call}", "run", "nothing: the run is as without it", file
     for what, words in test_trials_before.WRONG.items():
@@ -61,9 +70,28 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
             )
             times = test_interrupts_at_random.MOMENTS[command] // len(SIGNALS)
             yield f"{number.name} at {times} random moments", command, told, _file(test_interrupts_at_random)
+    for command in test_interrupts_at_random.KILLED:
+        told = (
+            "no half file, no process; the next command goes on and removes what is left beside the results"
+        )
+        what = f"SIGKILL at {test_interrupts_at_random.MOMENTS[command]} random moments"
+        yield what, command, told, _file(test_interrupts_at_random)
     for name in targets():
         told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
         yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)
+    for what in test_hostile_xml.ATTACKS:
+        told = "it is read without it, or one line and exit code 2; no other file is opened"
+        yield f"XML with {what}", "all that read an FMU or an SSP package", told, _file(test_hostile_xml)
+    told = "one line, exit code 2"
+    yield (
+        "XML with entities that grow",
+        "all that read an FMU or an SSP package",
+        told,
+        _file(test_hostile_xml),
+    )
+    for command, place in test_links.PLACES:
+        told = "one line, exit code 2; nothing behind the link is changed"
+        yield f"a link at `{place}` in --out", command, told, _file(test_links)
     for what in test_command_line.WRONG:
         told = "one line, exit code 2, nothing written"
         yield f"experiment: {what}", "close-loop", told, _file(test_command_line)

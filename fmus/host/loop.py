@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fmus.aside import blocks
 from fmus.host.places import BEYOND
-from fmus.host.status import OK, WARNING, CallFailed
+from fmus.host.status import OK, WARNING, CallFailed, failure
 from fmus.host.watch import GETTING, LOOPING, PAGE, SETTING, WHAT
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _interpreted(
             cells[WHAT] = getting
             status = pull()
         if status > WARNING:
-            raise CallFailed(it.failed(f"step at t = {times[k]:g} s", status))
+            raise CallFailed(refusal(it, f"step at t = {times[k]:g} s", status))
         y[k] = out
 
 
@@ -114,12 +114,17 @@ def _compiled(
         return
     status = it.stopped(float(t[k]), float(t[k + 1] - t[k]), status)
     if status > WARNING:
-        raise CallFailed(it.failed(f"step at t = {t[k]:g} s", status))
+        raise CallFailed(refusal(it, f"step at t = {t[k]:g} s", status))
     if k + 1 < len(y):
         it.ready()
     if ends is not None:
         it.set(set_refs, ends[k].tolist())
     y[k] = it.get(get_refs)
+
+
+def refusal(it: "Instance", what: str, status: int) -> str:
+    """The sentence that a call failed: with the reason that the FMU logged, else with the status."""
+    return it.failed(what if it.messages else failure(what, status), status)
 
 
 @cache

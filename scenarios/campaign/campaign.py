@@ -20,7 +20,7 @@ from scenarios.campaign.result import CampaignResult, failures_of, measured
 from scenarios.output import writable, written_at_once
 from scenarios.tasks.hashes import hash_of_program
 from scenarios.tasks.parquet import write_table
-from scenarios.tasks.store import BUILDS, FAILED, TASKS, Answer, Store
+from scenarios.tasks.store import BUILDS, FAILED, Answer, Store
 
 Tell = Callable[[str], None]
 Row = dict[str, Any]
@@ -61,7 +61,7 @@ def campaign(
     begun = time.monotonic()
     plan = plan_of(file, isolation)
     folder = writable(Path(out))
-    store = Store(folder / TASKS)
+    store = Store.within(folder)
     if retry_failed:
         store.forget_failed(t.key for t in plan.tasks)
     from scenarios.campaign.work import simulated
@@ -127,7 +127,7 @@ def _plain(value: Any) -> float | str:
     """A value of a varied key as it stands in the table: a number, or its text."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    return value if isinstance(value, str) else json.dumps(value)
+    return value if isinstance(value, str) else json.dumps(value, default=str)
 
 
 def _indices(plan: Plan, rows: Sequence[Row]) -> list[Index]:

@@ -1,8 +1,8 @@
 """From a campaign file to its tasks: the scenario with other values of some keys, once for each point."""
 
-import json
 import tomllib
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -42,8 +42,8 @@ def plan_of(path: str | Path, isolation: Isolation | None) -> Plan:
             expression(text, f"key 'measure.{name}'")
         paths = {key: _path(key) for key in (*d.set, *d.vary)}
     scenario = file.parent / d.scenario
-    points = points_of(d)
     with of_file(file):
+        points = points_of(d)
         table = changed(_table(scenario, d.variant, file), d.set, paths)
         for point in points[:1]:
             read_table(Scenario, changed(table, point, paths))
@@ -99,7 +99,7 @@ def _path(key: str) -> Way:
 
 def changed(table: Mapping[str, Any], point: Point, paths: Mapping[str, Way]) -> dict[str, Any]:
     """A scenario with the values of a point; BadInput where a key leads through what is no table or list."""
-    made = json.loads(json.dumps(table))
+    made = deepcopy(dict(table))
     for key, value in point.items():
         *way, last = paths[key]
         here: Any = made
@@ -111,7 +111,7 @@ def changed(table: Mapping[str, Any], point: Point, paths: Mapping[str, Way]) ->
             here[last] = value
         else:
             raise BadInput(f"key '{key}': '{way[-1]}' is no table of the scenario; name one of its keys")
-    return dict(made)
+    return made
 
 
 def _step(here: Any, part: str, key: str) -> Any:

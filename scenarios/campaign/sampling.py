@@ -5,17 +5,19 @@ The points of SciPy's quasi-Monte Carlo are in the unit cube; each range makes a
 
 from collections.abc import Mapping
 from itertools import product
-from math import exp, floor, log
+from math import exp, floor, log, prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
+from fmus.errors import BadInput
 from scenarios.campaign.declaration import Declaration, Range
 
 Array = NDArray[np.float64]
 BITS = 64  # of Sobol's sequence, so that no two points coincide
+MOST = 1_000_000  # points, which are planned in memory and kept in a file each
 INSIDE = 2.0**-53  # keeps a coordinate within the open interval, where the normal distribution is finite
 Point = dict[str, Any]
 
@@ -24,7 +26,11 @@ def points_of(d: Declaration) -> list[Point]:
     """The values of all varied keys at each point, in the order of the rows of the result.
 
     For "sobol" the points A (n), B (n), then for each key the points of A with this key's values of B (n).
+    Raises BadInput, before any is made, for more points than MOST.
     """
+    if (count := _count(d)) > MOST:
+        asked = str(count) if count < 10**15 else "more than 10^15"
+        raise BadInput(f"asks for {asked} points, and {MOST} are the most; vary fewer keys, or lower 'n'")
     if d.sample == "grid":
         axes = [_axis(r) for r in d.vary.values()]
         return [dict(zip(d.vary, values, strict=True)) for values in product(*axes)]
@@ -35,6 +41,20 @@ def points_of(d: Declaration) -> list[Point]:
     a, b = unit[:, :k], unit[:, k:]
     mixed = [np.where(np.arange(k) == i, b, a) for i in range(k)]
     return _values(np.concatenate([a, b, *mixed]), d.vary)
+
+
+def _count(d: Declaration) -> int:
+    """How many points there are."""
+    if d.sample == "grid":
+        return prod(_size(r) for r in d.vary.values())
+    return (d.n or 0) * (len(d.vary) + 2 if d.sample == "sobol" else 1)
+
+
+def _size(r: Range) -> int:
+    """How many values of a range a grid has."""
+    if r.values is not None:
+        return len(r.values)
+    return int(r.high or 0) - int(r.low or 0) + 1 if r.whole else r.points or 2
 
 
 def _values(unit: Array, vary: Mapping[str, Range]) -> list[Point]:

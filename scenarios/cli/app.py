@@ -14,8 +14,8 @@ import typer
 
 from fmus.errors import BadInput
 from scenarios.cli.console import NOTICES, app, say_notices
-from scenarios.cli.supervision import INTERRUPTED, STOPPED, supervised
-from scenarios.cli.voice import VOICE, said
+from scenarios.cli.supervision import INTERRUPTED, STOPPED, hint, supervised
+from scenarios.cli.voice import VOICE, said, visible
 
 FOLDER = Path(__file__).parent
 NO_COMMANDS = ("__main__", "app", "console", "build_options", "supervision", "tasks", "voice")
@@ -29,17 +29,20 @@ UNWRITABLE = (  # errors of a disk or a folder
     errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM,
 )  # fmt: skip
 
-UNPRINTABLE = "\N{REPLACEMENT CHARACTER}"
 PIPE_CLOSED = 1  # exit code of a command whose output nobody reads, as that of the library click
 
 # libraries' worker processes would each use every core for small matrices
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
+# the working folder may hold somebody's data: worker processes import no module from it, and a file there
+# names no folder for Numba's cache, whose files are unpickled
+NOTHING_FROM_HERE = {"PYTHONSAFEPATH": "1", "NUMBA_CACHE_DIR": ""}
+
 
 def main() -> None:
     """Entry of the console command."""
-    for name in THREADS:
-        os.environ.setdefault(name, "1")
+    for name, value in {**dict.fromkeys(THREADS, "1"), **NOTHING_FROM_HERE}.items():
+        os.environ.setdefault(name, value)
     sys.exit(supervised(run_safely, sys.argv[1:]))
 
 
@@ -108,14 +111,14 @@ def _run_safely(arguments: Sequence[str]) -> int:
         NOTICES.clear()
         code = loaded(arguments)(list(arguments), standalone_mode=False)
         if code == STOPPED and not INTERRUPTED.told:  # typer made an exit code of the exception
-            return _interrupted()
+            return _interrupted(arguments)
         if code != STOPPED:
             say_notices()
         _flush_output()
         return code if isinstance(code, int) else 0
     except BadInput as error:
         if INTERRUPTED.came:  # and was taken for a fault of what was being read
-            return _interrupted()
+            return _interrupted(arguments)
         return _wrong(error)
     except BrokenProcessPool:
         return _wrong(
@@ -123,20 +126,20 @@ def _run_safely(arguments: Sequence[str]) -> int:
             "out; 'railfmi check' on the FMU tells whether it does so, and --jobs 1 needs the least memory"
         )
     except typer.Abort:
-        return _interrupted()
+        return _interrupted(arguments)
     except KeyboardInterrupt:
-        return _interrupted()
+        return _interrupted(arguments)
     except BrokenPipeError:  # as with 'railfmi ... | head'
         return PIPE_CLOSED
     except OSError as error:
         if INTERRUPTED.came:
-            return _interrupted()
+            return _interrupted(arguments)
         return _wrong(_of_system(error))
     except MemoryError:
         return _wrong("memory ran out; close other programs, use --jobs 1, or cut the record")
     except Exception as error:
         if INTERRUPTED.came:  # an FMU in Python, or CasADi, took the exception for a failure of its own
-            return _interrupted()
+            return _interrupted(arguments)
         if _is_of_fmu(error):
             return _wrong(error)
         shown = getattr(error, "format_message", None)  # click's own errors of usage
@@ -164,8 +167,7 @@ def _no_more_output() -> None:
 
 def _line(error: object) -> str:
     """What an error says, in one line; what it quotes of a file may hold line ends and codes of terminals."""
-    text = " ".join(str(error).splitlines())
-    return "".join(c if c.isprintable() else UNPRINTABLE for c in text)
+    return visible(" ".join(str(error).splitlines())).replace("\t", " ")
 
 
 def _of_system(error: OSError) -> str:
@@ -187,6 +189,7 @@ def _is_of_fmu(error: Exception) -> bool:
     )
 
 
-def _interrupted() -> int:
-    said.print("railfmi: interrupted; files that were finished before are kept")
+def _interrupted(arguments: Sequence[str]) -> int:
+    """Say that the command was interrupted; the exit code."""
+    said.print(f"railfmi: interrupted; {hint(arguments)}", markup=False, soft_wrap=True)
     return STOPPED

@@ -16,7 +16,7 @@ def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
 
     Tried are its model description, restarts, repeated runs, several instances at once, saved states, tunable
     parameters, and how it refuses wrong values. What is only beside the letter of the standard does not count
-    as a failure.
+    as a failure. An FMU that ends or holds up the process of the trials is told to need isolation.
     """
     from fmus.host.grading.check import grade
     from fmus.host.grading.fitness import LETTER
@@ -30,5 +30,7 @@ def check(fmu: Annotated[Path, typer.Argument(help="FMU file")]) -> None:
         word, colour = ("not by the standard", "yellow") if beside else signs[entry.passed]
         echo_coloured(f"[{colour}]{word:<19}[/]  {escape(f'{entry.title}: {entry.sentence}')}")
     echo(result.conclusion)
+    if result.isolation:
+        echo(result.isolation)
     if not result.ok:
         raise typer.Exit(1)

@@ -11,7 +11,7 @@ import typer
 
 from fmus.errors import BadInput
 from scenarios.cli.supervision import INTERRUPTED, STOPPED
-from scenarios.cli.voice import VOICE, said
+from scenarios.cli.voice import VOICE, said, visible
 from scenarios.output import replaced
 
 EXPERIMENT = "an experiment.toml; 'railfmi init MODEL.fmu RECORD' drafts one from an FMU and a record"
@@ -118,10 +118,10 @@ def say_notices() -> None:
     while NOTICES:
         notice = NOTICES.pop(0)
         if not VOICE.quiet:
-            said.print(f"railfmi: {notice}", markup=False, soft_wrap=True)
+            said.print(f"railfmi: {visible(notice)}", markup=False, soft_wrap=True)
 
 
 def show(lines: Sequence[str]) -> None:
     """Print lines that stay, above the progress."""
     for line in () if VOICE.quiet else lines:
-        said.print(line, markup=False, soft_wrap=True)
+        said.print(visible(line), markup=False, soft_wrap=True)

@@ -35,9 +35,13 @@ FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary fil
 MEMORY_HINT = "; where memory runs out, the system does this"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-HINTS = {
-    "close-loop": "; the same command with --resume continues from the last checkpoint, if there is one",
-    "watch": "; the same command goes on from the last window",
+KEPT = "files that were finished before are kept"
+TASKS_KEPT = "what was finished is kept; the same command goes on from here"
+HINTS = {  # how to go on after an interrupt, by command
+    "close-loop": "the same command with --resume continues from the last checkpoint, if there is one",
+    "watch": "the same command goes on from the last window",
+    "fleet": TASKS_KEPT,
+    "campaign": TASKS_KEPT,
 }
 
 
@@ -63,6 +67,12 @@ class Interrupts:
 
 
 INTERRUPTED = Interrupts()
+
+
+def hint(arguments: Sequence[str]) -> str:
+    """What is left of an interrupted command, and how to go on."""
+    command = next((word for word in arguments if not word.startswith("-")), "")
+    return HINTS.get(command, KEPT)
 
 
 def supervised(command: Command, arguments: Sequence[str]) -> int:
@@ -158,8 +168,7 @@ class Watch:
         if code is not None:
             return 128 + self._signal if self._signal and code == STOPPED else code
         if self._signal:
-            hint = next((HINTS[name] for name in self._arguments if name in HINTS), "")
-            _say(f"interrupted{hint}")
+            _say(f"interrupted; {hint(self._arguments)}")
             return 128 + self._signal
         _say(self._sentence(os.waitstatus_to_exitcode(status)))
         return FAILED
@@ -225,7 +234,8 @@ def _children() -> list[int]:
 
 def _say(sentence: str) -> None:
     shown = f"{SHOW_CURSOR}\n" if sys.stderr.isatty() else ""
-    os.write(2, f"{shown}railfmi: {sentence}\n".encode())
+    plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in sentence)
+    os.write(2, f"{shown}railfmi: {plain}\n".encode())
 
 
 def _send(how: Callable[[int, int], None], to: int, number: int) -> None:

@@ -6,6 +6,7 @@ import math
 import re
 import threading
 import time
+import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,7 +24,18 @@ INTERVAL = 10.0  # s, between two lines of progress where there is no terminal, 
 SHARE = 0.1  # later as a share of the time that has passed, since a log of hours is not read line by line
 TICK = 0.5  # s, between two drawings of the progress
 
+UNPRINTABLE = "\N{REPLACEMENT CHARACTER}"
+# categories of Unicode: controls, formats such as a change of direction, surrogates
+OBEYED = ("Cc", "Cf", "Cs")
+
 said = Console(stderr=True, highlight=False)
+
+
+def visible(text: object) -> str:
+    """A text without what a terminal would obey: names in an FMU or a file may hold its codes."""
+    return "".join(
+        UNPRINTABLE if unicodedata.category(c) in OBEYED and c not in "\n\t" else c for c in str(text)
+    )
 
 
 class Voice:
@@ -43,13 +55,13 @@ class Voice:
         """A line of the answer."""
         self.lines.append(str(line))
         if not self.as_json:
-            print(line)
+            print(visible(line))
 
     def echo_coloured(self, line: str) -> None:
         """A line of the answer with colours, as the library rich writes them."""
         self.lines.append(Text.from_markup(line).plain)
         if not self.as_json:
-            Console(highlight=False, soft_wrap=True).print(line)
+            Console(highlight=False, soft_wrap=True).print(visible(line))
 
     def found(self, result: object) -> None:
         """What the answer is made of, for --json; of several, a list."""
@@ -164,9 +176,9 @@ def _tell(shown: Progress, over: threading.Event) -> None:
     if said.is_terminal and not VOICE.verbose:
         if over.wait(PATIENCE):
             return
-        with said.status(str(shown)) as status:
+        with said.status(visible(shown)) as status:
             while not over.wait(TICK):
-                status.update(str(shown))
+                status.update(visible(shown))
         return
     last, step = time.monotonic() + PATIENCE - INTERVAL, ""
     while not over.wait(TICK):
@@ -174,5 +186,5 @@ def _tell(shown: Progress, over: threading.Event) -> None:
         interval = max(INTERVAL, SHARE * shown.elapsed)
         due = now - last >= interval or (VOICE.verbose and step_of(text) != step_of(step))
         if due:
-            said.print(f"... {shown}", markup=False, soft_wrap=True)
+            said.print(f"... {visible(shown)}", markup=False, soft_wrap=True)
             last, step = now, text

@@ -17,10 +17,10 @@ from scenarios.cli.console import (
     interrupted,
     show,
 )
-from scenarios.cli.supervision import INTERRUPTED
+from scenarios.cli.supervision import HINTS, INTERRUPTED
 from scenarios.cli.voice import echo, found, progress
 
-GOES_ON = "the same command goes on from the last window"
+GOES_ON = HINTS["watch"]
 
 
 @app.command()

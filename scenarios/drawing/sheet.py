@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from estimator.record import Array, Record
@@ -68,10 +69,25 @@ def _source(picture: bytes) -> str:
 
 def _drawn(figure: Figure) -> Image.Image:
     """A figure as a picture; it is laid out by this."""
+    as_it_stands(figure)
     figure.set_dpi(DPI)
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+
+def as_it_stands(figure: Figure) -> None:
+    """Have every text drawn as it stands: dollars in a name or a title are no mathematics, broken or not.
+
+    Nor is LaTeX run on them where a matplotlibrc in the working directory asks for it. The numbers at ticks,
+    which Matplotlib writes itself, stay as they are.
+    """
+    ours = {*figure.findobj(Text)}
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        ours -= {text for tick in (*axis.majorTicks, *axis.minorTicks) for text in (tick.label1, tick.label2)}
+    for text in ours:
+        text.set_parse_math(False)
+        text.set_usetex(False)
 
 
 def _settle(figure: Figure) -> None:

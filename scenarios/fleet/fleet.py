@@ -32,7 +32,7 @@ from scenarios.fleet.tables import (
 from scenarios.output import writable, written_at_once
 from scenarios.tasks.hashes import hash_of_program
 from scenarios.tasks.parquet import write_parts, write_table
-from scenarios.tasks.store import BUILDS, FAILED, TASKS, Answer, Store
+from scenarios.tasks.store import BUILDS, FAILED, Answer, Store
 
 Tell = Callable[[str], None]
 
@@ -69,7 +69,7 @@ def fleet(
     begun = time.monotonic()
     plan = plan_of(file, isolation)
     folder = writable(Path(out))
-    store = Store(folder / TASKS)
+    store = Store.within(folder, RESULTS)
     if retry_failed:
         store.forget_failed(j.task.key for j in plan.jobs if j.task)
     reasons = _done(plan, store, workers, scheduler, tell)

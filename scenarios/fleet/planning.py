@@ -9,6 +9,7 @@ from typing import Any
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import describe
+from fmus.taken import check_file
 from scenarios.experiment.declaration import Declaration as Experiment
 from scenarios.experiment.experiment import check_names, placed
 from scenarios.experiment.validation import of_file, read_file, read_table, read_toml
@@ -94,8 +95,12 @@ def plan_of(path: str | Path, isolation: Isolation | None) -> Plan:
 
 
 def _data_hash(data: Path) -> str | OSError:
+    """The checksum of a record's data, or why there is none; a device or a pipe is not waited for."""
     try:
+        check_file(data)
         return hash_of_file(data)
+    except BadInput as error:
+        return OSError(str(error).removeprefix(f"{data}: "))
     except OSError as error:
         return error
 

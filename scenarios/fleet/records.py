@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow.parquet as pq
 
 from fmus.errors import BadInput, did_you_mean
-from fmus.taken import check_file
+from fmus.taken import NUMBER, check_file, check_record
 from scenarios.fleet.declaration import Declaration
 
 NEEDED = ("record", "vehicle", "data")
@@ -53,11 +54,15 @@ def _table(file: Path) -> pd.DataFrame:
     check_file(file)
     try:
         if file.suffix == ".parquet":
+            about = pq.read_metadata(file)
+            check_record(file, NUMBER * about.num_rows * about.num_columns)
             table = pd.read_parquet(file)
             return table.astype(object).where(table.notna(), "").astype(str)
         return pd.read_csv(file, dtype=str, keep_default_na=False, skipinitialspace=True)
     except FileNotFoundError as error:
         raise BadInput(f"{file}: does not exist; name the table of records in key 'records'") from error
+    except BadInput:
+        raise
     except (OSError, ValueError) as error:  # also a parser's or Arrow's errors
         why = " ".join(str(error).split())[:200]
         raise BadInput(f"{file}: cannot be read as a table ({why}); write it as CSV or Parquet") from error

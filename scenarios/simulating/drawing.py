@@ -21,6 +21,7 @@ from scenarios.drawing.sheet import (
     INK,
     LAW,
     NOISE,
+    as_it_stands,
     envelope,
     name_axes,
     sheet,
@@ -60,6 +61,7 @@ def write_figure(picture: Picture, place: int, asked: Asked, runs: Mapping[str, 
     figure.suptitle(fill(picture.title, LINE), x=0.01, ha="left", fontsize=10, fontweight="bold", color=INK)
     _legends(figure, [axes[name] for name in names])
     target = folder / f"{picture.name}.png"
+    as_it_stands(figure)
     figure.savefig(target, dpi=DPI)
     return target
 

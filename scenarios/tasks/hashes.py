@@ -21,8 +21,8 @@ def hash_of_file(file: Path) -> str:
 
 
 def hash_of(value: Any) -> str:
-    """SHA-256 of a value that JSON can hold, the same for tables in any order of their keys."""
-    text = json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    """SHA-256 of a value that TOML can hold, the same for tables in any order of their keys."""
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"), default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -8,9 +8,12 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from secrets import token_hex
+from threading import Thread
 from typing import Any
 
 from joblib import cpu_count
@@ -84,12 +87,14 @@ Work = Callable[[Mapping[str, Any], Place], Answer]  # a function of a module, s
 class Crew:
     """Who does the tasks: so many processes here, or the workers of the scheduler at an address.
 
-    files: files that each worker gets once, by checksum.
+    files: files that each worker gets once, by checksum. builds: name of the folder of the FMUs that they
+    build, which are programs: a name that nobody knows before, so that none is found there and run.
     """
 
     workers: int | None = None
     scheduler: str | None = None
     files: Mapping[str, Path] = field(default_factory=dict)
+    builds: str = field(default_factory=token_hex)
 
 
 class Shipment(WorkerPlugin):  # type: ignore[misc]  # the library is not followed
@@ -123,10 +128,11 @@ def run(tasks: Sequence[Task], work: Work, store: Store, crew: Crew, tell: Tell,
         client.register_plugin(Shipment(files))
         names = {f"railfmi-{hash_of([str(store.folder), t.key])}": t.key for t in left}
         futures = client.map(
-            _perform, left, work=work, folder=str(store.folder), program=hash_of_program(), key=[*names]
-        )
+            _perform, left, work=work, folder=str(store.folder), builds=crew.builds,
+            program=hash_of_program(), key=[*names],
+        )  # fmt: skip
         tell(f"{what}, {done} of {len(tasks)}")
-        waiting = as_completed(futures)
+        waiting = as_completed(futures, loop=client.loop)
         futures.clear()  # an answer is let go once it is here
         for future in waiting:
             _take(future, names[future.key], store, failed)
@@ -162,7 +168,7 @@ def _take(future: Any, key: str, store: Store, failed: dict[str, str]) -> None:
         store.finish(key, future.result())
 
 
-def _perform(task: Task, work: Work, folder: str, program: str) -> Answer:
+def _perform(task: Task, work: Work, folder: str, builds: str, program: str) -> Answer:
     """Do a task in a worker, unless it was finished meanwhile; the answer, with the time that it took."""
     store = Store(Path(folder))
     if hash_of_program() != program:
@@ -172,7 +178,7 @@ def _perform(task: Task, work: Work, folder: str, program: str) -> Answer:
             return kept
         begun = time.monotonic()
         try:
-            answer = work(task.given, _place(store))
+            answer = work(task.given, _place(store, builds))
         except (OSError, MemoryError) as error:
             raise Passing(f"{type(error).__name__}: {error}") from None
         answer = {**answer, "seconds": round(time.monotonic() - begun, 3)}
@@ -180,31 +186,30 @@ def _perform(task: Task, work: Work, folder: str, program: str) -> Answer:
     return answer
 
 
-def _place(store: Store) -> Place:
+def _place(store: Store, builds: str) -> Place:
     """Builds are shared by the workers of a host, since a compiler makes them for its processor."""
-    builds = store.folder.parent / BUILDS / hash_of([os.uname()[:2], hash_of_program()])[:16]
-    builds.mkdir(parents=True, exist_ok=True)
-    return Place(builds, Path(get_worker().local_directory) / SHIPPED)
+    shared = store.folder.parent / BUILDS / builds / hash_of(os.uname()[:2])[:16]
+    shared.mkdir(parents=True, exist_ok=True)
+    return Place(shared, Path(get_worker().local_directory) / SHIPPED)
 
 
 @contextmanager
 def _client(crew: Crew) -> Iterator[Any]:
     """A client of the scheduler at the crew's address, or of one with workers that are started here."""
-    with dask.config.set(SETTINGS):
+    with dask.config.set(SETTINGS), ExitStack() as stack:
         if crew.scheduler is not None:
-            with _reached(crew.scheduler) as client:
-                yield client
+            yield _reached(crew.scheduler, stack)
             return
-        with tempfile.TemporaryDirectory(prefix="railfmi_workers_") as folder, ExitStack() as stack:
-            with undisturbed():  # distributed can close a cluster that is whole, and fails at half of one
-                cluster = LocalCluster(
-                    n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
-                    dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
-                )  # fmt: skip
-                stack.callback(_close, cluster)
-                client = Client(cluster, timeout=CONNECTING)
-                stack.callback(_close, client)
-            yield client
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="railfmi_workers_"))
+        with undisturbed():  # distributed can close a cluster that is whole, and fails at half of one
+            cluster = LocalCluster(
+                n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
+                dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
+            )  # fmt: skip
+            stack.callback(_close, cluster)
+            client = Client(cluster, timeout=CONNECTING)
+            stack.callback(_close, client)
+        yield client
 
 
 def _close(part: Any) -> None:
@@ -213,10 +218,12 @@ def _close(part: Any) -> None:
         part.close(timeout=CLOSING)
 
 
-def _reached(address: str) -> Any:
-    """A client of the scheduler at an address, which has a worker."""
+def _reached(address: str, stack: ExitStack) -> Any:
+    """A client of the scheduler at an address, which has a worker; the stack closes it."""
+    found = _connecting(address)
+    stack.callback(found.add_done_callback, _close_found)
     try:
-        client = Client(address, timeout=CONNECTING)
+        client = found.result()
     except (OSError, ValueError, TimeoutError) as error:
         raise BadInput(
             f"--scheduler {address}: cannot be reached ({' '.join(str(error).split())}); start it with 'dask "
@@ -225,9 +232,32 @@ def _reached(address: str) -> Any:
     try:
         client.wait_for_workers(1, timeout=FIRST_WORKER)
     except TimeoutError as error:
-        client.close()
         raise BadInput(
             f"--scheduler {address}: has no workers; start some with 'dask worker {address} --nthreads 1 "
             "--nworkers auto'"
         ) from error
     return client
+
+
+def _connecting(address: str) -> "Future[Any]":
+    """A client that is being connected, in a thread of its own.
+
+    Where Ctrl-C breaks off the start of a client, the library waits a minute to close it. Here it breaks off
+    the waiting alone: the thread ends with the process, or closes the client when it is connected after all.
+    """
+    found: Future[Any] = Future()
+
+    def connect() -> None:
+        try:
+            found.set_result(Client(address, timeout=CONNECTING, set_as_default=False))
+        except Exception as error:
+            found.set_exception(error)
+
+    Thread(target=connect, name="railfmi-connecting", daemon=True).start()
+    return found
+
+
+def _close_found(found: "Future[Any]") -> None:
+    """Close the client, if there is one."""
+    if found.exception() is None:
+        _close(found.result())

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.files import write_at_once
+from scenarios.links import refuse_links
 
 Answer = dict[str, Any]  # what JSON can hold
 TASKS = ".tasks"  # folder of the finished tasks, in that of the results
@@ -27,6 +28,12 @@ class Store:
 
     folder: Path
 
+    @classmethod
+    def within(cls, folder: Path, *more: str) -> "Store":
+        """The store in a folder of results; BadInput where a link in it, or in `more`, leads elsewhere."""
+        refuse_links(folder, TASKS, BUILDS, *more)
+        return cls(folder / TASKS)
+
     def file(self, key: str) -> Path:
         """The place of a task's answer; folders of at most a 256th of all tasks."""
         return self.folder / key[:2] / f"{key}.json"
@@ -35,9 +42,10 @@ class Store:
         """The answer of a finished task; None if it is not finished, or its file is damaged."""
         try:
             found = json.loads(self.file(key).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return None
-        return found if isinstance(found, dict) and found.get("key") == key else None
+        whole = isinstance(found, dict) and found.get("key") == key and isinstance(found.get("verdict"), str)
+        return found if whole else None
 
     def finish(self, key: str, answer: Answer) -> None:
         """Keep the answer of a task; raises OSError."""

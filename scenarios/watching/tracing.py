@@ -96,11 +96,11 @@ class Tracing:
 
     def _started(self, event: Path) -> "subprocess.Popen[bytes]":
         out = str(event / ANSWER)
-        command = ["-m", "scenarios.cli", "close-loop", str(event), "--out", out, "--jobs", "1", "--resume"]
+        asked = ["close-loop", str(event), "--out", out, "--jobs", "1", "--resume"]
         with (event / LOG).open("ab") as log:
             return subprocess.Popen(
-                [sys.executable, *command], stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-                preexec_fn=_behind,
+                [sys.executable, "-P", "-m", "scenarios.cli", *asked], stdin=subprocess.DEVNULL,
+                stdout=log, stderr=subprocess.STDOUT, preexec_fn=_behind,
             )  # fmt: skip
 
 
@@ -122,5 +122,5 @@ def answer_of(event: Path) -> Answer:
         result: Any = json.loads((event / ANSWER / "result.json").read_text(encoding="utf-8"))
         found = tuple(f"{e['kind']} at {e['location']}" for e in result["effects"])
         return Answer(event.name, str(result["verdict"]), found)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return Answer(event.name, "not looked into yet")

@@ -18,16 +18,18 @@ from scenarios.estimating.findings import Tell
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
+from scenarios.links import refuse_links
 from scenarios.output import unwritten, writable
 from scenarios.watching import checkpoint
 from scenarios.watching.capturing import EVENTS, Capturing, sentence
+from scenarios.watching.capturing import RECENT as LAST
 from scenarios.watching.checkpoint import Checkpoint
 from scenarios.watching.commission import Commissioned, Making, commissioned
 from scenarios.watching.declaration import Watched, load_watching
 from scenarios.watching.following import LEARNING, PAST, TESTED, Following, Outcome
 from scenarios.watching.health import Height, Status
 from scenarios.watching.joining import Joining
-from scenarios.watching.logging import Log
+from scenarios.watching.logging import FILE, OLD, Log
 from scenarios.watching.result import RESULT, WatchResult
 from scenarios.watching.serving import Serving
 from scenarios.watching.sources.folder import Folder
@@ -60,6 +62,7 @@ def watch(
     Raises BadInput if a declaration or the record of the experiment is wrong; a window that is wrong is left
     out. KeyboardInterrupt leaves the checkpoint of the last window, from which the same call goes on.
     """
+    refuse_links(Path(out).absolute(), checkpoint.FILE, FILE, OLD, LAST, EVENTS)
     declared = load_watching(watching)
     where = declared.folder / declared.experiment
     e = load_experiment(where / "experiment.toml" if where.is_dir() else where)

@@ -15,7 +15,8 @@ QUICK, MANY = 40, 2000
 @pytest.mark.parametrize("name", targets())
 def test_a_spoiled_file_is_read_or_bad_input(name, count, tmp_path):
     target, rng = targets()[name], random.Random(count)
-    assert not wrong(target, target.good, tmp_path)
+    (tmp_path / target.name).write_bytes(target.good)
+    target.read(tmp_path / target.name)  # else all spoiled ones could be refused for what is wrong in it
     for _ in range(count):
         data = spoiled(target.good, rng)
         told = wrong(target, data, tmp_path)

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import pytest
 from packaging.markers import Marker
@@ -12,7 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from tests.helpers.paths import ROOT
-from tests.sbom import DECLARED, FILE, LOCK, WHEEL, Pin, bill, declared, inside, pins
+from tests.sbom import DECLARED, FILE, LOCK, OURS, WHEEL, Pin, bill, declared, inside, pins
 
 INTEROP = ROOT / "requirements-interop.lock"
 OTHERS = "interop"  # the extra that has a lock of its own
@@ -137,5 +138,17 @@ def _is_packed(file: Path) -> bool:
     return max(map(len, file.read_text(encoding="utf-8").splitlines())) > 1000
 
 
-def test_the_bill_of_materials_is_part_of_the_package() -> None:
-    assert WHEEL["sbom-files"] == [FILE.name]
+def test_a_wheel_carries_the_bill_of_materials(tmp_path: Path) -> None:
+    """As it is built for a release, in the folder of its metadata that PEP 770 names."""
+    from hatchling.builders.wheel import WheelBuilder
+
+    [wheel] = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["standard"])
+    with ZipFile(wheel) as packed:
+        names = packed.namelist()
+        [held] = [name for name in names if ".dist-info/sboms/" in name]
+        assert held == f"{OURS}-{DECLARED['project']['version']}.dist-info/sboms/{FILE.name}"
+        assert packed.read(held) == FILE.read_bytes()
+        [record] = [name for name in names if name.endswith(".dist-info/RECORD")]
+        assert f"{held},sha256=" in packed.read(record).decode()
+    tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
+    assert tops == set(WHEEL["packages"])

@@ -1,6 +1,9 @@
 """The native container of a foreign FMU takes the same steps as the container in Python."""
 
+import os
 import re
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -14,10 +17,14 @@ from fmus.export.builders import hypotheses
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container import carrier
 from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu, FmuError
+from tests.helpers.native import DEFINED, STRICT, compiler, native
+from tests.helpers.packed import repacked
+from tests.helpers.paths import ROOT
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
 BASES = {
@@ -165,3 +172,76 @@ def test_a_variable_may_be_set_and_asked_for_more_than_once(base, tmp_path):
         (force,) = fmu.references(["F"])
         fmu.instance.set([force] * many, [float(k) for k in range(many)])
         assert fmu.read(["q", "F"] * many) == [0.1, many - 1.0] * many
+
+
+CARRIED = """
+import sys
+import numpy as np
+from fmus.host.fmu import Fmu, FmuError
+t = np.arange(400) * 2.5e-3
+for _ in range(3):
+    with Fmu(sys.argv[1]) as fmu, Fmu(sys.argv[1]) as other:
+        first = fmu.simulate(t, {"F": np.sin(9 * t)}, ["q"], {"M": 90.0})
+        other.restart(M=50.0)
+        other.step(1e-3, F=3.0)
+        assert np.array_equal(first, fmu.simulate(t, {"F": np.sin(9 * t)}, ["q"], {"M": 90.0}))
+        try:
+            fmu.step(float("nan"))
+        except FmuError:
+            pass
+print("lived")
+"""
+
+
+@pytest.fixture
+def sources(tmp_path, monkeypatch) -> Path:
+    """The C files of a carrier with effects of every kind, in a folder, and its FMU without a library."""
+    made = tmp_path / "sources"
+    made.mkdir()
+
+    def kept(code, main, linked=()):
+        for name, data in code.items():
+            (made / name).write_bytes(data)
+        return b"no library"
+
+    monkeypatch.setattr(carrier, "library", kept)
+    effects = [effect for some, _ in EFFECTS.values() for effect in some]
+    build_carrier(native("drive"), (PORT,), effects, tmp_path / "bare.fmu")
+    return made
+
+
+def compiled(sources: Path, *flags: str) -> bytes:
+    """The carrier's library, made without a warning."""
+    strict = [flag for flag in STRICT if flag != "-pedantic"]  # it forbids functions of loaded libraries
+    strict += [*DEFINED, "-g", "-fPIC", "-shared", "-fvisibility=hidden", *flags]
+    files = ["carrier.c", "-o", "made.so", "-lm", "-ldl"]
+    subprocess.run([compiler(), *strict, *files], cwd=sources, check=True)
+    return (sources / "made.so").read_bytes()
+
+
+def test_the_carrier_compiles_without_a_warning(sources):
+    assert compiled(sources)
+
+
+@pytest.mark.slow
+def test_sanitizers_find_nothing_in_the_carrier(sources, tmp_path):
+    """In a process of Python in which the address sanitizer is loaded first; leaks are Python's own too."""
+    runtime = subprocess.run(
+        [compiler(), "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    if not Path(runtime).is_absolute():
+        pytest.skip("the C compiler here has no address sanitizer")
+    # what the sanitizers add makes the compiler guess that values may not be set
+    flags = ("-O1", "-Wno-maybe-uninitialized", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    made = compiled(sources, *flags)
+
+    def exchanged(name, data):
+        return (name, made) if data == b"no library" else (name, data)
+
+    fmu = repacked(tmp_path / "bare.fmu", tmp_path / "carried.fmu", exchanged)
+    watched = os.environ | {"LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0"}
+    done = subprocess.run(
+        [sys.executable, "-c", CARRIED, str(fmu)], cwd=ROOT, env=watched, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout) == (0, "lived\n"), done.stderr
+    assert "runtime error" not in done.stderr

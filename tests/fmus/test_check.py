@@ -18,6 +18,7 @@ from fmus.host.grading import check
 from fmus.host.grading.check import Check, Grade, grade
 from fmus.host.grading.fitness import LETTER, fitness
 from fmus.host.grading.trials import TRIALS
+from scenarios.cli.app import run_safely
 from tests.helpers.foreign import AT_START, GOOD, HIDDEN
 from tests.helpers.packed import repacked, with_description
 from tests.helpers.sizes import bare_and_with_all_effects
@@ -64,6 +65,15 @@ def test_every_outcome_is_one_sentence(built, foreign):
             assert c.sentence.endswith(".")
             assert c.sentence[0].isupper()
             assert "\n" not in c.sentence
+
+
+def test_where_isolation_matters_is_printed(foreign, capfd):
+    """And where every trial came to its end, nothing is said of it: a failure is no crash."""
+    assert grade(foreign(HIDDEN)).isolation == ""
+    assert run_safely(["check", str(foreign("if dt < 0:\n    os._exit(0)\n" + GOOD))]) == 1
+    last = capfd.readouterr().out.splitlines()[-1]
+    assert last.startswith("isolation matters: it ended or held up its process in the trial refusals; ")
+    assert "--trust-fmu" in last
 
 
 def test_what_is_not_offered_is_no_failure(foreign):
@@ -177,7 +187,8 @@ def test_refusal_that_cannot_be_survived(foreign):
     ],
 )
 def test_a_crash_is_one_failed_check(foreign, end, words):
-    assert_only(foreign(f"if dt < 0:\n    {end}\n" + GOOD), "refusals", words)
+    path = foreign(f"if dt < 0:\n    {end}\n" + GOOD)
+    assert_only(path, "refusals", words)
 
 
 def test_a_crash_in_the_middle_leaves_the_rest(foreign):
@@ -185,12 +196,14 @@ def test_a_crash_in_the_middle_leaves_the_rest(foreign):
     found = grade(path)
     assert [c.title for c in found.checks] == list(TRIALS)
     assert {c.title for c in found.checks if c.passed is False} == {"tunable parameters", "refusals"}
+    assert "process in the trials tunable parameters and refusals" in found.isolation
 
 
 def test_a_run_without_end_is_ended(foreign, built):
     found = grade(foreign("while dt < 0:\n    time.sleep(1)\n" + GOOD), patience=12.0)
     assert [c.passed for c in found.checks][-1] is False
     assert re.fullmatch(r"It did not come to an end within \d+ s\.", found.checks[-1].sentence)
+    assert found.isolation.startswith("isolation matters: ")
     assert all(c.passed is not False for c in found.checks[:-1])
 
 

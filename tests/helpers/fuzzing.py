@@ -24,8 +24,13 @@ from fmus.errors import BadInput
 from fmus.export.ssp.reading import read_package
 from fmus.host.archive import describe
 from fmus.host.master.expression import parsed
+from scenarios.campaign.declaration import Declaration as Campaign
+from scenarios.campaign.sampling import points_of
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.readers import read_sheet
+from scenarios.experiment.validation import read_file
+from scenarios.fleet.declaration import Declaration as Fleet
+from scenarios.fleet.records import read_records
 from scenarios.reporting.entries import entry
 from scenarios.simulating.expression import statement
 from scenarios.simulating.reading import load_scenario
@@ -44,7 +49,7 @@ STRUCTURE = b"""<?xml version="1.0"?>
  xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" version="1.0" name="s"><ssd:System name="s">
 <ssd:Elements><ssd:Component name="a" source="resources/a.fmu" type="application/x-fmu-sharedlibrary">
 <ssd:Connectors><ssd:Connector name="u" kind="input"><ssc:Real unit="m"/></ssd:Connector></ssd:Connectors>
-</ssd:Component></ssd:Elements><ssd:Connections/></ssd:System>
+</ssd:Component></ssd:Elements></ssd:System>
 <ssd:DefaultExperiment startTime="0" stopTime="1"/></ssd:SystemStructureDescription>"""
 STATEMENTS = b"max(abs(run.m.x)) < 2e-3 and rms(run.m.x - 2 * run.m.y) ** 2 <= 1 / (3 + pi)"
 
@@ -82,6 +87,9 @@ def targets() -> Mapping[str, Target]:
         Target("experiment.toml", EXPERIMENT.encode(), load_experiment),
         Target("scenario.toml", SCENARIO.encode(), load_scenario),
         Target("watch.toml", (SHIPPED / "watch" / "watch.toml").read_bytes(), load_watching),
+        Target("campaign.toml", (SHIPPED / "campaign" / "settling.toml").read_bytes(), _sampled),
+        Target("fleet.toml", (SHIPPED / "fleet" / "fleet.toml").read_bytes(), _fleet),
+        Target("records.csv", (SHIPPED / "fleet" / "records.csv").read_bytes(), _records),
         Target("modelDescription.xml", DESCRIPTION.replace("{fault}", "none").encode(), _described),
         Target("bad.fmu", _fmu(DESCRIPTION.replace("{fault}", "none").encode()), describe),
         Target("SystemStructure.ssd", STRUCTURE, _packaged),
@@ -116,6 +124,20 @@ def _packaged(file: Path) -> object:
         archive.writestr("SystemStructure.ssd", file.read_bytes())
         archive.writestr("resources/a.fmu", b"")
     return read_package(package)
+
+
+def _sampled(file: Path) -> object:
+    d = read_file(Campaign, file, "a campaign file")
+    return points_of(d.model_copy(update={"n": d.n and min(d.n, 8)}))  # few, for many points take minutes
+
+
+def _fleet(file: Path) -> object:
+    return read_file(Fleet, file, "a fleet file")
+
+
+def _records(file: Path) -> object:
+    setups = {"rig": {"experiment": "setup.toml"}}
+    return read_records(Fleet.model_validate({"id": "x", "records": file.name, "setups": setups}), file)
 
 
 def _stated(file: Path) -> object:

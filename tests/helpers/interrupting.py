@@ -22,7 +22,9 @@ from tests.helpers.small_commands import command_line, prepare
 PATIENCE = 180  # s, for a busy machine; a command that hangs is named
 LONGEST = 25.0  # s, within which signals come
 SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+LEAVING = 60.0  # s, within which what a killed command had started is gone
 AGAIN = 0.5  # s, within which an impatient user sends the signal again
+GOES_ON = {"close-loop": ("--resume",)}  # what a command is given to go on after a kill
 
 
 def interrupted(
@@ -95,6 +97,44 @@ def tried(command: str, seed: int, times: int, folder: Path) -> list[str]:
         when = " and ".join(f"{t:.2f} s" for t in after)
         found += [f"{command}, {number.name} after {when} of {lasts:.1f} s: {one}: {said}" for one in wrong]
     return found
+
+
+def killed(command: str, seed: int, times: int, folder: Path) -> list[str]:
+    """Faults of a command that is killed at so many random moments, and of the next one, which goes on.
+
+    What it leaves beside the results, under names that begin with a dot, the next command may remove.
+    """
+    temporary, out = folder / f"temporary-killed-{command}", folder / f"out-killed-{command}"
+    temporary.mkdir()
+    arguments, rng = command_line(command, out), np.random.default_rng(seed)
+    begun = time.monotonic()
+    code, said = interrupted(arguments, folder, temporary, signal.SIGINT, LONGEST)
+    lasts, found = min(time.monotonic() - begun, LONGEST), []
+    for _ in range(times):
+        shutil.rmtree(out, ignore_errors=True)
+        after = rng.uniform(0.05, lasts)
+        interrupted(arguments, folder, temporary, signal.SIGKILL, after)
+        until = time.monotonic() + LEAVING
+        while (left := orphans(temporary)) and time.monotonic() < until:
+            time.sleep(0.2)
+        wrong = [f"orphan: {one}" for one in left]
+        files = [file for file in out.rglob("*") if file.is_file() and not _is_aside(file, out)]
+        wrong += [f"half file: {file.name}" for file in files if not whole(file)]
+        found += [f"{command}, killed after {after:.2f} s of {lasts:.1f} s: {one}" for one in wrong]
+    code, said = interrupted(
+        [*arguments, *GOES_ON.get(command, ())], folder, temporary, signal.SIGINT, PATIENCE
+    )
+    wrong = [f"left: {file}" for file in (*temporary.iterdir(), *out.rglob(".writing_*"))]
+    wrong += [] if code in (0, 1) else [f"exit code {code}: {said}"]
+    return found + [f"{command}, after it was killed: {one}" for one in wrong]
+
+
+def _is_aside(file: Path, out: Path) -> bool:
+    """Whether a file is written beside the results, to be renamed or moved when it is whole."""
+    parts = file.relative_to(out).parts
+    return any(part.startswith(".writing_") for part in parts) or (
+        file.name.startswith(".") or file.suffix == ".part"
+    )
 
 
 def main(seed: int, times: int, commands: Sequence[str]) -> None:

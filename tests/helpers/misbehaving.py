@@ -96,7 +96,9 @@ CALLS = {
     "load": "loading its library", "instantiate": "fmi2Instantiate", "setup": "fmi2SetupExperiment",
     "enter": "fmi2EnterInitializationMode", "leave": "fmi2ExitInitializationMode", "set": "fmi2SetReal",
     "get": "fmi2GetReal", "step": "fmi2DoStep", "late": "fmi2DoStep", "reset": "fmi2Reset",
+    "terminate": "fmi2Terminate", "free": "fmi2FreeInstance",
 }  # fmt: skip
+AFTER = ("terminate", "free")  # calls when the work is done
 SIGNALS = {
     "abort": "Aborted", "assert": "Aborted", "says": "Aborted", "twice": "Aborted",
     "segfault": "Segmentation",
@@ -119,7 +121,7 @@ DEATHS = (
         _death(what, call)
         for what in ("segfault", "exit0", "_exit0")
         for call in CALLS
-        if call not in ("late", "reset")
+        if call not in ("late", "reset", *AFTER)
     ),
     Fault("memory", "late", "fmi2DoStep.*memory|fmi2DoStep.*Aborted"),
     Fault("shared_memory", "late", "fmi2DoStep.*needs more than .* of memory"),
@@ -129,6 +131,27 @@ ENDLESS = (
     *(_death(what, call) for what in HANGS for call in ("late", "leave", "instantiate")),
     *(_death(what, "late") for what in ("stop", "cuts_memory")),
 )
+# at the end of a run, whose results are not believed then
+AT_THE_END = tuple(_death(what, call) for what in ("segfault", "exit0", "sleep") for call in AFTER)
+
+
+def _refusal(what: str, call: str, words: str) -> Fault:
+    status = {
+        "discard": r"2 \(discard\)", "error": r"3 \(error\)", "fatal": r"4 \(fatal\)",
+        "status": r"77 \(not of the standard\)",
+    }  # fmt: skip
+    return Fault(what, call, f"{words}.* failed with status {status[what]}")
+
+
+# what an FMU says no to, without a word of why
+REFUSALS = (
+    *(_refusal(what, "late", r"step of 0\.001 s") for what in ("discard", "error", "fatal", "status")),
+    _refusal("discard", "leave", "fmi2ExitInitializationMode"),
+    _refusal("fatal", "get", "reading outputs"),
+    _refusal("error", "set", "setting inputs"),
+    Fault("error", "instantiate", "Failed to instantiate model"),
+)
+NOT_FINITE = (Fault("nan", "none", "is not finite"), Fault("infinite", "none", "is not finite"))
 
 
 @cache
@@ -174,7 +197,7 @@ def write_data(folder: Path) -> None:
 HARMLESS = tuple(
     Fault(what, "step", "")
     for what in (
-        "none", "warning", "null_message", "log_flood", "print_flood", "no_line", "closes_output",
-        "directory", "locale", "rounding", "ignores_signals", "leak", "child", "background",
+        "none", "warning", "null_message", "formats", "log_flood", "print_flood", "no_line", "closes_output",
+        "directory", "locale", "rounding", "traps", "ignores_signals", "leak", "child", "background",
     )
 )  # fmt: skip

@@ -188,6 +188,12 @@ def written(folder: Path, *changes: tuple[str, str]) -> Path:
         ("values = [4e5, 5e5]", "low = 1.0, high = 2.0", "needs 'values', or 'low', 'high' and 'points'"),
         ("values = [4e5, 5e5]", "low = 1.0, high = 2.0, mean = 1.0", "either 'low' and 'high', or 'mean'"),
         ("values = [4e5, 5e5]", 'low = 0.0, high = 2.0, points = 3, scale = "log"', "has no logarithm"),
+        ("values = [4e5, 5e5]", "low = 0, high = 1000000000000, whole = true", "for 1000000000001 points"),
+        ("values = [4e5, 5e5]", "low = 0, high = 1e300, whole = true", "asks for more than 10^15 points"),
+        ("values = [4e5, 5e5]", "low = 1.0, high = 2.0, points = 1000001", "asks for 1000001 points, and"),
+        ('sample = "grid"', 'sample = "sobol"\nn = 1048576', "asks for 3145728 points"),
+        ('sample = "grid"', 'sample = "latin-hypercube"\nn = 4000000000', "asks for 4000000000 points"),
+        ("values = [4e5, 5e5]", "values = [1979-05-27]", "fmus.vehicle.parameters"),
         ("fmus.vehicle.parameters.k1", "fmus.vehicle.parameters.k1 k2", "is no key of TOML"),
         ("fmus.vehicle.parameters.k1", "duration.k1", "'duration' is no table"),
         ("fmus.vehicle.parameters.k1", "expect.9.that", "is no number of a list"),
@@ -204,6 +210,16 @@ def test_what_is_wrong_in_the_file_is_one_line_that_names_it(old, new, said, tmp
         plan_of(written(tmp_path, (old, new)), ISOLATED)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_value_that_no_scenario_takes_is_a_point_that_fails(tmp_path):
+    """Only the first point is tried before; a date has no form in JSON, by which points are known."""
+    plan = plan_of(written(tmp_path, ("[4e5, 5e5]", "[4e5, 1979-05-27]")), ISOLATED)
+    assert len({task.key for task in plan.tasks}) == 2
+    found = assembled(plan, {}, {}, 1.0)
+    write_tables(tmp_path / "out", found)
+    kept = pq.read_table(tmp_path / "out" / "points.parquet")
+    assert kept["fmus.vehicle.parameters.k1"].to_pylist() == ["400000.0", '"1979-05-27"']
 
 
 def test_a_task_is_known_by_all_that_its_answer_follows_from(tmp_path):

@@ -1,5 +1,6 @@
 """The command line: wrong input gets one clear line and exit code 2, whatever is wrong with it."""
 
+import os
 import subprocess
 import sys
 import zipfile
@@ -8,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.cli.app import COMMANDS, _told, run_safely
+from scenarios.cli.app import COMMANDS, NOTHING_FROM_HERE, _told, run_safely
+from tests.helpers.misbehaving import Fault, bad_fmu
 from tests.helpers.paths import SHIPPED
 
 DEMO = SHIPPED / "demo" / "rig-drag"
@@ -234,3 +236,50 @@ def test_all_commands_are_listed_with_what_they_do():
 def test_a_command_stays_a_command_where_it_is_loaded_alone(capsys):
     assert railfmi("check", "--help") == 0
     assert " check [OPTIONS] {fmu}" in capsys.readouterr().out
+
+
+FROM_HERE = """
+import sys
+from joblib import Parallel, delayed
+import scenarios.cli.app as app
+
+def command(run, arguments):
+    from numba.core import config
+    return 10 * bool(config.CACHE_DIR) + sum(Parallel(2)(delayed(abs)(i) for i in (-1, 2)))
+
+app.supervised = command
+app.main()
+"""
+
+
+def test_nothing_is_run_that_lies_in_the_working_folder(tmp_path: Path) -> None:
+    """It may be that of somebody's data; Python's own workers would import modules from it first."""
+    for name in ("joblib", "numpy", "json", "pickle", "scenarios", "fmus"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('run from the working folder')\n")
+    (tmp_path / ".numba_config.yaml").write_text("cache_dir: here\n")
+    left = {name: value for name, value in os.environ.items() if name not in NOTHING_FROM_HERE}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", FROM_HERE], cwd=tmp_path, env=left, capture_output=True, text=True
+    )
+    assert done.returncode == 3, done.stderr
+
+
+@pytest.mark.slow
+def test_close_loop_runs_nothing_of_the_working_folder(tmp_path: Path, compiled: Path) -> None:
+    """As a command in the folder of the record, with workers that import."""
+    bad_fmu(tmp_path, Fault("none", "none", ""), compiled)
+    for name in ("joblib", "numpy", "scipy", "casadi"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('run from the working folder')\n")
+    call = "from scenarios.cli.app import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", call, "close-loop", "experiment.toml", "--jobs", "2", "--out", "out"],
+        cwd=tmp_path, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "result.json").exists()
+
+
+@pytest.fixture
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for a compiled library."""
+    return tmp_path_factory.mktemp("compiled")

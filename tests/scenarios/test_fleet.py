@@ -1,6 +1,7 @@
 """Fleets: the table of records, the tasks, rows and pooling, clear errors, and a whole run."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -12,10 +13,11 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 import pytest
 
+from fmus import limits
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import ISOLATED
 from scenarios.fleet.declaration import Declaration
-from scenarios.fleet.records import read_records, with_record
+from scenarios.fleet.records import NEEDED, read_records, with_record
 from tests.helpers.paths import ROOT
 from tests.truth.rig import write_record
 from tests.truth.rig_effects import Effects, Torque
@@ -171,6 +173,26 @@ def test_a_record_without_data_is_a_row_with_the_reason(tmp_path):
     found = assembled(plan, Store(tmp_path / "none"), {}, 1.0)
     assert [row["record"] for row in found.rows] == ["r00", "r00"][: len(found.rows)]
     assert all("00.csv: cannot be read" in row["reason"] for row in found.rows)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+def test_a_record_that_is_no_file_is_not_waited_for(kind, tmp_path):
+    file = written(tmp_path)
+    data = tmp_path / "00.csv"
+    data.unlink()
+    {"pipe": os.mkfifo, "device": lambda d: d.symlink_to("/dev/zero"), "folder": os.mkdir}[kind](data)
+    reasons = [j.reason for j in plan_of(file, ISOLATED).jobs if j.record and j.record.data == data]
+    assert reasons
+    assert all(r == reasons[0] and r.startswith("00.csv: cannot be read (is a folder, ") for r in reasons)
+
+
+def test_a_table_of_records_that_would_fill_the_memory_is_not_read(tmp_path, monkeypatch):
+    import pandas as pd
+
+    monkeypatch.setattr(limits, "RECORD", 1e-6)
+    pd.DataFrame({name: ["a"] * 1000 for name in NEEDED}).to_parquet(tmp_path / "records.parquet")
+    with pytest.raises(BadInput, match=r"^\S+records\.parquet: holds 2.4e-05 GB, more than 1e-06 GB"):
+        read_records(declared(), tmp_path / "records.parquet")
 
 
 def test_a_broken_record_is_an_answer_with_the_reason_and_changed_data_none(tmp_path):

@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -14,11 +15,14 @@ import pytest
 
 from fmus.files import remove_left
 from fmus.host.master.recording import read_recording
-from scenarios.cli.supervision import FOLDER
+from scenarios.cli.supervision import FOLDER, hint
 from scenarios.tasks.undisturbed import undisturbed
 from tests.helpers.interrupting import PATIENCE, SIGNALS, orphans
 from tests.helpers.misbehaving import EXPERIMENT, SCENARIO, Fault, bad_fmu, write_data
 from tests.helpers.paths import SHIPPED
+from tests.helpers.small_commands import command_line
+
+LATEST = 5.0  # s, after an interrupt
 
 SWALLOWS = """if t > 0.05:
     open({mark!r}, "w").close()
@@ -30,23 +34,27 @@ SWALLOWS = """if t > 0.05:
 self.x += dt * (self.u - self.k * self.x)"""
 
 
-def ended(
-    arguments: Sequence[str | Path], number: int, begun: Path, folder: Path
-) -> subprocess.CompletedProcess[str]:
-    """A command to which a signal was sent as soon as a file was there; its temporary files in `folder`."""
-    command = [sys.executable, "-m", "scenarios.cli", *map(str, arguments)]
-    process = subprocess.Popen(
-        command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        env=os.environ | {"TMPDIR": str(folder)},
+def begun(arguments: Sequence[str | Path], folder: Path) -> subprocess.Popen[str]:
+    """A command that has been started, with its temporary files in `folder`."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "scenarios.cli", *map(str, arguments)], text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ | {"TMPDIR": str(folder)},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
+
+
+def ended(
+    arguments: Sequence[str | Path], number: int, there: Path, folder: Path
+) -> subprocess.CompletedProcess[str]:
+    """A command to which a signal was sent as soon as a file was there; its temporary files in `folder`."""
+    process = begun(arguments, folder)
     until = time.monotonic() + PATIENCE
-    while not any(Path("/").glob(str(begun)[1:])) and process.poll() is None and time.monotonic() < until:
+    while not any(Path("/").glob(str(there)[1:])) and process.poll() is None and time.monotonic() < until:
         time.sleep(0.05)
     assert process.poll() is None, process.communicate()[0]
     process.send_signal(number)
     said, _ = process.communicate(timeout=PATIENCE)
-    return subprocess.CompletedProcess(command, process.returncode, said, "")
+    return subprocess.CompletedProcess(process.args, process.returncode, said, "")
 
 
 @contextlib.contextmanager
@@ -134,11 +142,11 @@ def test_the_fits_of_an_fmu_are_interrupted(swallowing, command, trusted):
 def test_a_loop_says_how_to_go_on(tmp_path, step, number):
     (tmp_path / "temporary").mkdir()
     arguments = ["close-loop", SHIPPED / "demo" / "rig-drag", "--out", tmp_path / "out", "--jobs", "2"]
-    begun = tmp_path / "out" / ".stages" / f"{step}.checkpoint"
-    done = ended(arguments, number, begun, tmp_path / "temporary")
+    kept = tmp_path / "out" / ".stages" / f"{step}.checkpoint"
+    done = ended(arguments, number, kept, tmp_path / "temporary")
     assert done.returncode == SIGNALS[number]
     assert "--resume" in done.stdout
-    assert begun.exists()
+    assert kept.exists()
     assert_tidied(tmp_path / "temporary")
 
 
@@ -172,8 +180,8 @@ def test_the_next_command_tidies_up_after_a_killed_one(tmp_path):
 def test_a_build_leaves_no_compiler(tmp_path, number):
     (tmp_path / "temporary").mkdir()
     arguments = ["build", "wheelset", "--kind", "native", "--platform", "all", "--out", tmp_path / "out"]
-    begun = tmp_path / "temporary" / "railfmi_*" / "railfmi_*"
-    done = ended(arguments, number, begun, tmp_path / "temporary")
+    folders = tmp_path / "temporary" / "railfmi_*" / "railfmi_*"
+    done = ended(arguments, number, folders, tmp_path / "temporary")
     assert done.returncode == SIGNALS[number]
     assert "interrupted" in done.stdout
     assert not (tmp_path / "out").exists()
@@ -187,12 +195,63 @@ def test_a_fleet_ends_in_one_line_while_its_workers_start(tmp_path, number):
     (tmp_path / "temporary").mkdir()
     fleet = SHIPPED / "fleet" / "fleet.toml"
     arguments = ["fleet", fleet, "--workers", "2", "--quiet", "--out", tmp_path / "out"]
-    begun = tmp_path / "temporary" / "railfmi_*" / "railfmi_workers_*"
-    done = ended(arguments, number, begun, tmp_path / "temporary")
+    workers = tmp_path / "temporary" / "railfmi_*" / "railfmi_workers_*"
+    done = ended(arguments, number, workers, tmp_path / "temporary")
     assert done.returncode == SIGNALS[number]
     assert done.stdout.startswith("railfmi: interrupted")
     assert len(done.stdout.splitlines()) == 1, done.stdout
     assert_tidied(tmp_path / "temporary")
+
+
+@pytest.fixture
+def silent():
+    """The address of a scheduler that takes a connection and never says a word, and when it has taken one."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(PATIENCE)
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}", server.accept
+
+
+@pytest.mark.parametrize(
+    ("command", "number"),
+    [("campaign", signal.SIGINT), pytest.param("fleet", signal.SIGTERM, marks=pytest.mark.slow)],
+)
+def test_a_command_that_connects_to_a_scheduler_says_how_to_go_on(command, number, silent, tmp_path):
+    """The library would wait a minute to close a client whose start was broken off."""
+    pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
+    address, taken = silent
+    (tmp_path / "temporary").mkdir()
+    arguments = [*command_line(command, tmp_path / "out"), "--scheduler", address, "--quiet"]
+    with begun(arguments, tmp_path / "temporary") as process:
+        try:
+            connection, _ = taken()
+            with connection:
+                time.sleep(0.5)  # it waits for an answer
+                since = time.monotonic()
+                process.send_signal(number)
+                said, _ = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
+    assert time.monotonic() - since < LATEST
+    assert process.returncode == SIGNALS[number]
+    [line] = said.splitlines()
+    assert line.startswith("railfmi: interrupted; ")
+    assert line.endswith("the same command goes on from here")
+    assert_tidied(tmp_path / "temporary")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["fleet", "watch"], "the same command goes on from here"),
+        (["watch", "--once"], "from the last window"),
+        (["-q", "close-loop", "fleet"], "--resume"),
+        (["run", "watch"], "files that were finished before are kept"),
+        ([], "files that were finished before are kept"),
+    ],
+)
+def test_what_is_said_of_an_interrupt_is_of_the_command(arguments, words):
+    """Not of a file that has the name of another one."""
+    assert words in hint(arguments)
 
 
 @pytest.fixture

@@ -8,7 +8,16 @@ import pytest
 
 from fmus.host.master.recording import read_recording
 from scenarios.cli.app import run_safely
-from tests.helpers.misbehaving import DEATHS, ENDLESS, HARMLESS, Fault, bad_fmu
+from tests.helpers.misbehaving import (
+    AT_THE_END,
+    DEATHS,
+    ENDLESS,
+    HARMLESS,
+    NOT_FINITE,
+    REFUSALS,
+    Fault,
+    bad_fmu,
+)
 
 PROGRESS = "... "  # how a line of progress begins, which is no message
 LIMITS = ["--call-limit", "4", "--memory-limit", "0.6"]
@@ -77,6 +86,48 @@ def test_what_does_no_harm_is_no_failure(fault, tmp_path, compiled, capfd, monke
     code, out, err = told("run", fault, tmp_path, compiled, capfd, monkeypatch)
     assert code == 0, err
     assert out.splitlines()[0].startswith("bad: 1 of 1 expectations met")
+
+
+def some(faults: tuple[Fault, ...]) -> list[object]:
+    """Faults of which every third is quick."""
+    return [
+        pytest.param(fault, marks=() if i % 3 == 0 else pytest.mark.slow, id=fault.name)
+        for i, fault in enumerate(faults)
+    ]
+
+
+def the_line(out: str, err: str) -> str:
+    """The one line that a command says beside its progress."""
+    [line] = [line for line in (out + err).splitlines() if line.strip() and not line.startswith(PROGRESS)]
+    return line
+
+
+@pytest.mark.parametrize("fault", some(REFUSALS))
+def test_a_refusal_is_told_with_its_status(fault, tmp_path, compiled, capfd, monkeypatch):
+    """An FMU that logs no reason leaves the status to tell; a step that is refused leaves the recording."""
+    code, *said = told("run", fault, tmp_path, compiled, capfd, monkeypatch)
+    assert code == 2
+    assert re.search(fault.words, the_line(*said)), said
+    assert "bad.fmu" in the_line(*said)
+    assert (tmp_path / "out" / "run.parquet").exists() == (fault.call == "late")
+
+
+@pytest.mark.parametrize("fault", some(AT_THE_END))
+def test_a_run_whose_fmu_breaks_down_at_its_end_is_no_result(fault, tmp_path, compiled, capfd, monkeypatch):
+    code, *said = told("run", fault, tmp_path, compiled, capfd, monkeypatch)
+    assert code == 2
+    assert re.search(fault.words, the_line(*said)), said
+    assert not (tmp_path / "out" / "result.json").exists()
+    kept = read_recording(tmp_path / "out" / "run.parquet").data
+    assert kept["time"].iloc[-1] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("fault", some(NOT_FINITE))
+def test_a_statement_over_what_is_not_finite_does_not_hold(fault, tmp_path, compiled, capfd, monkeypatch):
+    code, out, _ = told("run", fault, tmp_path, compiled, capfd, monkeypatch)
+    assert code == 1
+    assert out.startswith("bad: 0 of 1 expectations met")
+    assert re.search(fault.words, out)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 
 from fmus.contact.forces.conditions import CONDITIONS
 from fmus.errors import BadInput
+from fmus.export.builders import script
 from fmus.host.fmu import FmuError
 from fmus.host.master.recording import read_recording
 from fmus.model import equations
@@ -270,6 +271,22 @@ def test_a_source_that_cannot_be_built_is_said_in_one_line(tmp_path):
     with pytest.raises(BadInput, match=r"broken.py': PythonFMU cannot build it") as refused:
         run(write(tmp_path, text), tmp_path / "out")
     assert "\n" not in str(refused.value)
+
+
+def test_a_source_that_is_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.py")
+    text = edited(GOOD, ('model = "drive"', 'source = "a.py"'))
+    with pytest.raises(BadInput, match=r"a\.py: is a folder, a device or a pipe"):
+        run(write(tmp_path, text), tmp_path / "out")
+
+
+def test_a_source_that_does_not_end_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(script, "PATIENCE", 0.2)
+    source = "import time\nfrom pythonfmu import Fmi2Slave\nclass A(Fmi2Slave): ...\ntime.sleep(999)\n"
+    write(tmp_path, source, "a.py")
+    text = edited(GOOD, ('model = "drive"', 'source = "a.py"'))
+    with pytest.raises(BadInput, match=r"a.py': was not built within 0\.2 s"):
+        run(write(tmp_path, text), tmp_path / "out")
 
 
 def test_a_model_can_be_built_native(tmp_path):

@@ -51,6 +51,22 @@ def test_the_second_format_keeps_axes_and_labels_where_the_first_has_them(tmp_pa
         assert text.any()  # the label was drawn where the second format puts it
 
 
+def test_dollars_in_words_are_no_mathematics(tmp_path):
+    """Broken mathematics would end the command; the powers of ten at the ticks are written as such."""
+    broken = "$\\frac{1$ of $\\nonsense$"
+    figure, axes = sheet(2.0, [["a"]])
+    ax = axes["a"]
+    ax.semilogy([1, 2], [1e-3, 1e3], label=broken)
+    name_axes(ax, broken, broken, broken)
+    legend(figure, ax)
+    figure.suptitle(broken)
+    Plot("one", figure, broken).embedded(tmp_path)
+    assert not any(t.get_parse_math() for t in (ax.title, ax.xaxis.label, *figure.legends[0].get_texts()))
+    ticks = [tick.label1 for tick in ax.yaxis.majorTicks]
+    assert len(ticks) > 2
+    assert all(text.get_parse_math() for text in ticks)
+
+
 def test_the_picture_has_few_colours_and_a_white_ground(tmp_path):
     data = a_plot().write(tmp_path)
     assert data == (tmp_path / "one.png").read_bytes()

@@ -8,16 +8,20 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from scenarios.cli.app import run_safely
 from scenarios.tasks.hashes import hash_of, hash_of_file, hash_of_program
 from scenarios.tasks.store import Store
-from tests.helpers.paths import ROOT
+from tests.helpers.paths import ROOT, SHIPPED
 
 pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
 
+from psutil import net_connections
+
+from scenarios.tasks import running
 from tests.helpers.tasks import BEGUN, FINISHED, noted
 
 PATIENCE = 300  # s, for a process of tasks on a busy machine
@@ -78,9 +82,10 @@ def test_a_task_is_finished_when_its_whole_file_is_there(tmp_path):
     store.finish(KEY, {"verdict": "done", "x": 0.1})
     assert store.read(KEY) == {"key": KEY, "verdict": "done", "x": 0.1}
     whole = store.file(KEY).read_text()
-    for spoiled in ("", whole[:-5], "[]", json.dumps({"key": "another"})):
+    unknown = json.dumps({"key": KEY, "verdict": 3})
+    for spoiled in ("", whole[:-5], "[]", json.dumps({"key": "another"}), unknown, "[" * 100_000):
         store.file(KEY).write_text(spoiled)
-        assert store.read(KEY) is None, spoiled
+        assert store.read(KEY) is None, spoiled[:40]
 
 
 def test_failed_tasks_alone_are_forgotten(tmp_path):
@@ -114,6 +119,19 @@ def test_a_claim_waits_for_the_one_before(tmp_path):
         other.wait()
         if other.stdout:
             other.stdout.close()
+
+
+def test_no_build_is_found_that_another_run_has_left(tmp_path, monkeypatch):
+    """A build is a program: one that lies in a folder of results from elsewhere must not be run."""
+    worker = SimpleNamespace(local_directory=str(tmp_path))
+    monkeypatch.setattr(running, "get_worker", lambda: worker)
+    store, crew = Store(tmp_path / ".tasks"), running.Crew()
+    place = running._place(store, crew.builds)
+    (place.builds / "model.fmu").touch()
+    assert running._place(store, crew.builds) == place
+    other = running._place(store, running.Crew().builds)
+    assert list(other.builds.iterdir()) == []
+    assert other.builds.is_relative_to(tmp_path / ".builds")
 
 
 def test_finished_tasks_are_not_done_again(whole, tmp_path):
@@ -183,8 +201,8 @@ def dask(*arguments: object) -> subprocess.Popen[bytes]:
     )  # fmt: skip
 
 
-def started(cluster: list[subprocess.Popen[bytes]], folder: Path) -> tuple[subprocess.Popen[bytes], str]:
-    """A scheduler with a worker; its process and its address."""
+def scheduling(cluster: list[subprocess.Popen[bytes]], folder: Path) -> tuple[subprocess.Popen[bytes], str]:
+    """A scheduler; its process and its address."""
     file = folder / "scheduler.json"
     file.unlink(missing_ok=True)
     scheduler = dask(
@@ -192,7 +210,12 @@ def started(cluster: list[subprocess.Popen[bytes]], folder: Path) -> tuple[subpr
     )
     cluster.append(scheduler)
     until(lambda: file.exists() and file.read_text().rstrip().endswith("}"))
-    address = json.loads(file.read_text())["address"]
+    return scheduler, json.loads(file.read_text())["address"]
+
+
+def started(cluster: list[subprocess.Popen[bytes]], folder: Path) -> tuple[subprocess.Popen[bytes], str]:
+    """A scheduler with a worker; its process and its address."""
+    scheduler, address = scheduling(cluster, folder)
     cluster.append(
         dask("worker", address, "--nthreads", 1, "--no-dashboard", "--death-timeout", 5, "--local-directory",
              folder / f"worker-{len(cluster)}")
@@ -222,6 +245,27 @@ def test_the_next_run_goes_on_after_a_killed_scheduler(whole, tmp_path, cluster)
     assert len(noted(tmp_path, BEGUN)) <= 12 + 1
     assert {*noted(tmp_path, FINISHED)} == {*range(12)}
     assert tables(tmp_path) == tables(whole)
+
+
+@pytest.mark.slow
+def test_ctrl_c_while_a_scheduler_has_no_workers_says_how_to_go_on(tmp_path, cluster):
+    _, address = scheduling(cluster, tmp_path)
+    port = int(address.rpartition(":")[2])
+    words = ["campaign", str(SHIPPED / "campaign" / "settling.toml"), "--scheduler", address, "--quiet"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "scenarios.cli", *words, "--out", str(tmp_path / "out")], cwd=ROOT, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    with process:
+        until(lambda: any(c.laddr.port == port and c.status == "ESTABLISHED" for c in net_connections("tcp")))
+        time.sleep(2)
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    [line] = said.splitlines()
+    assert line.startswith("railfmi: interrupted; ")
+    assert line.endswith("the same command goes on from here")
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from rich.console import Console
 
 from scenarios.cli import voice
 from scenarios.cli.app import COMMANDS, loaded, run_safely
+from scenarios.cli.console import show
 from scenarios.cli.voice import Progress, plain, progress, span
 from tests.helpers.paths import ROOT, SHIPPED
 
@@ -82,6 +83,15 @@ class Holds:
 def test_what_is_not_of_json_becomes_so():
     given = Holds(Path("a/b"), {"n": np.float64(2.5), "x": np.array([1.0, math.nan]), "s": (True, None)})
     assert plain(given) == {"file": "a/b", "value": {"n": 2.5, "x": [1.0, None], "s": [True, None]}}
+
+
+@pytest.mark.parametrize("tell", [voice.echo, voice.echo_coloured, lambda line: show([line])])
+def test_nothing_is_printed_that_a_terminal_obeys(tell, capfd):
+    """Names in an FMU or a record may hold its codes; spaces without a line break are none."""
+    voice.VOICE.begin()
+    tell("a\u00a0b \x1b[2J\x1b]0;title\x07 \u202eedocnu \x9b1m \ud800")
+    said = "".join(capfd.readouterr()).replace("\n", "")
+    assert said == "a\u00a0b \ufffd[2J\ufffd]0;title\ufffd \ufffdedocnu \ufffd1m \ufffd"
 
 
 def test_json_is_all_that_stands_on_the_output(tmp_path, capsys):

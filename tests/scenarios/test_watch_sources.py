@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from fmus.errors import BadInput
 from scenarios.watching.declaration import Mqtt
 from scenarios.watching.sources.folder import PATIENCE, REMEMBERED, Folder, natural
+from scenarios.watching.sources.mqtt import _password
 from scenarios.watching.sources.source import Arrival
 from scenarios.watching.triggers import TRIGGERS
 from tests.helpers.streams import record, write_experiment, write_watch, write_windows
@@ -204,6 +205,23 @@ def test_a_broker_that_is_not_there_is_bad_input(tmp_path):
     declared = Mqtt(host="127.0.0.1", port=free_port(), topic="x")
     with pytest.raises(BadInput, match="cannot be reached"):
         Broker(declared, tmp_path / "watch.toml")
+
+
+@pytest.mark.parametrize(
+    ("place", "words"), [("several", "several lines, and no password alone"), ("/dev/zero", "a device")]
+)
+def test_what_is_no_password_is_sent_to_no_broker(place, words, tmp_path):
+    """A declaration of somebody else may name any file of mine, and a broker of its own."""
+    (tmp_path / "several").write_text("-----BEGIN PRIVATE KEY-----\nkey\n")
+    declared = Mqtt(host="127.0.0.1", topic="t", user="me", password_file=place)
+    with pytest.raises(BadInput, match=words):
+        _password(declared, tmp_path / "watch.toml")
+
+
+def test_a_password_stands_alone_in_its_file(tmp_path):
+    (tmp_path / "password").write_text("secret\n")
+    declared = Mqtt(host="127.0.0.1", topic="t", user="me", password_file="password")
+    assert _password(declared, tmp_path / "watch.toml") == "secret"
 
 
 def test_a_stream_from_a_broker_is_that_from_a_folder(broker, tmp_path):

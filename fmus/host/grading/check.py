@@ -19,6 +19,7 @@ from fmus.host.grading.trials import TRIALS
 
 PATIENCE = 120.0  # s, for all trials together
 LEAST = 2.0  # s, for the time of a step where the trials took all
+ENDS, LATE = "It brings down the process that runs it", "It did not come to an end"
 RUN, COST = "fmus.host.grading.trials", "fmus.host.grading.cost"
 
 
@@ -51,6 +52,18 @@ class Grade:
     def conclusion(self) -> str:
         """What the FMU is fit for, in one sentence."""
         return f"fit for {'; '.join(map(str, self.fit))}"
+
+    @property
+    def isolation(self) -> str:
+        """What it needs a process of its own for, in one sentence; empty where no trial has shown that."""
+        harmed = [c.title for c in self.checks if c.passed is False and c.sentence.startswith((ENDS, LATE))]
+        if not harmed:
+            return ""
+        where = f"{'trials' if len(harmed) > 1 else 'trial'} {' and '.join(harmed)}"
+        return (
+            f"isolation matters: it ended or held up its process in the {where}; run it without --trust-fmu, "
+            "and elsewhere in a process of its own"
+        )
 
 
 def grade(path: str | Path, patience: float = PATIENCE) -> Grade:
@@ -120,6 +133,6 @@ def _process(module: str, arguments: list[str], patience: float) -> str:
     try:
         ended = subprocess.run(command, env=paths, stdout=quiet, stderr=quiet, timeout=patience, check=False)
     except subprocess.TimeoutExpired:
-        return f"It did not come to an end within {patience:.0f} s."
+        return f"{LATE} within {patience:.0f} s."
     how = signal.strsignal(-ended.returncode) if ended.returncode < 0 else f"exit code {ended.returncode}"
-    return f"It brings down the process that runs it ({how}); keep it out of processes that must live."
+    return f"{ENDS} ({how}); keep it out of processes that must live."

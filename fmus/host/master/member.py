@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fmus.host.fmu import Fmu, FmuError
-from fmus.host.loop import Array
+from fmus.host.loop import Array, refusal
 from fmus.host.master.samples import Extrapolation, Samples, Values
 from fmus.host.master.signals import Signal
 from fmus.host.status import DISCARD, WARNING, AskedToEnd, CallFailed
@@ -123,7 +123,7 @@ class Member:
         except CallFailed as error:
             raise self._refused(str(error)) from error
         if status > WARNING:
-            reason = self._instance.failed(f"step of {dt:g} s", status)
+            reason = refusal(self._instance, f"step of {dt:g} s", status)
             if status == DISCARD:
                 raise StepRefused(self._said(reason))
             raise self._refused(reason)
@@ -204,7 +204,7 @@ class Member:
             raise self._refused(str(error)) from error
 
     def _error(self, what: str, status: int) -> FmuError:
-        return self._refused(self._instance.failed(what, status))
+        return self._refused(refusal(self._instance, what, status))
 
     def _refused(self, reason: str) -> FmuError:
         return FmuError(self._said(reason))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.errors import BadInput
+from fmus.taken import check_text
 from scenarios.watching.declaration import Mqtt
 from scenarios.watching.sources.source import Arrival, Source
 
@@ -51,6 +52,7 @@ class Broker(Source):
         if d.user is not None:
             client.username_pw_set(d.user, _password(d, where))
         if d.certificates is not None:
+            check_text(where.parent / d.certificates)
             client.tls_set(str(where.parent / d.certificates))
         client.max_inflight_messages_set(QUEUED)
         client.on_connect, client.on_message = self._on_connect, self._on_message
@@ -125,11 +127,15 @@ class Broker(Source):
 
 
 def _password(d: Mqtt, where: Path) -> str | None:
-    """The password in the file that the declaration names."""
+    """The password in the file that the declaration names; it goes to the broker, and nothing else may."""
     if d.password_file is None:
         return None
     file = where.parent / d.password_file
+    check_text(file)
     try:
-        return file.read_text(encoding="utf-8").strip()
+        text = file.read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{file}: the password cannot be read ({error}); correct password_file") from error
+    if len(text.splitlines()) > 1:
+        raise BadInput(f"{file}: holds several lines, and no password alone; correct password_file")
+    return text
