@@ -2,7 +2,8 @@
 
     python -m benchmarks.fleet --vehicles 100 --records 10 --out out/benchmarks/fleet
 
-With --once, only one run with one worker and one that is killed on the way, which says nothing on speed.
+The same call goes on where it was cut off. With --once, only one run with one worker and one that is killed
+on the way, which says nothing on speed.
 """
 
 import argparse
@@ -11,36 +12,18 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-from benchmarks.fleet.kills import cluster, command, kill_client, kill_worker, killed_at, run
+from benchmarks.fleet.arms import SLOWER, Clock, Kept, cut, timed
+from benchmarks.fleet.kills import cluster, command, kill_client, kill_worker
 from benchmarks.fleet.make import FleetTruth, write_fleet
+from benchmarks.fleet.outcome import KILLED, Outcome, outcome_of, told
+from benchmarks.machine import described
 
-TABLES = ("results", "drifts.parquet", "levels.parquet", "effects.parquet")
 WORKERS = 2
-
-
-@dataclass
-class Outcome:
-    """What was measured; drift_*: vehicles; seconds: by number of workers, wall time of the whole command."""
-
-    records: int
-    seconds: dict[int, float] = field(default_factory=dict)
-    efficiency: float | None = None
-    same_bytes: dict[str, bool] = field(default_factory=dict)
-    exit_codes: dict[str, int] = field(default_factory=dict)
-    drift_true: list[str] = field(default_factory=list)
-    drift_found: list[str] = field(default_factory=list)
-    broken_true: list[str] = field(default_factory=list)
-    broken_listed: list[str] = field(default_factory=list)
-
-    @property
-    def right(self) -> bool:
-        """Whether those that drift and those that are broken were named alone, and all bytes are equal."""
-        named = self.drift_true == self.drift_found and self.broken_true == self.broken_listed
-        return named and all(self.same_bytes.values())
+LEVEL = 0.01  # of false names: of 400 tests, one fleet in thirty names a sound vehicle
+TRUTH = "truth.json"  # in the folder of the data, written when they are whole
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,73 +36,71 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--drifting", type=float, default=0.05, help="share of vehicles")
     parser.add_argument("--broken", type=float, default=0.01, help="share of records")
     parser.add_argument("--once", action="store_true", help="one worker at a time, no speed")
+    parser.add_argument("--anew", action="store_true", help="forget what is finished already")
     a = parser.parse_args(arguments)
-    shutil.rmtree(a.out, ignore_errors=True)
-    data = a.out / "data"
-    data.mkdir(parents=True)
-    fmu = _built(data)
-    truth = write_fleet(
-        data, a.vehicles, a.records, a.seed, drifting=a.drifting, broken=a.broken, fmu=fmu,
-        commands=("check", "estimate"),
-    )  # fmt: skip
-    found = measured(truth, a.out, a.vehicles * a.records, 1 if a.once else WORKERS)
-    (a.out / "fleet.json").write_text(json.dumps(asdict(found), indent=1))
-    for name, value in asdict(found).items():
-        print(f"{name}: {value}")
+    if a.anew:
+        shutil.rmtree(a.out, ignore_errors=True)
+    kept = Kept(a.out / "arms.json", {k: v for k, v in vars(a).items() if k not in ("out", "anew")})
+    found = measured(_made(a), a.out, a.vehicles * a.records, 1 if a.once else WORKERS, kept)
+    said = {"machine": described(), "asked": dict(kept.asked), "fleet": asdict(found)}
+    (a.out / "fleet.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+    text = told(found)
+    (a.out / "fleet.md").write_text(text, encoding="utf-8")
+    print(text)
     return 0 if found.right else 1
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+def _made(a: argparse.Namespace) -> FleetTruth:
+    """The records and what is true of them, made anew unless they are there as a whole."""
+    data = a.out / "data"
+    if (data / TRUTH).exists():
+        kept = json.loads((data / TRUTH).read_text(encoding="utf-8"))
+        return FleetTruth(kept["drifting"], kept["broken"], data / "fleet.toml")
+    shutil.rmtree(data, ignore_errors=True)
+    data.mkdir(parents=True)
+    _say(f"making {a.vehicles * a.records} records, some 0.1 s each")
+    truth = write_fleet(
+        data, a.vehicles, a.records, a.seed, drifting=a.drifting, broken=a.broken, fmu=_built(data),
+        commands=("check", "estimate"), level=LEVEL,
+    )  # fmt: skip
+    (data / TRUTH).write_text(json.dumps({"drifting": truth.drifting, "broken": truth.broken}))
+    return truth
 
 
 def _built(folder: Path) -> str:
     """The test rig with drag at the roller built in; its file name."""
-    effect = "viscous_damping@roller"
-    build = [
-        sys.executable,
-        "-m",
-        "railfmi",
-        "build",
-        "testrig",
-        "--effect",
-        effect,
-        "--out",
-        str(folder),
-        "-q",
-    ]
-    subprocess.run([*build, "--kind", "native"], check=True, stdout=subprocess.DEVNULL)
+    build = [sys.executable, "-m", "railfmi", "build", "testrig", "--effect", "viscous_damping@roller"]
+    build += ["--kind", "native", "--out", str(folder), "-q"]
+    subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
     return next(folder.glob("*.fmu")).name
 
 
-def measured(truth: FleetTruth, out: Path, records: int, workers: int) -> Outcome:
+def measured(truth: FleetTruth, out: Path, records: int, workers: int, kept: Kept) -> Outcome:
     """All runs: whole ones with one and with `workers`, and one that is killed three times on its way."""
-    found = Outcome(records)
-    for n in sorted({1, workers}):
-        found.seconds[n] = round(run(command(truth.fleet, out / f"{n}", "--workers", n)), 1)
-    if workers > 1:
-        found.efficiency = round(found.seconds[1] / (workers * found.seconds[workers]), 3)
-    killed(truth, out / "killed", records, workers, found)
-    whole = tables(out / "1")
-    for name in sorted({f"{workers}", "killed"} - {"1"}):
-        found.same_bytes[name] = tables(out / name) == whole
-    result = json.loads((out / "1" / "result.json").read_text())
-    found.drift_true, found.broken_true = truth.drifting, sorted(truth.broken)
-    found.drift_found = sorted({d["vehicle"] for d in result["drifts"]})
-    found.broken_listed = sorted({f["record"] for f in result["failed"]})
-    return found
+    numbers = sorted({1, workers})
+    shares: dict[str, float] = {f"{n}": n for n in numbers} | {KILLED: workers / SLOWER}
+    clock = Clock(records + 1, shares, _say)  # and the check of the FMU
+    for n in numbers:
+        timed(f"{n}", command(truth.fleet, out / f"{n}", "--workers", n), out / f"{n}", kept, clock)
+    killed(truth, out / KILLED, records, workers, kept, clock)
+    return outcome_of(truth, out, records, numbers, kept)
 
 
-def killed(truth: FleetTruth, out: Path, records: int, workers: int, found: Outcome) -> None:
-    """A run whose worker, command and scheduler are killed, one after the other, and that is then ended."""
+def killed(
+    truth: FleetTruth, out: Path, records: int, workers: int, kept: Kept, clock: Clock
+) -> None:  # fmt: skip
+    """A run whose command, scheduler and worker are killed, one after the other, and that is then ended."""
     start = command(truth.fleet, out, "--workers", workers)
-    found.exit_codes["client killed"] = killed_at(start, out, records // 4, kill_client)
-    with cluster(out.with_name("cluster"), workers) as (address, kill_scheduler):
-        joined = command(truth.fleet, out, "--scheduler", address)
-        found.exit_codes["scheduler killed"] = killed_at(joined, out, records // 2, kill_scheduler)
-    found.exit_codes["worker killed"] = killed_at(start, out, 3 * records // 4, kill_worker)
-
-
-def tables(out: Path) -> dict[str, Any]:
-    """The bytes of all tables of a run."""
-    files = [f for name in TABLES for f in (out / name, *(out / name).rglob("*.parquet")) if f.is_file()]
-    return {f.relative_to(out).as_posix(): f.read_bytes() for f in files}
+    cut(KILLED, "client", start, out, records // 4, kill_client, kept, clock)
+    if "scheduler" not in kept.arm(KILLED).killed:
+        with cluster(out.with_name("cluster"), workers) as (address, kill_scheduler):
+            joined = command(truth.fleet, out, "--scheduler", address)
+            cut(KILLED, "scheduler", joined, out, records // 2, kill_scheduler, kept, clock)
+    cut(KILLED, "worker", start, out, 3 * records // 4, kill_worker, kept, clock)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Runs of `railfmi fleet` that are killed on the way: a worker, the command, or the scheduler."""
 
+import ctypes
 import json
 import os
 import signal
@@ -12,8 +13,10 @@ from pathlib import Path
 
 import psutil
 
-LOOK = 0.2  # s, between looks at the number of finished tasks
-STARTED = 120  # s, until a scheduler has written its address
+LOOK = 0.5  # s, between looks at the number of finished tasks
+DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
+_LIBRARY = ctypes.CDLL(None) if sys.platform == "linux" else None  # loaded before any process is forked
+STARTED = 120  # s, until a scheduler has written its address, and until a worker has reached it
 WORKER = "multiprocessing"  # in the command line of the workers that a command starts
 
 
@@ -27,31 +30,67 @@ def finished(out: Path) -> int:
     return sum(1 for _ in (out / ".tasks").glob("*/*.json"))
 
 
-def run(arguments: Sequence[str]) -> float:
-    """Run to the end; the time in s. Raises CalledProcessError unless all tasks are done."""
-    begun = time.monotonic()
-    subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
-    return time.monotonic() - begun
+@contextmanager
+def started(arguments: Sequence[str], log: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """A run that ends with this process, however that ends; what it says is added to a log."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("ab") as said:
+        process = subprocess.Popen(
+            arguments, stdout=subprocess.DEVNULL, stderr=said, preexec_fn=_with_its_parent
+        )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.terminate()
+            process.wait()
 
 
-def killed_at(arguments: Sequence[str], out: Path, count: int, kill: Callable[[int], None]) -> int:
-    """Run until so many tasks are finished, then kill; the exit code, whatever it is.
+def _with_its_parent() -> None:
+    """In the new process: it is told to end when the one that started it has ended."""
+    if _LIBRARY is not None:
+        _LIBRARY.prctl(DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
 
-    kill: gets the number of the process that was started.
+
+class Early(Exception):
+    """A run ended before anything could be killed; its argument is the exit code."""
+
+
+def log_of(out: Path) -> Path:
+    """Where runs with their results in a folder say what they have to say."""
+    return out.with_name(f"{out.name}.log")
+
+
+def killed_at(
+    arguments: Sequence[str], out: Path, count: int, kill: Callable[[int], bool],
+    seen: Callable[[int], None] = lambda _: None,
+) -> int:  # fmt: skip
+    """Run until so many tasks are finished, then kill; the exit code.
+
+    Raises Early, with the exit code, if nothing could be killed.
+
+    kill: gets the number of the process that was started, and says whether it has killed; seen: gets the
+    number of finished tasks now and then.
     """
-    process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while process.poll() is None and finished(out) < count:
-        time.sleep(LOOK)
-    if process.poll() is None:
-        kill(process.pid)
-    return process.wait()
+    with started(arguments, log_of(out)) as process:
+        while process.poll() is None and (done := finished(out)) < count:
+            seen(done)
+            time.sleep(LOOK)
+        struck = process.poll() is None and kill(process.pid)
+        while process.poll() is None:
+            seen(finished(out))
+            time.sleep(LOOK)
+    if not struck:
+        raise Early(process.returncode)
+    return process.returncode
 
 
-def kill_worker(pid: int) -> None:
+def kill_worker(pid: int) -> bool:
     """Kill one worker of a command."""
     workers = [p for p in psutil.Process(pid).children(recursive=True) if _is_worker(p)]
     if workers:
         workers[-1].send_signal(signal.SIGKILL)
+    return bool(workers)
 
 
 def _is_worker(process: psutil.Process) -> bool:
@@ -61,14 +100,16 @@ def _is_worker(process: psutil.Process) -> bool:
     return False
 
 
-def kill_client(pid: int) -> None:
+def kill_client(pid: int) -> bool:
     """Kill the process of a command that computes, not the one that watches it."""
-    for child in psutil.Process(pid).children():
+    children = psutil.Process(pid).children()
+    for child in children:
         child.send_signal(signal.SIGKILL)
+    return bool(children)
 
 
 @contextmanager
-def cluster(folder: Path, workers: int) -> Iterator[tuple[str, Callable[[int], None]]]:
+def cluster(folder: Path, workers: int) -> Iterator[tuple[str, Callable[[int], bool]]]:
     """A scheduler with workers in processes of their own: its address, and what kills it."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "scheduler.json"
@@ -85,10 +126,15 @@ def cluster(folder: Path, workers: int) -> Iterator[tuple[str, Callable[[int], N
         for k in range(workers):
             own = folder / f"worker-{k}"
             started.append(
-                _dask("worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "5",
+                _dask("worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", STARTED,
                       "--local-directory", own)
             )  # fmt: skip
-        yield address, lambda _: scheduler.send_signal(signal.SIGKILL)
+
+        def kill_scheduler(_: int) -> bool:
+            scheduler.send_signal(signal.SIGKILL)
+            return True
+
+        yield address, kill_scheduler
     finally:
         for process in started:
             process.kill()
@@ -99,5 +145,5 @@ def _dask(*arguments: object) -> "subprocess.Popen[bytes]":
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen(
         [sys.executable, "-m", "dask", *map(str, arguments)], env=os.environ | one_thread,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=_with_its_parent,
     )  # fmt: skip

@@ -48,13 +48,14 @@ def write_fleet(
     wear: float = -2e-5,
     fmu: str | None = None,
     commands: Sequence[str] = ("estimate",),
+    level: float = 0.05,
 ) -> FleetTruth:
     """Write fleet.toml, its table and setup, and records/*.csv; returns what is true.
 
     records: of each vehicle at each place; drifting, broken: shares of vehicles and of records.
     fmu: an FMU with drag at the roller built in, whose parameter is estimated; all vehicles then have a drag,
     which grows in the drifting ones by `growth`, N.m.s/rad per km. Without it, their friction mu0 changes by
-    `wear`, 1/km.
+    `wear`, 1/km. level: of the fleet file.
     """
     rng = np.random.default_rng(seed)
     names = [f"rig-{k:03}" for k in range(1, vehicles + 1)]
@@ -72,7 +73,7 @@ def write_fleet(
                 rows.append((record, name, "tram", place, f"{mileage:.0f}", f"records/{record}.csv"))
     spoiled = rng.choice(len(rows), round(broken * len(rows)), replace=False)
     lost = [_spoil(folder / rows[k][5], i) for i, k in enumerate(sorted(spoiled.tolist()))]
-    _tables(folder, rows, duration, fmu, commands)
+    _tables(folder, rows, duration, fmu, commands, level)
     return FleetTruth(odd, lost, folder / "fleet.toml")
 
 
@@ -123,8 +124,9 @@ def _spoil(file: Path, k: int) -> str:
 
 
 def _tables(
-    folder: Path, rows: Sequence[Sequence[str]], duration: float, fmu: str | None, commands: Sequence[str]
-) -> None:
+    folder: Path, rows: Sequence[Sequence[str]], duration: float, fmu: str | None, commands: Sequence[str],
+    level: float,
+) -> None:  # fmt: skip
     with (folder / "records.csv").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerows([COLUMNS, *rows])
@@ -138,6 +140,6 @@ def _tables(
     (folder / "setup.toml").write_text(text + ESTIMATE + (WITH_DRAG if fmu else ""))
     said = ", ".join(f'"{c}"' for c in commands)
     (folder / "fleet.toml").write_text(
-        'id = "rigs"\nrecords = "records.csv"\n\n[setups.rig]\nexperiment = "setup.toml"\n'
+        f'id = "rigs"\nrecords = "records.csv"\nlevel = {level}\n\n[setups.rig]\nexperiment = "setup.toml"\n'
         f"commands = [{said}]\n"
     )

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from estimator.monitoring.cusum import ALLOWANCE, Sums, mean_run, threshold
-from estimator.monitoring.monitor import MOST
+from estimator.monitoring.cusum import Sums, mean_run, threshold
+from estimator.monitoring.policy import POLICY
 from estimator.monitoring.reference import Reference, learned
 from estimator.record import Array
 
@@ -61,9 +61,9 @@ def false_alarms(
     h, n = threshold(mean_run(asked, BLOCK, STATISTICS)), round(hours * 3600 / BLOCK)
     kept, references = list[Array](), list[Reference]()
     for _ in range(streams):
-        values = draw(rng, MOST * learn + n, STATISTICS)
-        for used in range(learn, MOST * learn + 1, max(1, learn // 4)):
-            reference = learned(values[:used], 2 * ALLOWANCE * h)
+        values = draw(rng, POLICY.kept * learn + n, STATISTICS)
+        for used in range(learn, POLICY.kept * learn + 1, max(1, learn // 4)):
+            reference = learned(values[:used], 2 * POLICY.allowance * h)
             if reference is not None:
                 references.append(spoil(reference))
                 kept.append(values[used : used + n])

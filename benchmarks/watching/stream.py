@@ -1,19 +1,22 @@
-"""A long stream through `railfmi watch`: speed, memory, and a friction step in its last minute.
+"""A long stream through `railfmi watch`: speed, memory, a friction step at its end, and a kill half way.
 
     python -m benchmarks.watching.stream --seconds 3600 --rate 1000 --out out/benchmarks/watching
 
-Windows of one second lie ready, so that the speed is that of the filter and not of the logger. It is given
-over processor time, which other work on the machine hardly changes, and over wall time, which it does.
+Windows of one second lie ready, so that the speed is that of the command and not of the logger. It is given
+over processor time, which other work on the machine hardly changes, and over wall time, which it does. A
+second run is killed half way and started again; its log has to be that of the first, to the bit.
 """
 
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +33,9 @@ LEARN = 60.0  # s
 LOOK = 0.25  # s, between two looks at the memory
 FOUND = 3.0  # s of record, within which the step is to be found
 SETTLED = 0.3  # share of the windows after which memory is compared
+FAST = 20.0  # times real time of wall clock, which the whole command has to reach
+GROWN = 1.03  # memory at the end over that after SETTLED, which is still constant
+TOLD = 30.0  # s, between lines on the progress
 
 
 @dataclass(frozen=True)
@@ -37,21 +43,37 @@ class Measured:
     """What a run took.
 
     processor_seconds: of all processes, with the start, in which the FMU is built and the filter set up;
-    processor_speed: record over it; wall_speed: record over the wall time of the filter and the test alone;
-    milliseconds: median of these; memory in MB after SETTLED of the windows and at the end;
-    found_after: s of record from the friction step to the alarm, None if there was none.
+    processor_speed: record over it; command_speed: record over the wall time of the whole command, from its
+    start to its end; wall_speed: over that of the filter and the test alone; milliseconds: median of these;
+    memory in MB after SETTLED of the windows and at the end; found_after: s of record from the friction step
+    to the alarm, None if there was none; resumed: whether a run that was killed half way has the same log and
+    result, to the bit.
     """
 
     seconds: float
     windows: int
     processor_seconds: float
     processor_speed: float
+    command_seconds: float
+    command_speed: float
     wall_speed: float
     milliseconds: float
     memory_settled: float
     memory_end: float
     alarms: int
     found_after: float | None
+    resumed: bool = False
+
+    def wrong(self) -> Iterator[str]:
+        """What is not as it has to be."""
+        if self.alarms != 1 or self.found_after is None or self.found_after > FOUND:
+            yield f"{self.alarms} alarms, {self.found_after} s after the step, not one within {FOUND:g} s"
+        if self.command_speed < FAST:
+            yield f"{self.command_speed:.1f} times real time of wall clock, not {FAST:g}"
+        if not self.memory_end <= GROWN * self.memory_settled:
+            yield f"memory went from {self.memory_settled:.0f} to {self.memory_end:.0f} MB"
+        if not self.resumed:
+            yield "the run that was killed is not the one that was not, to the bit"
 
 
 def period(rate: float, seed: int, effects: Effects) -> tuple[Inputs, tuple[Array, Array]]:
@@ -114,17 +136,32 @@ def memory(pid: int) -> float:
     return found
 
 
+def command(folder: Path, out: Path) -> list[str]:
+    """The command line of a run over all windows."""
+    return [sys.executable, "-m", "scenarios.cli", "watch", str(folder), "--once", "-q", "--out", str(out)]
+
+
+def rows(log: Path) -> int:
+    """Windows in a log."""
+    return log.read_bytes().count(b"\n") - 1 if log.exists() else 0
+
+
 def measured(folder: Path, seconds: int, step: float) -> Measured:
     """Run the command over all windows."""
     out, log = folder / "out", folder / "out" / "windows.csv"
-    command = [sys.executable, "-m", "scenarios.cli", "watch", str(folder), "--once", "-q", "--out", str(out)]
     before, seen = os.times(), list[tuple[float, float]]()  # share of the windows, MB
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    begun = told = time.monotonic()
+    process = subprocess.Popen(command(folder, out), stdout=subprocess.DEVNULL)
     while process.poll() is None:
-        if log.exists():
-            seen.append(((log.read_bytes().count(b"\n") - 1) / seconds, memory(process.pid)))
+        if (done := rows(log)) > 0:
+            seen.append((done / seconds, memory(process.pid)))
+        if done > 0 and (now := time.monotonic()) - told > TOLD:
+            told, left = now, (now - begun) * (seconds / done - 1)
+            print(f"{done} of {seconds} s of record, about {left:.0f} s left of the first run", flush=True)
         time.sleep(LOOK)
-    after = os.times()
+    whole, after = time.monotonic() - begun, os.times()
+    if process.returncode:
+        raise SystemExit(f"the command ended with exit code {process.returncode}")
     spent = after.children_user + after.children_system - before.children_user - before.children_system
     table = pd.read_csv(log)
     took = table["milliseconds"].dropna()
@@ -132,14 +169,32 @@ def measured(folder: Path, seconds: int, step: float) -> Measured:
     later = alarms[alarms >= step]
     running = [mb for share, mb in seen if SETTLED <= share < 1]
     return Measured(
-        seconds, len(table), spent, seconds / spent, seconds / (took.sum() / 1e3), float(took.median()),
-        running[0] if running else float("nan"), running[-1] if running else float("nan"), len(alarms),
+        seconds, len(table), spent, seconds / spent, whole, seconds / whole, seconds / (took.sum() / 1e3),
+        float(took.median()), running[0] if running else float("nan"),
+        running[-1] if running else float("nan"), len(alarms),
         float(later.iloc[0] - step) if len(later) else None,
     )  # fmt: skip
 
 
+def resumed(folder: Path, seconds: int) -> bool:
+    """Kill a run half way, run it to the end, and compare it with the one in `out`."""
+    whole, out = folder / "out", folder / "killed"
+    process = subprocess.Popen(command(folder, out), stdout=subprocess.DEVNULL)
+    while process.poll() is None and rows(out / "windows.csv") < seconds // 2:
+        time.sleep(LOOK)
+    if process.poll() is not None:
+        raise SystemExit("the run ended before it could be killed; ask for more seconds")
+    process.send_signal(signal.SIGKILL)  # what it has started dies with it
+    process.wait()
+    time.sleep(1.0)
+    subprocess.run(command(folder, out), check=True, stdout=subprocess.DEVNULL)
+    logs = [pd.read_csv(f / "windows.csv", dtype=str).drop(columns="milliseconds") for f in (whole, out)]
+    results = [(f / "watch.json").read_bytes() for f in (whole, out)]
+    return bool(logs[0].equals(logs[1]) and results[0] == results[1])
+
+
 def main() -> int:
-    """Write stream.json with the machine; 1 if the step was not found within 3 s, or something else was."""
+    """Write stream.json with the machine; 1 if something is not as it has to be, which is printed."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--seconds", type=int, default=3600, help=f"of record, a multiple of {PERIOD}")
     parser.add_argument("--rate", type=float, default=1000.0, help="Hz")
@@ -149,11 +204,14 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="railfmi_stream_") as work:
         step = write_stream(Path(work), a.seconds, a.rate, a.seed)
         found = measured(Path(work), a.seconds, step)
+        found = replace(found, resumed=resumed(Path(work), a.seconds))
     text = json.dumps({"machine": described(), "rate": a.rate, "stream": asdict(found)}, indent=1)
     a.out.mkdir(parents=True, exist_ok=True)
     (a.out / "stream.json").write_text(text + "\n", encoding="utf-8")
     print(text)
-    return 0 if found.alarms == 1 and found.found_after is not None and found.found_after <= FOUND else 1
+    for line in (wrong := [*found.wrong()]):
+        print(f"not as it has to be: {line}")
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":

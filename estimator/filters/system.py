@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -110,6 +110,11 @@ class Joint:
             x += [0.0] * len(w.states)
             variance += w.variance.tolist()
         return Estimate(t, np.array(x), np.diag(variance), carried=self._first_carried)
+
+    def drive(self, noise: Sequence[float]) -> None:
+        """Drive the states by this process noise, unit/sqrt(s), in their order, in place of what they had."""
+        self.states = tuple(replace(s, noise=x) for s, x in zip(self.states, noise, strict=True))
+        self._steps.clear()
 
     def noise(self, dt: float) -> Array:
         """Process noise covariance (n, n) of a step of dt [s]."""

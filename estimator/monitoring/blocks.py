@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
+from estimator.monitoring.policy import POLICY
 from estimator.record import Array
 
 Kind = Literal["bias", "NIS", "whiteness", "likeness"]
-FEWEST = 8  # samples of a block
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def block_statistics(innovation: Array, nis: Array, freedom: Array, directions: 
         whiteness = (filled[1:] * filled[:-1]).sum(axis=0) / np.sqrt(pairs)
         d = float(freedom.sum())
         size = (np.cbrt(nis.sum() / d) - (1 - 2 / (9 * d))) / np.sqrt(2 / (9 * d)) if d else np.nan
-    bias[count < FEWEST] = np.nan
-    whiteness[pairs < FEWEST] = np.nan
+    bias[count < POLICY.fewest_samples] = np.nan
+    whiteness[pairs < POLICY.fewest_samples] = np.nan
     likeness = directions @ np.where(np.isfinite(bias), bias, 0.0)
     likeness[~directions.any(axis=1)] = np.nan
-    return np.concatenate([bias, [size if d >= FEWEST else np.nan], whiteness, likeness])
+    return np.concatenate([bias, [size if d >= POLICY.fewest_samples else np.nan], whiteness, likeness])

@@ -16,11 +16,10 @@ from math import expm1
 import numpy as np
 from scipy.optimize import brentq
 
+from estimator.monitoring.policy import POLICY
 from estimator.monitoring.reference import Reference
 from estimator.record import Array
 
-ALLOWANCE = 0.5  # k: shifts of the mean by one scale are found soonest
-CLIP = 4.0  # largest value that counts: one outlier, as of a radio that fails, is no change
 LARGEST = 300.0  # of 2 k b, beyond which the exponential leaves the range of doubles
 
 
@@ -28,10 +27,10 @@ def threshold(mean_run: float) -> float:
     """The threshold h at which a one-sided CUSUM of healthy values runs for that many in the mean, > 1."""
 
     def excess(b: float) -> float:
-        a = 2 * ALLOWANCE * b
-        return (expm1(a) - a) / (2 * ALLOWANCE**2) - mean_run
+        a = 2 * POLICY.allowance * b
+        return (expm1(a) - a) / (2 * POLICY.allowance**2) - mean_run
 
-    return float(brentq(excess, 0.0, LARGEST / (2 * ALLOWANCE)))
+    return float(brentq(excess, 0.0, LARGEST / (2 * POLICY.allowance)))
 
 
 def mean_run(false_alarms_per_hour: float, block: float, statistics: int) -> float:
@@ -63,9 +62,9 @@ class Sums:
         The mean of the reference has the standard error of its scale over the root of its blocks. The mean
         rate of false alarms over references is kept if the allowance grows by h over their number.
         """
-        z = np.clip((values - reference.mean) / reference.scale, -CLIP, CLIP)
+        z = np.clip((values - reference.mean) / reference.scale, -POLICY.clip, POLICY.clip)
         there, z = np.isfinite(z), np.nan_to_num(z)
-        allowance = ALLOWANCE + h / reference.blocks
+        allowance = POLICY.allowance + h / reference.blocks
         above = np.where(there, np.maximum(self.above + z - allowance, 0.0), self.above)
         below = np.where(there, np.maximum(self.below - z - allowance, 0.0), self.below)
         return Sums(

@@ -7,13 +7,13 @@ from typing import Protocol
 import numpy as np
 
 from estimator.filters.history import History
-from estimator.monitoring.blocks import FEWEST, Statistic, block_statistics, statistics
-from estimator.monitoring.cusum import ALLOWANCE, Sums, mean_run, threshold
+from estimator.monitoring.blocks import Statistic, block_statistics, statistics
+from estimator.monitoring.cusum import Sums, mean_run, threshold
+from estimator.monitoring.policy import POLICY
 from estimator.monitoring.reference import Reference, learned
 from estimator.record import Array
 
 SHOWN = 3  # effects that an alarm names
-MOST = 8  # times the blocks to learn from, that are kept while they are too correlated
 
 
 class Directions(Protocol):
@@ -84,7 +84,7 @@ class Monitor:
     ) -> None:
         self._directions, self.settings = directions, settings
         self.statistics = statistics(outputs, directions.names)
-        self._length = max(FEWEST, round(settings.block / usual))
+        self._length = max(POLICY.fewest_samples, round(settings.block / usual))
         self._settling = round(settings.settle / usual)
         self.block = self._length * usual  # s
         self._learning = max(2, round(settings.learn / self.block))
@@ -140,7 +140,7 @@ class Monitor:
             blocks=s.blocks + 1,
         )  # fmt: skip
         if s.reference is None:
-            some = s.learnt[-(MOST * self._learning - 1) :]  # of correlated blocks, the last ones
+            some = s.learnt[-(POLICY.kept * self._learning - 1) :]  # of correlated blocks, the last ones
             self.state = self._learned(replace(empty, learnt=np.vstack([some, values])), t)
             return []
         sums = s.sums.after(values, t, s.reference, self.h)
@@ -158,7 +158,7 @@ class Monitor:
         """With the reference, if there are enough blocks for it."""
         if len(s.learnt) < self._learning or s.blocks % max(1, self._learning // 4):
             return s
-        reference = learned(s.learnt, 2 * ALLOWANCE * self.h)
+        reference = learned(s.learnt, 2 * POLICY.allowance * self.h)
         if reference is None:
             return s
         return replace(s, reference=reference, learnt=s.learnt[:0], sums=Sums.begun(len(self.statistics), t))

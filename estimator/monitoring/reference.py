@@ -14,12 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.monitoring.policy import POLICY
 from estimator.record import Array
 
-FEWEST_BATCHES = 20  # of which a variance is estimated; with fewer it is hardly known
-INDEPENDENT = 30.0  # blocks that tell as much as so many independent ones are enough for a mean and a scale
 LEAST_SCALE = 1e-9  # of a statistic that never changes
-MOST_CORRELATED = 0.999  # beyond it the statistics wander and have no mean
 
 
 @dataclass(frozen=True)
@@ -37,11 +35,11 @@ def learned(values: Array, exponent: float) -> Reference | None:
     exponent: 2 k b of the test that uses it, see `cusum`. The long-run variance is the largest one of two
     kinds of estimate: by means of batches of 1, 2, 4, ... blocks (Kim, Alexopoulos, Tsui and Wilson, IIE
     Transactions 39 (2007) 317), and by the correlation of successive blocks as of an autoregression. None if
-    the blocks are so correlated that they tell less than INDEPENDENT blocks would.
+    the blocks are so correlated that they tell less than the policy asks.
     """
     rho = correlation(values)
     n = np.isfinite(values).sum(axis=0)
-    if np.min(n * (1 - rho) / (1 + rho), where=n > 0, initial=np.inf) < INDEPENDENT:
+    if np.min(n * (1 - rho) / (1 + rho), where=n > 0, initial=np.inf) < POLICY.independent:
         return None
     used = n > 0
     mean, scale = np.zeros(len(n)), np.full(len(n), np.inf)  # a statistic that was never there tells nothing
@@ -60,7 +58,7 @@ def correlation(values: Array) -> Array:
     off = np.nan_to_num(values - np.nansum(values, axis=0) / n)
     power = (off**2).sum(axis=0)
     rho = (off[1:] * off[:-1]).sum(axis=0) / np.where(power > 0, power, 1.0)
-    found: Array = np.clip(rho + (1 + 4 * rho) / n, 0.0, MOST_CORRELATED)
+    found: Array = np.clip(rho + (1 + 4 * rho) / n, 0.0, POLICY.most_correlated)
     return found
 
 
@@ -75,7 +73,7 @@ def _by_correlation(values: Array, rho: Array, exponent: float) -> Array:
 def _by_batches(values: Array, exponent: float) -> Array:
     """Long-run variance (c,), the largest one by means of batches; 0 without enough blocks."""
     variance, size = np.zeros(values.shape[1]), 1
-    while len(values) // size >= FEWEST_BATCHES:
+    while len(values) // size >= POLICY.fewest_batches:
         whole = values[: len(values) // size * size].reshape(-1, size, values.shape[1])
         count = np.isfinite(whole).sum(axis=1)
         batches = np.nansum(whole, axis=1) / np.where(count > 0, count, np.nan)

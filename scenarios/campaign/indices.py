@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
+from scipy.stats import t as student
 
-CONFIDENCE = 0.95
-RESAMPLES = 999
-FEWEST = 4  # complete base points, from which on indices are computed
+from scenarios.campaign.policy import POLICY
+
 Array = NDArray[np.float64]
 
 
@@ -35,17 +36,18 @@ def indices_of(measure: str, keys: Sequence[str], values: Array, seed: int) -> l
     """Indices from the values (n (k + 2),) at the points of `sampling`; none if too few or all alike.
 
     Intervals by resampling the base points (G. E. B. Archer, A. Saltelli and I. M. Sobol, J. Statist. Comput.
-    Simul. 58 (1997), 99-120), as quantiles. A base point that has no value in one of its simulations is left
-    out as a whole, so that their number need not be a power of two, which scipy.stats.sobol_indices demands.
+    Simul. 58 (1997), 99-120), as quantiles, see `tail`. A base point that has no value in one of its
+    simulations is left out as a whole, so that their number need not be a power of two, which
+    scipy.stats.sobol_indices demands.
     """
     table = values.reshape(len(keys) + 2, -1)
     table = table[:, np.isfinite(table).all(axis=0)]
     n = table.shape[1]
-    if n < FEWEST or not np.ptp(table[:2]) > 0:
+    if n < POLICY.fewest or not np.ptp(table[:2]) > 0:
         return []
     found, rng = estimates(table), np.random.default_rng(seed)
-    drawn = np.array([estimates(table[:, rng.integers(0, n, n)]) for _ in range(RESAMPLES)])
-    low, high = np.nanquantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2], axis=0)
+    drawn = np.array([estimates(table[:, rng.integers(0, n, n)]) for _ in range(POLICY.resamples)])
+    low, high = np.nanquantile(drawn, [tail(n), 1 - tail(n)], axis=0)
     one, all_ = np.array([found, low, high]).transpose(1, 2, 0)  # (k, 3) each: value and interval
     return [
         Index(
@@ -54,6 +56,17 @@ def indices_of(measure: str, keys: Sequence[str], values: Array, seed: int) -> l
         )
         for i, key in enumerate(keys)
     ]  # fmt: skip
+
+
+def tail(n: int) -> float:
+    """Share of the resamples of n base points beyond either end of an interval.
+
+    A resample has n - 1 of n parts of the variance and no t distribution, so that plain quantiles are too
+    narrow for few points; the share is made smaller by both (T. C. Hesterberg, The American Statistician 69
+    (2015), 371-386, "expanded percentile interval").
+    """
+    wide = np.sqrt(n / (n - 1)) * student.ppf(0.5 - POLICY.confidence / 2, n - 1)
+    return float(norm.cdf(wide))
 
 
 def estimates(table: Array) -> Array:

@@ -1,13 +1,14 @@
 """The result of campaign, as it is written to result.json beside the tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from scenarios.campaign.indices import Index
+from scenarios.campaign.policy import POLICY
 from scenarios.shown import axes_or_new
 from scenarios.tasks.result import TasksResult
 from scenarios.tasks.store import FAILED
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 NAMED = 10  # failures that are told on the command line
-QUANTILES = (0.05, 0.5, 0.95)
+QUANTILES = (POLICY.lowest, 0.5, 1 - POLICY.lowest)
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,8 @@ class CampaignResult(TasksResult):
     """The result of a campaign; each field is a key of result.json.
 
     tasks: how many points are `planned`, `finished`, `failed` (answered with a reason) and `left` (not done,
-    with a reason that may pass). indices: see Index; empty unless Sobol's points were sampled.
+    with a reason that may pass). indices: see Index; empty unless Sobol's points were sampled. limits: by
+    which they were found, by name.
     """
 
     campaign: str
@@ -52,6 +54,7 @@ class CampaignResult(TasksResult):
     measured: list[Measured]
     indices: list[Index]
     failed: list[dict[str, Any]]
+    limits: dict[str, float] = field(default_factory=lambda: POLICY.values)
 
     @property
     def headline(self) -> str:

@@ -160,7 +160,11 @@ def _wandering(s: Setup, archive: Archive, share: float) -> Setup:
     def walking(size: float) -> Setup:
         return replace(s, parameters=wandering(s.parameters, names, size))
 
-    return walking(largest_wandering(lambda size: _log_likelihood(walking(size), archive, share, first)))
+    def log_likelihood(size: float) -> float:
+        with walking(size).joint(archive, share) as joint:
+            return _log_likelihood(s, joint, first)
+
+    return walking(largest_wandering(log_likelihood))
 
 
 def _learnt_from(s: Setup) -> Samples:
@@ -186,19 +190,22 @@ def request(o: Options, noise: Array, dt: float, u: Array) -> Request:
 def _noise_share(s: Setup, archive: Archive) -> float:
     """By maximum likelihood over the first samples."""
     first = s.samples.first(LEARNT_FROM)
-    return likeliest(lambda part: _log_likelihood(s, archive, part, first))
+    with s.joint(archive, 0.0) as joint:  # one for all, since the ways into the FMU are tried out for each
+
+        def log_likelihood(part: float) -> float:
+            joint.drive(s.noise_of(part))
+            return _log_likelihood(s, joint, first)
+
+        return likeliest(log_likelihood)
 
 
-def _log_likelihood(s: Setup, archive: Archive, share: float, samples: Samples) -> float:
-    """Of samples, by the filter of a setup with this share of the states' motion as noise; -inf if it
-    diverges.
-    """
-    with s.joint(archive, share) as joint:
-        try:
-            found = filtered(filter_of(s, joint, joint.start(float(samples.t[0]))), samples)
-        except Diverged:
-            return -np.inf
-        return -np.inf if found.broken else found.log_likelihood
+def _log_likelihood(s: Setup, joint: Joint, samples: Samples) -> float:
+    """Of samples, by the filter of a setup and its joint system; -inf if it diverges."""
+    try:
+        found = filtered(filter_of(s, joint, joint.start(float(samples.t[0]))), samples)
+    except Diverged:
+        return -np.inf
+    return -np.inf if found.broken else found.log_likelihood
 
 
 def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:

@@ -156,7 +156,8 @@ def estimated(
 ) -> dict[str, dict[str, Any]]:
     """The last value of each quantity in the FMU's units; bounds: side of the bound that it lies at.
 
-    form: names of the parameters that stand for what the form of the model leaves open.
+    form: names of the parameters that stand for what the form of the model leaves open. "prior": mean and
+    standard deviation of a constant parameter before the record, which its estimate still contains.
     """
     if not len(h.t):
         return {}
@@ -166,6 +167,7 @@ def estimated(
     value, std = joint.values(h.x[-1:], h.std[-1:])
     low, high = (joint.values(h.x[-1:] + s * BAND * h.std[-1:], h.std[-1:])[0][0] for s in (-1, 1))
     variables = joint.archive.description.variables
+    believed = {p.name: [p.start, p.std] for p in joint.parameters if not p.walk and p.name not in form}
     return {
         name: {
             "kind": kind,
@@ -173,6 +175,7 @@ def estimated(
             "value": float(value[0, i]),
             "std_error": float(std[0, i]),
             "band_95": [float(low[i]), float(high[i])],
+            **({"prior": believed[name]} if name in believed else {}),
             **({"informed_by_data": informed[name]} if name in informed else {}),
             **({"at_bound": bounds[name]} if name in bounds else {}),
         }

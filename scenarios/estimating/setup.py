@@ -69,13 +69,17 @@ class Setup:
         """The same with one choice of the form."""
         return replace(self, constants={**self.constants, **choice})
 
+    def noise_of(self, part: float) -> list[float]:
+        """Process noise of each state, unit/sqrt(s): the declared one, or `part` of its motion."""
+        given = self.options.process_std
+        return [
+            given.get(s.name, part * scale) for s, scale in zip(self.states, self.scale.tolist(), strict=True)
+        ]
+
     def joint(self, archive: Archive, part: float) -> Joint:
         """The system; a state without declared noise is driven by noise of `part` of its motion."""
-        given = self.options.process_std
-        states = [
-            replace(s, noise=given.get(s.name, part * scale))
-            for s, scale in zip(self.states, self.scale.tolist(), strict=True)
-        ]
+        noise = self.noise_of(part)
+        states = [replace(state, noise=x) for state, x in zip(self.states, noise, strict=True)]
         s = self.samples
         return Joint(
             archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,

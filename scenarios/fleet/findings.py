@@ -11,21 +11,22 @@ from scipy.stats import t as student
 
 from scenarios.fleet.declaration import CALIBRATED
 from scenarios.fleet.drift import Course, Points, courses
+from scenarios.fleet.policy import POLICY
+from scenarios.fleet.repeats import Repeats, Scatter, scatter_of, variance_of
 from scenarios.fleet.rows import Row
-from scenarios.fleet.scatter import EFFICIENCY, Array, Mean, excess, mean_over
+from scenarios.fleet.scatter import Mean, mean_over
 from scenarios.tasks.store import FAILED
 
 QUANTITY = ("command", "setup", "model", "class", "place", "kind", "location", "parameter")
 FOLLOWED = ("parameter", "form", CALIBRATED)  # kinds of rows beside effects that are followed over mileage
 SURE = ("traced", "several", "sensor_fault")  # verdicts whose effects are one answer, not members of a class
-LEAST_VEHICLES = 4  # of a class, so that one of them can deviate from the others
 Quantity = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Drift:
     """The course of a quantity in a vehicle; q_value: by Y. Benjamini and Y. Hochberg (J. R. Statist. Soc. B
-    57 (1995), 289-300) over all courses of the fleet; drifts: whether it is below the fleet's level.
+    57 (1995), 289-300) over all that is tested in the fleet; drifts: whether it is below the fleet's level.
     """
 
     quantity: Quantity
@@ -69,7 +70,15 @@ class Findings:
 def findings_of(rows: Sequence[Row], level: float) -> Findings:
     """Drifts and levels of all quantities in a fleet's rows; level: rate of false ones among those named."""
     series = _series(rows)
-    return Findings(_drifts(series, level), _levels(series, level))
+    followed, compared = [*_followed(series)], [*_compared(series)]
+    p = [*(f[3].p_value for f in followed), *(c["p_value"] for c in compared if c["p_value"] is not None)]
+    q = iter(false_discovery_control(p).tolist() if p else ())  # one rate over all that is said
+    drifts = [Drift(*entry, q_value=(value := next(q)), drifts=value < level) for entry in followed]
+    levels = []
+    for entry in compared:
+        value = None if entry["p_value"] is None else next(q)
+        levels.append(Level(**entry, q_value=value, deviates=value is not None and value < level))
+    return Findings(drifts, levels)
 
 
 Series = Mapping[Quantity, Mapping[str, list[Row]]]
@@ -80,25 +89,39 @@ def _series(rows: Sequence[Row]) -> Series:
     found: dict[Quantity, dict[str, list[Row]]] = defaultdict(lambda: defaultdict(list))
     for row in rows:
         if row["size"] is not None and row["std"] and _is_followed(row):
-            found[tuple(str(row[name]) for name in QUANTITY)][row["vehicle"]].append(row)
+            found[tuple(str(row[name]) for name in QUANTITY)][row["vehicle"]].append(of_the_record(row))
     return found
 
 
+def of_the_record(row: Row) -> Row:
+    """A row with the value and error that its record alone would give, without what was believed before it.
+
+    An estimate is the mean of both, weighted by one over their variances. Many estimates contain the same
+    belief, which would count as often as there are records. A value held at a bound has none.
+    """
+    start, believed = row["prior"], row["prior_std"]
+    if start is None or believed is None:
+        return row
+    left = 1 - (row["std"] / believed) ** 2
+    value = start + (row["size"] - start) / left
+    return {**row, "size": value, "std": row["std"] / np.sqrt(left)}
+
+
 def _is_followed(row: Row) -> bool:
-    if row["verdict"] in (FAILED, "diverged"):
+    if row["verdict"] in (FAILED, "diverged") or row["held"]:
+        return False
+    if row["prior_std"] is not None and row["std"] >= POLICY.informed * row["prior_std"]:
         return False
     return row["kind"] in FOLLOWED or (row["command"] == "close-loop" and row["verdict"] in SURE)
 
 
-def _drifts(series: Series, level: float) -> list[Drift]:
-    found: list[tuple[Quantity, str, Points, Course, str]] = []
+def _followed(series: Series) -> Iterator[tuple[Quantity, str, Points, Course, str]]:
+    """The courses of all quantities of all vehicles with enough records."""
     for quantity, vehicles in series.items():
         points = {v: _points(rows) for v, rows in vehicles.items()}
         enough = {v: p for v, p in points.items() if p.enough}
         for (vehicle, p), course in zip(enough.items(), courses([*enough.values()]), strict=True):
-            found.append((quantity, vehicle, p, course, vehicles[vehicle][0]["unit"]))
-    q = _q_values([course.p_value for _, _, _, course, _ in found])
-    return [Drift(*entry, float(value), bool(value < level)) for entry, value in zip(found, q, strict=True)]
+            yield quantity, vehicle, p, course, vehicles[vehicle][0]["unit"]
 
 
 def _points(rows: Sequence[Row]) -> Points:
@@ -106,46 +129,51 @@ def _points(rows: Sequence[Row]) -> Points:
     return Points.of(*([row[name] for row in known] for name in ("mileage", "size", "std")))
 
 
-def _q_values(p: Sequence[float]) -> Array:
-    values: Array = false_discovery_control(p) if len(p) else np.zeros(0)
-    return values
-
-
-def _levels(series: Series, level: float) -> list[Level]:
-    found = [entry for quantity, vehicles in series.items() for entry in _of_class(quantity, vehicles)]
-    tested = [entry["p_value"] for entry in found if entry["p_value"] is not None]
-    q = iter(_q_values(tested))
-    levels = []
-    for entry in found:
-        value = None if entry["p_value"] is None else float(next(q))
-        levels.append(Level(**entry, q_value=value, deviates=value is not None and value < level))
-    return levels
+def _compared(series: Series) -> Iterator[dict[str, Any]]:
+    """The vehicles of each class with their means, and how far each is from the others."""
+    for quantity, vehicles in series.items():
+        yield from _of_class(quantity, vehicles)
 
 
 def _of_class(quantity: Quantity, vehicles: Mapping[str, Sequence[Row]]) -> Iterator[dict[str, Any]]:
-    """The vehicles of a class with their means, and how far each is from the others."""
-    values = {v: np.array([[r["size"], r["std"]] for r in rows]).T for v, rows in vehicles.items()}
-    repeated = [x for x in values.values() if x.shape[1] > 1]
-    scatter = excess(
-        lambda tau: np.array([_about_mean(x[0], x[1], tau) for x in repeated]),
-        np.array([x.shape[1] - 1.0 for x in repeated]),
-        float(min(x[1].min() for x in values.values())),
-    )
-    weights = {v: 1 / (x[1] ** 2 + scatter**2) for v, x in values.items()}
-    means = {v: float(np.sum(weights[v] * x[0]) / weights[v].sum()) for v, x in values.items()}
-    errors = {v: float(w.sum() ** -0.5) for v, w in weights.items()}
-    of_class = mean_over([*means.values()], [*errors.values()])
-    freedom = EFFICIENCY * (of_class.groups - 1)
+    values = {v: _about_mean(rows) for v, rows in vehicles.items()}
+    s = scatter_of([*values.values()])
+    means = {v: _mean(x, s) for v, x in values.items()}
+    of_class = mean_over([m for m, _ in means.values()], [e for _, e in means.values()])
+    between = POLICY.efficiency * (of_class.groups - 1)
     for v, rows in vehicles.items():
-        distance = (means[v] - of_class.centre) / float(np.hypot(errors[v], of_class.spread))
-        tested = of_class.groups >= LEAST_VEHICLES
+        mean, error = means[v]
+        distance = (mean - of_class.centre) / float(np.hypot(error, of_class.spread))
+        tested = of_class.groups >= POLICY.fewest_vehicles
+        own = error, s.freedom(values[v].freedom)
+        freedom = min(_joined(own, (of_class.spread, between)), between)  # a spread of 0 is found, not known
         yield {
-            "quantity": quantity, "vehicle": v, "value": means[v], "std": errors[v], "records": len(rows),
+            "quantity": quantity, "vehicle": v, "value": mean, "std": error, "records": len(rows),
             "unit": rows[0]["unit"], "of_class": of_class, "distance": distance,
             "p_value": float(2 * student.sf(abs(distance), freedom)) if tested else None,
         }  # fmt: skip
 
 
-def _about_mean(value: Array, std: Array, tau: float) -> float:
-    w = 1 / (std**2 + tau**2)
-    return float(np.sum(w * (value - np.sum(w * value) / w.sum()) ** 2))
+def _about_mean(rows: Sequence[Row]) -> Repeats:
+    """The records of a vehicle about their mean, in the order of their mileage where all have one."""
+    some = sorted(rows, key=lambda r: r["mileage"]) if all(r["mileage"] is not None for r in rows) else rows
+    value, std = (np.array([r[name] for r in some], dtype=np.float64) for name in ("size", "std"))
+    return Repeats(value, std, np.ones((len(value), 1)))
+
+
+def _mean(x: Repeats, s: Scatter) -> tuple[float, float]:
+    """The weighted mean of a vehicle with its standard error, which contains the scatter."""
+    w = s.weights(x.std)
+    variance = float(variance_of(np.sqrt(w) / w.sum(), s.correlation)[-1])
+    scale = float(s.scale(x.squares(s.beyond), x.freedom))
+    return float(np.sum(w * x.value) / w.sum()), float(np.sqrt(variance * scale))
+
+
+def _joined(*parts: tuple[float, float]) -> float:
+    """Degrees of freedom of a sum of variances, each given by its root and its own degrees of freedom.
+
+    F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
+    """
+    whole = sum(std**2 for std, _ in parts)
+    unknown = sum((std**2 / whole) ** 2 / freedom for std, freedom in parts) if whole else 0.0
+    return 1 / unknown if unknown else float("inf")

@@ -10,7 +10,8 @@ from scipy.stats import binomtest
 from scenarios.fleet.declaration import CALIBRATED
 from scenarios.fleet.findings import SURE
 from scenarios.fleet.planning import Plan
-from scenarios.fleet.scatter import CONFIDENCE, Mean, mean_over
+from scenarios.fleet.policy import POLICY
+from scenarios.fleet.scatter import Mean, mean_over
 from scenarios.tasks.store import FAILED, Answer
 
 GROUP = ("setup", "model", "class")
@@ -20,7 +21,7 @@ GROUP = ("setup", "model", "class")
 class Pooled:
     """An effect in a class of vehicles.
 
-    parameter, size: that which says how large it is, with its mean over the records that show it.
+    parameter, size: that which says how large it is, with its mean over the vehicles that show it.
     shown: vehicles with an answer that has it; possible: it is one of several in an ambiguous answer;
     absent: vehicles without it, of which a record would have shown it at the mean size; blind: vehicles
     without it whose records would not have shown it; share: of shown among shown and absent, with its exact
@@ -91,10 +92,19 @@ def _of_group(key: tuple[str, ...], seen: Sequence[_Seen]) -> Iterator[Pooled]:
             if _effect(row) == effect and row["size"] is not None and row["std"]
         ]
         parameter = _amplitude(effect, sure, rows)
-        sizes = [row for _, row in rows if row["parameter"] == parameter]
+        sizes: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+        for vehicle, row in rows:
+            if row["parameter"] == parameter:
+                sizes[vehicle].append(row)
         if sizes:
-            mean = mean_over([r["size"] for r in sizes], [r["std"] for r in sizes])
-            yield _standing(key, effect, parameter, sizes[0]["unit"], mean, seen)
+            unit = next(iter(sizes.values()))[0]["unit"]
+            yield _standing(key, effect, parameter, unit, _mean_size([*sizes.values()]), seen)
+
+
+def _mean_size(vehicles: Sequence[Sequence[Mapping[str, Any]]]) -> Mean:
+    """The mean over vehicles of the mean of each: the records of one vehicle are no independent sizes."""
+    each = [mean_over([r["size"] for r in rows], [r["std"] for r in rows]) for rows in vehicles]
+    return mean_over([m.value for m in each], [m.std for m in each])
 
 
 def _amplitude(
@@ -133,7 +143,7 @@ def _standing(
         else:
             blind.append(vehicle)
     n, decided = len(shown), len(shown) + len(absent)
-    interval = binomtest(n, decided).proportion_ci(CONFIDENCE, "exact")
+    interval = binomtest(n, decided).proportion_ci(POLICY.confidence, "exact")
     setup, model, vehicle_class = key
     return Pooled(
         setup, model, vehicle_class, effect[0], effect[1], parameter, unit, size, shown, possible, absent,

@@ -2,12 +2,13 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from scenarios.drawing.typography import quantity, unit, with_error
+from scenarios.fleet.policy import POLICY
 from scenarios.fleet.rows import Row
 from scenarios.shown import axes_or_new
 from scenarios.tasks.result import TasksResult
@@ -25,10 +26,10 @@ class FleetResult(TasksResult):
     """The result of a fleet; each field is a key of result.json.
 
     tasks: how many are `planned`, `finished`, `failed` (answered with a reason), `left` (not done, with a
-    reason
-    that may pass) and left out by `triage`. verdicts: by command, how many answers have each. failed: records
-    that could not be answered, with the reason. drifts, deviates, effects: rows of the tables of these names,
-    of drifts and levels those alone that are beyond the fleet's level.
+    reason that may pass) and left out by `triage`. verdicts: by command, how many answers have each. failed:
+    records that could not be answered, with the reason. drifts, deviates, effects: rows of the tables of
+    these names, of drifts and levels those alone that are beyond the fleet's level. limits: by which they
+    were found, by name.
     """
 
     fleet: str
@@ -41,6 +42,7 @@ class FleetResult(TasksResult):
     effects: list[dict[str, Any]]
     level: float
     mileage_unit: str
+    limits: dict[str, float] = field(default_factory=lambda: POLICY.values)
 
     @property
     def headline(self) -> str:

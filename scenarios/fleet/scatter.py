@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
+from scenarios.fleet.policy import POLICY
+
 Array = NDArray[np.float64]
-CONFIDENCE = 0.95  # of all intervals
-# of a scatter found by a median, against one by a mean of squares: P. J. Rousseeuw and C. Croux (J. Am.
-# Stat. Assoc. 88 (1993), 1273-1283); so much of its degrees of freedom count
-EFFICIENCY = 0.37
 DOUBLINGS = 200  # of the scatter, in the search for one that is too large
 
 
@@ -28,7 +26,7 @@ def excess(squares: Callable[[float], Array], freedom: Array, least: float) -> f
     """
 
     def too_much(tau: float) -> float:
-        return float(np.median(chi2.cdf(squares(tau), freedom))) - 0.5
+        return float(np.quantile(chi2.cdf(squares(tau), freedom), POLICY.middle)) - POLICY.middle
 
     if not len(freedom) or too_much(0.0) <= 0:
         return 0.0

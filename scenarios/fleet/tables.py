@@ -17,7 +17,7 @@ DRIFT_COLUMNS = pa.schema(
         ("slope_low_95", NUMBER), ("slope_high_95", NUMBER), ("change_at", NUMBER), ("change_low_95", NUMBER),
         ("change_high_95", NUMBER), ("change_size", NUMBER), ("change_std", NUMBER),
         ("change_size_low_95", NUMBER), ("change_size_high_95", NUMBER), ("scatter", NUMBER),
-        ("p_value", NUMBER), ("q_value", NUMBER),
+        ("correlation", NUMBER), ("p_value", NUMBER), ("q_value", NUMBER),
     ]
 )  # fmt: skip
 LEVEL_COLUMNS = pa.schema(
@@ -54,7 +54,8 @@ def drift_row(d: Drift) -> Row:
         **_named(d.quantity, d.vehicle, d.unit), "records": d.course.records, "drifts": d.drifts,
         "form": d.course.form, "slope": d.course.line.slope, "slope_std": d.course.line.std,
         "slope_low_95": d.course.low, "slope_high_95": d.course.high, **change,
-        "scatter": d.course.scatter, "p_value": d.course.p_value, "q_value": d.q_value,
+        "scatter": d.course.scatter, "correlation": d.course.correlation,
+        "p_value": d.course.p_value, "q_value": d.q_value,
     }  # fmt: skip
 
 

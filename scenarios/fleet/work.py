@@ -109,8 +109,15 @@ def _estimated(found: EstimateResult) -> Iterator[Row]:
         yield {
             "kind": e["kind"], "location": name, "parameter": name, "size": finite(e["value"]),
             "std": finite(e["std_error"]), "low_95": finite(low), "high_95": finite(high),
-            "unit": e["unit"] or "",
+            "unit": e["unit"] or "", **_leaning(e),
         }  # fmt: skip
+
+
+def _leaning(e: Mapping[str, Any]) -> Row:
+    """How far an estimate is that of the record: what was believed before it, and why it says nothing."""
+    start, deviation = e.get("prior", (None, None))
+    held = "at a bound" if "at_bound" in e else "" if e.get("informed_by_data", True) else "not in the record"
+    return {"prior": start, "prior_std": deviation, "held": held}
 
 
 def _close_loop(given: Mapping[str, Any], place: Place) -> Answer:

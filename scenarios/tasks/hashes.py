@@ -10,8 +10,10 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 # what an answer follows from; pages, commands and the assembly of results are no part of it
-ANSWERING = ("fmus", "estimator", "scenarios/closing", "scenarios/estimating", "scenarios/experiment",
-             "scenarios/simulating", "scenarios/track")  # fmt: skip
+ANSWERING = (
+    "fmus", "estimator", "scenarios/closing", "scenarios/estimating", "scenarios/experiment",
+    "scenarios/simulating", "scenarios/track", "scenarios/fleet/work.py", "scenarios/campaign/work.py",
+)  # fmt: skip
 
 
 def hash_of_file(file: Path) -> str:
@@ -43,5 +45,6 @@ def _sources() -> Iterator[tuple[str, Path]]:
         yield from _below(Path(place), Path(place))
 
 
-def _below(folder: Path, root: Path) -> Iterable[tuple[str, Path]]:
-    return sorted((file.relative_to(root).as_posix(), file) for file in folder.rglob("*.py"))
+def _below(place: Path, root: Path) -> Iterable[tuple[str, Path]]:
+    files = [place] if place.is_file() else place.rglob("*.py")
+    return sorted((file.relative_to(root).as_posix(), file) for file in files)

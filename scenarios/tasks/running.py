@@ -4,6 +4,7 @@ The workers are processes of one thread each. A worker that is killed is replace
 another one. What was finished lies in the store, so that nothing else has to survive.
 """
 
+import logging
 import os
 import tempfile
 import time
@@ -123,7 +124,7 @@ def run(tasks: Sequence[Task], work: Work, store: Store, crew: Crew, tell: Tell,
         return {}
     done, failed = len(tasks) - len(left), dict[str, str]()
     tell(f"starting the workers; {done} of {len(tasks)} {what} are finished already")
-    with _lost_is_told(crew), _client(crew) as client:
+    with _lost_is_told(crew), _silent(), _client(crew) as client:
         files = {k: (file.name, file.read_bytes()) for k, file in crew.files.items()}
         client.register_plugin(Shipment(files))
         names = {f"railfmi-{hash_of([str(store.folder), t.key])}": t.key for t in left}
@@ -139,6 +140,20 @@ def run(tasks: Sequence[Task], work: Work, store: Store, crew: Crew, tell: Tell,
             done += 1
             tell(f"{what}, {done} of {len(tasks)}")
     return failed
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Without the library's own log, which shows a traceback where a scheduler is lost; that is told here."""
+    names = [n for n in logging.root.manager.loggerDict if n.partition(".")[0] == "distributed"]
+    before = {logger: logger.level for logger in map(logging.getLogger, names)}
+    for logger in before:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)
 
 
 @contextmanager

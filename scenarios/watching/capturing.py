@@ -15,11 +15,10 @@ from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.validation import read_toml
 from scenarios.output import written, written_at_once
 from scenarios.watching.declaration import Trace
+from scenarios.watching.policy import POLICY
 from scenarios.watching.windows import Window
 
 RECENT, EVENTS = "recent", "events"
-TESTED = 1 / 3  # share of the record after the alarm that tests the answer
-LEFT = 0.5  # s, of the samples at both ends of the record of an event that belong to no part
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Capturing:
     @property
     def _longest(self) -> float:
         """Of the record that is kept, s, also where a change is dated far back."""
-        return 4 * (self._trace.before + self._trace.after)
+        return POLICY.longest * (self._trace.before + self._trace.after)
 
     def alarm(self, a: Alarm, event: int) -> None:
         """Wait for the record after an alarm."""
@@ -97,7 +96,7 @@ class Capturing:
         t = table[self._e.time]
         table = table[(t >= begin) & (t <= end)].drop_duplicates(self._e.time).sort_values(self._e.time)
         first, last = float(table[self._e.time].iloc[0]), float(table[self._e.time].iloc[-1])
-        test = max(last - TESTED * self._trace.after, first + (last - first) / 2)
+        test = max(last - POLICY.tested * self._trace.after, first + (last - first) / 2)
         declared = self._declared(home, [first, test], [test, last])
         with written_at_once(home) as part:
             (part / "data.parquet").write_bytes(_parquet(table, units))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from estimator.filters import carried
 from estimator.monitoring import monitor
+from estimator.monitoring.policy import POLICY as OF_TEST
 from fmus import codec
 from fmus.errors import BadInput
 from fmus.export.provenance import checksum
@@ -64,10 +65,15 @@ TYPES = (
 
 
 def key_of(w: Watched, e: Experiment, fmu: Path | None) -> str:
-    """What a checkpoint belongs to: this version, and all that the two files and a foreign FMU say."""
+    """What a checkpoint belongs to: this version with its limits, and all that two files and an FMU say."""
     declared = sorted(e.model_dump(exclude={"file", "data_dir"}).items())
     said = repr((w.stream.continues, w.test, w.trigger, declared))
-    whole = [version("railfmi"), sha256(said.encode()).hexdigest(), *([checksum(fmu)] if fmu else [])]
+    whole = [
+        version("railfmi"),
+        OF_TEST.version,
+        sha256(said.encode()).hexdigest(),
+        *([checksum(fmu)] if fmu else []),
+    ]
     return " ".join(whole)
 
 

@@ -9,11 +9,10 @@ from typing import Any
 from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import capital, number, percent, with_error
 from scenarios.watching.checkpoint import Counts
+from scenarios.watching.policy import POLICY
 from scenarios.watching.tracing import Answer
 
 HERE = Path(__file__).parent
-STALE = 60.0  # s without a window, from which on a stream that runs is not healthy
-BACKWARD = 16  # windows in a row before the filter's time: the clock was set back
 
 
 @dataclass(frozen=True)
@@ -46,12 +45,12 @@ class Status:
 
     def trouble(self, now: float) -> str:
         """Why the stream is not healthy at a time of the machine's clock, empty if it is."""
-        if self.backward >= BACKWARD:
+        if self.backward >= POLICY.backward:
             return (
                 f"the last {self.backward} windows lie before the filter's time; a clock was set back, or "
                 "the stream has begun anew: start watch with --anew"
             )
-        if isfinite(self.seen) and now - self.seen > STALE:
+        if isfinite(self.seen) and now - self.seen > POLICY.stale:
             return f"no window has come for {now - self.seen:.0f} s"
         return ""
 

@@ -2,17 +2,19 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from estimator.monitoring.policy import POLICY as OF_TEST
 from scenarios.drawing.typography import with_error
 from scenarios.output import written
 from scenarios.shown import Shown, axes_or_new
 from scenarios.watching.checkpoint import Counts
+from scenarios.watching.policy import POLICY
 from scenarios.watching.tracing import Answer
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ RESULT = "watch.json"
 class WatchResult(Shown):
     """The state at the end: counts, time of the last sample [s], share of the reference that is learned,
     estimates with their standard deviations by NAME and NAME_std, the last alarms and what was found about
-    the last events.
+    the last events. limits: those by which the stream was tested, by name.
     """
 
     experiment: str
@@ -35,6 +37,7 @@ class WatchResult(Shown):
     estimates: dict[str, float]
     alarms: tuple[str, ...]
     answers: tuple[Answer, ...]
+    limits: dict[str, float] = field(default_factory=lambda: {**OF_TEST.values, **POLICY.values})
 
     def lines(self) -> list[str]:
         """See Shown.lines."""

@@ -58,6 +58,25 @@ def vdp_joint(fmu, names=("x0", "x1", "mu"), outputs=None, **more):
     return Joint(fmu, outputs or [x0], states, unknown, inputs=["u"], dt=VDP_DT, **more)
 
 
+@pytest.mark.parametrize("made_by", ["c", "python"])
+def test_a_system_that_is_driven_by_other_noise_is_a_new_one_to_the_bit(made_by, vdp, foreign):
+    """So that one is enough for all noise levels that are tried."""
+    s, _ = vdp_record(n=60)
+    path = vdp if made_by == "c" else foreign(PYTHON_VDP, SHOW_SPEED)
+    names, levels = ("x0", "x1", "mu") if made_by == "c" else ("x", "h", "k"), (1e-3, 1e-1, 1e-3)
+
+    def run(joint, level):
+        joint.drive((level, level))
+        return filtered(Ukf(joint, joint.start(), joint.noise, np.array([[VDP_NOISE**2]]), VDP_DT), s)
+
+    with vdp_joint(path, names) as one:
+        again = [run(one, level) for level in levels]
+    for level, found in zip(levels, again, strict=True):
+        with vdp_joint(path, names) as new:
+            assert_array_equal(run(new, level).x, found.x)
+    assert not np.array_equal(again[0].x, again[1].x)
+
+
 @pytest.mark.parametrize("kind", [Ukf, Ekf])
 @pytest.mark.parametrize("made_by", ["c", "python"])
 def test_the_damping_of_the_oscillator_is_found(kind, made_by, vdp, foreign):

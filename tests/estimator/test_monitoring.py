@@ -12,8 +12,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from benchmarks.watching.false_alarms import autoregression, false_alarms, heavy_tails
 from estimator.filters.history import History
 from estimator.monitoring.blocks import block_statistics, statistics
-from estimator.monitoring.cusum import ALLOWANCE, mean_run, threshold
+from estimator.monitoring.cusum import mean_run, threshold
 from estimator.monitoring.monitor import KEPT, Monitor, Settings
+from estimator.monitoring.policy import POLICY
 from estimator.monitoring.reference import Reference, correlation, learned
 from fmus import codec
 
@@ -77,7 +78,7 @@ def test_the_mean_run_of_normal_values_is_the_stated_one_or_longer():
     h = threshold(asked)
     sums, runs, since = np.zeros(500), [], np.zeros(500)
     for _ in range(3000):
-        sums = np.maximum(sums + rng.normal(size=500) - ALLOWANCE, 0.0)
+        sums = np.maximum(sums + rng.normal(size=500) - POLICY.allowance, 0.0)
         since += 1
         hit = sums > h
         runs += since[hit].tolist()

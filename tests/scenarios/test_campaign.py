@@ -16,7 +16,8 @@ from scipy.stats import sobol_indices
 from fmus.errors import BadInput
 from fmus.host.apart.isolation import ISOLATED
 from scenarios.campaign.declaration import Declaration, Range
-from scenarios.campaign.indices import estimates, indices_of
+from scenarios.campaign.indices import estimates, indices_of, tail
+from scenarios.campaign.policy import POLICY
 from scenarios.campaign.sampling import points_of, value_at
 from tests.helpers.paths import ROOT
 
@@ -88,6 +89,31 @@ def test_the_intervals_hold_as_often_as_the_page_says():
         for i, first, total in zip(found, *ishigami_indices(), strict=True):
             held += [i.first_low <= first <= i.first_high, i.total_low <= total <= i.total_high]
     assert np.mean(held) >= 0.9
+
+
+def test_intervals_of_few_points_are_wider_than_plain_quantiles():
+    """And those of many are plain quantiles. Eight points: 87 % of the plain intervals held, see the page."""
+    ends = [tail(n) for n in (8, 16, 64, 4096)]
+    assert ends == sorted(ends)
+    assert ends[0] < 0.25 * (1 - POLICY.confidence) / 2 * 1.05
+    assert ends[-1] == pytest.approx((1 - POLICY.confidence) / 2, rel=5e-3)
+
+
+def test_intervals_of_eight_points_hold_nine_times_in_ten():
+    pi, held = {"low": -math.pi, "high": math.pi}, []
+    for seed in range(25):
+        d = declared("sobol", 8, x1=pi, x2=pi, x3=pi).model_copy(update={"seed": seed})
+        x = np.array([[*p.values()] for p in points_of(d)])
+        for i, first, total in zip(
+            indices_of("y", [*d.vary], ishigami(x), seed), *ishigami_indices(), strict=True
+        ):
+            held += [i.first_low <= first <= i.first_high, i.total_low <= total <= i.total_high]
+    assert np.mean(held) >= 0.9
+
+
+def test_too_few_points_have_no_indices():
+    values = np.random.default_rng(1).normal(size=3 * (POLICY.fewest - 1))
+    assert indices_of("y", ["x"], values, seed=0) == []
 
 
 def test_complete_points_have_the_indices_of_scipy():

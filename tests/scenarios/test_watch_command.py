@@ -18,7 +18,8 @@ import pytest
 
 from scenarios.cli.app import run_safely
 from scenarios.watching.checkpoint import FILE, Counts
-from scenarios.watching.health import BACKWARD, STALE, Height, Status, health, metrics, page
+from scenarios.watching.health import Height, Status, health, metrics, page
+from scenarios.watching.policy import POLICY
 from scenarios.watching.serving import HOST, Serving
 from scenarios.watching.tracing import Answer, answer_of
 from tests.helpers.paths import SHIPPED
@@ -57,10 +58,10 @@ def test_labels_are_escaped():
 
 def test_health_says_when_nothing_comes_and_when_the_clock_goes_back():
     assert health(STATUS, 1001.0)[0] == 200
-    code, text = health(STATUS, 1001.0 + STALE)
+    code, text = health(STATUS, 1001.0 + POLICY.stale)
     assert code == 503
     assert "no window has come" in json.loads(text)["reason"]
-    code, text = health(replace(STATUS, backward=BACKWARD), 1001.0)
+    code, text = health(replace(STATUS, backward=POLICY.backward), 1001.0)
     assert code == 503
     assert "--anew" in json.loads(text)["reason"]
     assert health(Status("rig"), 5.0)[0] == 200  # nothing was to come yet

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from fmus.errors import BadInput
 from scenarios.watching.declaration import Mqtt
-from scenarios.watching.sources.folder import PATIENCE, REMEMBERED, Folder, natural
+from scenarios.watching.policy import POLICY
+from scenarios.watching.sources.folder import Folder, natural
 from scenarios.watching.sources.mqtt import _password
 from scenarios.watching.sources.source import Arrival
 from scenarios.watching.triggers import TRIGGERS
@@ -62,7 +63,7 @@ def test_a_file_comes_when_it_has_not_changed_for_a_while(tmp_path):
     [arrival] = source.arrivals()
     assert arrival.fresh  # what cannot be read yet comes again
     source.again(arrival)
-    clock[0] = now + 3 + PATIENCE
+    clock[0] = now + 3 + POLICY.patience
     [arrival] = source.arrivals()
     assert not arrival.fresh
 
@@ -79,11 +80,11 @@ def test_a_restart_gets_what_was_not_finished(tmp_path):
 
 def test_what_a_folder_remembers_is_bounded(tmp_path):
     source = Folder(tmp_path, "*", 0.0)
-    many = [f"w{i}" for i in range(3 * REMEMBERED)]
+    many = [f"w{i}" for i in range(3 * POLICY.remembered)]
     source.finished(tuple(many))
-    assert len(source.kept()) == REMEMBERED
-    made(tmp_path, "w0", many[-1], f"w{3 * REMEMBERED}")
-    assert names(source) == [f"w{3 * REMEMBERED}"]  # w0 is an old one
+    assert len(source.kept()) == POLICY.remembered
+    made(tmp_path, "w0", many[-1], f"w{3 * POLICY.remembered}")
+    assert names(source) == [f"w{3 * POLICY.remembered}"]  # w0 is an old one
 
 
 def test_a_folder_that_is_none_is_bad_input(tmp_path):

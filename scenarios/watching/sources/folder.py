@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from fmus.errors import BadInput
+from scenarios.watching.policy import POLICY
 from scenarios.watching.sources.source import Arrival, Source
 
-REMEMBERED = 256  # finished windows; a file whose name comes before all of these is taken for an old one
-PATIENCE = 10.0  # s, for which a file that cannot be read is tried again before it counts as broken
 UNFINISHED = (".part", ".tmp", ".crdownload", ".writing")  # endings of files that somebody is writing
 DIGITS = re.compile(r"(\d+)")
 Key = tuple[tuple[int, int, str], ...]
@@ -41,7 +40,7 @@ class Folder(Source):
 
     def arrivals(self) -> Iterator[Arrival]:
         """See Source."""
-        known, full = {name for _, name in self._done}, len(self._done) >= REMEMBERED
+        known, full = {name for _, name in self._done}, len(self._done) >= POLICY.remembered
         first = self._done[0][0] if full else ()
         new = []
         for file in self.folder.glob(self._pattern):
@@ -55,7 +54,7 @@ class Folder(Source):
             age = self._age(file)
             if age >= self._settle:
                 self._given.add(name)
-                yield Arrival(name, file, age < self._settle + PATIENCE)
+                yield Arrival(name, file, age < self._settle + POLICY.patience)
 
     def _age(self, file: Path) -> float:
         """Time since the last change of a file, s; negative if it is none, or has gone meanwhile."""
@@ -73,7 +72,7 @@ class Folder(Source):
         for name in names:
             self._given.discard(name)
             insort(self._done, (natural(name), name))
-        del self._done[:-REMEMBERED]
+        del self._done[: -POLICY.remembered]
 
     def kept(self) -> tuple[str, ...]:
         """See Source."""
