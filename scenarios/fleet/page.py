@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from scenarios.closing.page.glossary import effect_words
 from scenarios.drawing.pages import rendered
 from scenarios.drawing.typography import NOTHING, number, quantity, short, unit, with_error
 from scenarios.fleet.figures import course_plots, level_plots, map_plot
@@ -70,7 +71,7 @@ def _level(x: Row) -> Row:
 
 def _effect(e: Row) -> Row:
     return {
-        "effect": f"{e['kind']} @ {e['location']}",
+        "effect": f"{effect_words(e['kind'])} at {e['location']}",
         "class": e["class"] or NOTHING,
         "size": f"{e['parameter']} = {quantity(with_error(e['size'], e['std']), e['unit'])}",
         "shown": len(e["shown"]),

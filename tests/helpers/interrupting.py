@@ -22,6 +22,7 @@ from tests.helpers.small_commands import command_line, prepare
 PATIENCE = 180  # s, for a busy machine; a command that hangs is named
 LONGEST = 25.0  # s, within which signals come
 SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+WHOLE = 1800.0  # s, within which a command that is left alone comes to its end
 LEAVING = 60.0  # s, within which what a killed command had started is gone
 AGAIN = 0.5  # s, within which an impatient user sends the signal again
 GOES_ON = {"close-loop": ("--resume",)}  # what a command is given to go on after a kill

@@ -321,7 +321,7 @@ def test_the_result_and_the_page_say_who_drifts(found, tmp_path):
     assert "https://" not in page
     for figure in ("map", "courses", "distributions"):
         assert (tmp_path / f"{figure}.png").exists()
-    assert "viscous_damping @ roller" in page
+    assert "viscous damping at roller" in page
 
 
 def test_a_task_without_an_answer_is_left_with_the_reason(answered_fleet):

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from tests.contracts.interop import reference
 from tests.contracts.interop.cases import BUILDS, runs
 from tests.contracts.interop.importer import importers
 from tests.contracts.interop.record import BEGIN, END, PAGE, Row, keep, shown, stored, table, write_page
@@ -72,16 +71,3 @@ def test_the_worst_model_and_a_failure_are_shown(tmp_path):
 @pytest.mark.parametrize(("value", "text"), [(0.0, "0"), (3.62e-12, "4e-12"), (6.3e-5, "6e-5")])
 def test_a_difference_has_one_digit(value, text):
     assert shown(value) == text
-
-
-def test_the_page_shows_what_became_of_the_reference_fmus():
-    inside = PAGE.read_text().split(reference.BEGIN)[1].split(reference.END)[0]
-    assert inside.strip() == reference.table(reference.stored()).strip()
-
-
-def test_reference_fmus_with_real_outputs_give_what_their_authors_say_in_both_versions():
-    ran = [o for o in reference.stored() if o.run is not None]
-    assert {o.fmi for o in ran} == {2, 3}
-    assert len({o.name for o in ran}) >= 4
-    assert max(o.run for o in ran) < 1e-6
-    assert {o.compare for o in ran} == {"agree"}
