@@ -22,7 +22,7 @@ from benchmarks.fleet.outcome import KILLED, Outcome, outcome_of, told
 from benchmarks.machine import described
 
 WORKERS = 2
-LEVEL = 0.01  # of false names: of 400 tests, one fleet in thirty names a sound vehicle
+LEVEL = 0.01  # of false names, so that sound vehicles are rarely named among 400 tests
 TRUTH = "truth.json"  # in the folder of the data, written when they are whole
 
 

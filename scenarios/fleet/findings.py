@@ -144,13 +144,17 @@ def _of_class(quantity: Quantity, vehicles: Mapping[str, Sequence[Row]]) -> Iter
     for v, rows in vehicles.items():
         mean, error = means[v]
         distance = (mean - of_class.centre) / float(np.hypot(error, of_class.spread))
-        tested = of_class.groups >= POLICY.fewest_vehicles
-        own = error, s.freedom(values[v].freedom)
-        freedom = min(_joined(own, (of_class.spread, between)), between)  # a spread of 0 is found, not known
+        p_value = None
+        if of_class.groups >= POLICY.fewest_vehicles:
+            own = error, s.freedom(values[v].freedom)
+            # a spread of 0 is found, not known
+            p_value = 2 * float(
+                student.sf(abs(distance), min(_joined(own, (of_class.spread, between)), between))
+            )
         yield {
             "quantity": quantity, "vehicle": v, "value": mean, "std": error, "records": len(rows),
             "unit": rows[0]["unit"], "of_class": of_class, "distance": distance,
-            "p_value": float(2 * student.sf(abs(distance), freedom)) if tested else None,
+            "p_value": p_value,
         }  # fmt: skip
 
 
