@@ -19,6 +19,7 @@ from scenarios.fleet.policy import POLICY
 from scenarios.fleet.scatter import Array, excess
 
 LONG = 128  # records, from which on the correlation is found without the matrices of the fit
+ROUNDED = 1e-9  # of the expected squares, below which residuals are those of the arithmetic
 LARGEST = 10.0  # power of two of the freedom that is lent, beyond which vehicles are alike
 
 
@@ -145,6 +146,7 @@ def _correlation(some: _Class, beyond: float) -> tuple[float, Array]:
     for s in some.some:
         r, basis = s.left(beyond)
         power = float(r @ r)
+        power = power if power > ROUNDED * s.freedom else 0.0
         seen.append(float(r[1:] @ r[:-1]) / power if power > 0 else 0.0)
         counted.append(min(power, POLICY.counted * s.freedom))
         a, b = _expected(basis)

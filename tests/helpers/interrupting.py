@@ -122,9 +122,8 @@ def killed(command: str, seed: int, times: int, folder: Path) -> list[str]:
         files = [file for file in out.rglob("*") if file.is_file() and not _is_aside(file, out)]
         wrong += [f"half file: {file.name}" for file in files if not whole(file)]
         found += [f"{command}, killed after {after:.2f} s of {lasts:.1f} s: {one}" for one in wrong]
-    code, said = interrupted(
-        [*arguments, *GOES_ON.get(command, ())], folder, temporary, signal.SIGINT, PATIENCE
-    )
+    again = [*arguments, *GOES_ON.get(command, ())]
+    code, said = interrupted(again, folder, temporary, signal.SIGINT, WHOLE)
     wrong = [f"left: {file}" for file in (*temporary.iterdir(), *out.rglob(".writing_*"))]
     wrong += [] if code in (0, 1) else [f"exit code {code}: {said}"]
     return found + [f"{command}, after it was killed: {one}" for one in wrong]
