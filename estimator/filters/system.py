@@ -111,7 +111,7 @@ class Joint:
             variance += w.variance.tolist()
         return Estimate(t, np.array(x), np.diag(variance), carried=self._first_carried)
 
-    def drive(self, noise: Sequence[float]) -> None:
+    def set_noise(self, noise: Sequence[float]) -> None:
         """Drive the states by this process noise, unit/sqrt(s), in their order, in place of what they had."""
         self.states = tuple(replace(s, noise=x) for s, x in zip(self.states, noise, strict=True))
         self._steps.clear()

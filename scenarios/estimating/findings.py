@@ -193,7 +193,7 @@ def _noise_share(s: Setup, archive: Archive) -> float:
     with s.joint(archive, 0.0) as joint:  # one for all, since the ways into the FMU are tried out for each
 
         def log_likelihood(part: float) -> float:
-            joint.drive(s.noise_of(part))
+            joint.set_noise(s.noise_of(part))
             return _log_likelihood(s, joint, first)
 
         return likeliest(log_likelihood)

@@ -66,7 +66,7 @@ def test_a_system_that_is_driven_by_other_noise_is_a_new_one_to_the_bit(made_by,
     names, levels = ("x0", "x1", "mu") if made_by == "c" else ("x", "h", "k"), (1e-3, 1e-1, 1e-3)
 
     def run(joint, level):
-        joint.drive((level, level))
+        joint.set_noise((level, level))
         return filtered(Ukf(joint, joint.start(), joint.noise, np.array([[VDP_NOISE**2]]), VDP_DT), s)
 
     with vdp_joint(path, names) as one:

@@ -164,7 +164,10 @@ def test_what_an_output_depends_on(descriptions, vdp, tmp_path):
     d = descriptions["a"]
     assert direct_inputs(d, "x") == ()  # a state
     assert direct_inputs(d, "k") == ()
-    assert direct_inputs(d, "F") == ("x_other", "v_other", "F_ext")  # nothing is stated
+    assert direct_inputs(d, "F") == ("x_other", "v_other")  # as stated
+    nothing = dataclasses.replace(d, dependencies={})
+    assert direct_inputs(nothing, "F") == ("x_other", "v_other", "F_ext")
+    assert direct_inputs(nothing, "x") == ()
     assert direct_inputs(d, "F_ext") == ("F_ext",)
     stated = dataclasses.replace(d, dependencies={"F": ("x_other",), "x": ("F_ext",)})
     assert direct_inputs(stated, "F") == ("x_other",)
@@ -320,7 +323,7 @@ REFUSED = {
     ),
     "loop": (
         {"connections": [C("a.F", "a.x_other", gain_unit="m/N")]},
-        "algebraic loop a.F -> a.x_other -> a.F (a: assumed, as the FMU states no dependencies): each",
+        "algebraic loop a.F -> a.x_other -> a.F: each follows the one before at once",
     ),
     "input unknown": (
         {"inputs": {"a.F_exd": 1.0}},
@@ -369,14 +372,15 @@ def test_what_is_refused(parts, case):
     assert "\n" not in str(refused.value)
 
 
-def test_a_loop_is_named_all_the_way(parts):
-    fmus = {"a": parts["a"], "b": parts["a"], "c": parts["b"]}
+def test_a_loop_is_named_all_the_way(parts, tmp_path):
+    unstated = with_description(parts["a"], tmp_path / "unstated.fmu", rb' dependencies="[^"]*"', b"")
+    fmus = {"a": parts["a"], "b": unstated, "c": parts["b"]}
     links = [
         C("c.x", "a.v_other", gain_unit="1/s"),
         C("a.F", "b.x_other", gain_unit="m/N"),
         C("b.F", "a.x_other", gain_unit="m/N"),
     ]
-    words = "algebraic loop a.F -> b.x_other -> b.F -> a.x_other -> a.F (a, b: assumed"
+    words = "algebraic loop a.F -> b.x_other -> b.F -> a.x_other -> a.F (b: assumed, as the FMU"
     with pytest.raises(BadInput, match=re.escape(words)):
         Master(fmus, links, step=0.01)
 
