@@ -504,6 +504,32 @@ def test_invalid_samples_of_mdf_are_no_numbers(tmp_path):
     assert_array_equal(np.isnan(found), invalid)
 
 
+@pytest.mark.parametrize("version", ["4.10", "3.30"])
+@pytest.mark.parametrize(
+    ("formula", "right"),
+    [("2*X1+1", True), ("X1**2", True), ("X1^2.5", False), ("open('ran', 'w') and X1", False)],
+)
+def test_a_formula_of_mdf_is_evaluated_or_refused_and_never_run(
+    version, formula, right, tmp_path, monkeypatch
+):
+    from asammdf import MDF, Signal
+
+    ran = tmp_path / "ran"
+    formula = formula.replace("ran", str(ran))
+    written = formula if version > "4" else formula.replace("X1", "X")  # as the library writes each version
+    with MDF(version=version) as m:
+        m.append([Signal(np.arange(100.0), FAST, name="x", conversion={"formula": written})])
+        m.save(tmp_path / "a.mf4" if version > "4" else tmp_path / "a.mdf")
+    (file,) = tmp_path.glob("a.*")
+    if right:
+        X1 = np.arange(100.0)  # noqa: F841 - of the formula
+        assert_array_equal(sheet(file, "time", "x").numbers("x"), eval(formula))
+    else:
+        with pytest.raises(BadInput, match=r"its formula .* is no arithmetic of X"):
+            sheet(file, "time", "x").numbers("x")
+    assert not ran.exists()
+
+
 def test_an_index_of_pandas_is_a_column(tmp_path):
     pd.DataFrame({"x": FAST}, index=pd.Index(SLOW.repeat(5), name="time")).to_parquet(tmp_path / "a.parquet")
     assert_array_equal(sheet(tmp_path / "a.parquet", "time", "time").cells["time"], SLOW.repeat(5))

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator
 from functools import partial
 from hashlib import blake2b
+from importlib import import_module
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any, BinaryIO, ClassVar
@@ -10,6 +11,7 @@ from typing import Any, BinaryIO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.errors import BadInput
 from fmus.taken import NUMBER, check_record
 from scenarios.experiment.readers.channels import Channel, sheet_of
 from scenarios.experiment.readers.reader import Reader, library
@@ -30,11 +32,17 @@ class Mdf(Reader):
             for group in source.groups:  # their master channels are read whatever is wanted
                 about = group.channel_group
                 check_record(file, about.cycles_nr * max(about.samples_byte_nr, NUMBER))
-            return sheet_of(file, [c for g in groups for c in _channels(source, g)], time, columns)
+            return sheet_of(file, [c for g in groups for c in _channels(file, source, g)], time, columns)
 
 
 def _opened(asammdf: Any, stream: BinaryIO, options: dict[str, Any]) -> Any:
-    """The library's object of a file."""
+    """The library's object of a file.
+
+    What numexpr does not take of a formula in the file, the library hands to SymPy where that is installed,
+    which runs it as a program. It is kept from that.
+    """
+    for blocks in ("v4_blocks", "v2_v3_blocks"):
+        import_module(f"asammdf.blocks.{blocks}").lambdify = None  # type: ignore[attr-defined]
     try:
         return asammdf.MDF(stream, **options)
     except Exception as error:
@@ -46,8 +54,10 @@ def _opened(asammdf: Any, stream: BinaryIO, options: dict[str, Any]) -> Any:
         raise
 
 
-def _channels(source: Any, g: int) -> Iterator[Channel]:
+def _channels(file: Path, source: Any, g: int) -> Iterator[Channel]:
     """The channels of group number g, its master among them."""
+    if g in source.masters_db:
+        _check_formulas(file, source.groups[g].channels[source.masters_db[g]])
     master = source.get_master(g)
     if not len(master):
         return
@@ -56,15 +66,32 @@ def _channels(source: Any, g: int) -> Iterator[Channel]:
     group = getattr(source.groups[g].channel_group, "acq_name", None) or f"group {g}"
     for i, channel in enumerate(source.groups[g].channels):
         unit = source.get_channel_unit(group=g, index=i) or None
-        load = partial(_values, source, g, i)
+        load = partial(_values, file, source, g, i)
         yield Channel(channel.name, len(master), frozenset({raster}), load, group, unit)
 
 
-def _values(source: Any, g: int, i: int) -> NDArray[Any]:
+def _values(file: Path, source: Any, g: int, i: int) -> NDArray[Any]:
     """The samples of channel i in group g (N,), nan where the file calls them invalid."""
+    _check_formulas(file, source.groups[g].channels[i])
     # unless they are ignored there, the library leaves invalid samples out
     signal = source.get(group=g, index=i, ignore_invalidation_bits=True)
     values = np.asarray(signal.samples)
     if signal.invalidation_bits is None or values.dtype.kind not in "biuf":
         return values
     return np.where(signal.invalidation_bits, np.nan, values)
+
+
+def _check_formulas(file: Path, channel: Any) -> None:
+    """Raise BadInput for a conversion that is no arithmetic, for which the library would give raw values."""
+    validate = library("numexpr", "asammdf", file).validate
+    sample, waiting = np.zeros(1), [getattr(channel, "conversion", None)]
+    known = {"X": sample, "X1": sample, "INF": np.inf, "NaN": np.nan}
+    while waiting:
+        block = waiting.pop()
+        formula = getattr(block, "formula", "")
+        if formula and validate(formula, known, {}) is not None:
+            raise BadInput(
+                f"{file}: channel '{channel.name}': its formula '{formula[:60]}' is no arithmetic of X, and "
+                "cannot be evaluated; write it like 2*X**2 + 1, or export physical values"
+            )
+        waiting += (getattr(block, "referenced_blocks", None) or {}).values()
