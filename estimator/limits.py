@@ -2,13 +2,18 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
+
+
+def limit(value: Any, unit: str, meaning: str, source: str) -> Any:
+    """A field of limits with its default value, unit, meaning and source."""
+    return field(default=value, metadata={"unit": unit, "meaning": meaning, "source": source})
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the limits of a room have in common; each field is one, made by estimator.closeloop.policy.limit.
+    """What the limits of a room have in common; each field is one, made by `limit`.
 
     A limit is listed if another value could lead to another sentence, alarm or interval. Constants that only
     change the computing time or the last digits stay beside the code that uses them.

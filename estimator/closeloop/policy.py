@@ -9,18 +9,13 @@ challenge on whose records the value was found; such a limit is empirical.
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator
-from dataclasses import Field, asdict, dataclass, field, fields, is_dataclass
+from dataclasses import Field, dataclass, fields, is_dataclass
 from typing import Any
 
+from estimator.limits import Limits, limit
+
 CHALLENGE = "calibrated on the challenges up to seed 591988, frozen at 9217a2d"
-
-
-def limit(value: Any, unit: str, meaning: str, source: str) -> Any:
-    """A field of the policy with its default value, unit, meaning and source."""
-    return field(default=value, metadata={"unit": unit, "meaning": meaning, "source": source})
 
 
 @dataclass(frozen=True)
@@ -525,7 +520,7 @@ class PriorPolicy:
 
 
 @dataclass(frozen=True)
-class Policy:
+class Policy(Limits):
     """All limits, grouped by start states, inputs, detection, search, intervals, decision and priors."""
 
     start: StartPolicy = StartPolicy()
@@ -535,12 +530,6 @@ class Policy:
     interval: IntervalPolicy = IntervalPolicy()
     decision: DecisionPolicy = DecisionPolicy()
     prior: PriorPolicy = PriorPolicy()
-
-    @property
-    def version(self) -> str:
-        """A short hash of all values: results with the same version were decided with the same limits."""
-        text = json.dumps(asdict(self), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def limits(self) -> Iterator[tuple[str, Any, Field[Any]]]:
         """Name (group.limit), value and field of each limit."""

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from estimator.closeloop.policy import limit
-from estimator.limits import Limits
+from estimator.limits import Limits, limit
 
 
 @dataclass(frozen=True)
