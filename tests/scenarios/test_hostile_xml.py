@@ -53,8 +53,9 @@ def guarded(pipe: Path) -> Iterator[None]:
         yield
         assert not opened.is_set()
     finally:
-        os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))
+        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # open until the thread came, however late it began
         thread.join()
+        os.close(reader)
 
 
 @pytest.fixture
