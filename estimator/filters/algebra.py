@@ -273,27 +273,3 @@ def weigh(
     else:
         likelihood, nis = log_density(innovation, S)
     return n, likelihood, nis
-
-
-@compiled
-def match(
-    innovation: Array, S: Array, R: Array, declared: Array, used: BoolArray, share: float,
-    limits: tuple[float, float], scatter: Array, ratios: Array,
-) -> float:  # fmt: skip
-    """Match the noise to innovations (m,) with covariance S (m, m), of which R is the noise in use.
-
-    Continues with weight `share` the mean squares `scatter` (m,) and the ratios (m,) of the variances to the
-    declared ones, within limits. Returns the scatter found over that explained by the process noise.
-    """
-    explained = found = 0.0
-    for i in range(len(innovation)):
-        if np.isnan(scatter[i]):
-            scatter[i] = S[i, i]
-        if used[i]:
-            scatter[i] += share * (innovation[i] ** 2 - scatter[i])
-            wanted = (scatter[i] - (S[i, i] - R[i, i])) / declared[i, i]
-            ratios[i] += share * (wanted - ratios[i])
-            explained += (S[i, i] - R[i, i]) / S[i, i]
-            found += (scatter[i] - R[i, i]) / S[i, i]
-        ratios[i] = min(max(ratios[i], limits[0]), limits[1])
-    return found / max(explained, 1e-12)

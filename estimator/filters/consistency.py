@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from estimator.filters.policy import POLICY
 from estimator.record import Array
 
-LAGS = 20  # lags of the autocorrelation of the innovations
-FALSE_REJECTION = 0.05  # probability that any check rejects a filter whose model and noise are right
 NIS = "NIS"
 WHITENESS = "whiteness of "
 
@@ -75,7 +74,7 @@ class Whiteness:
         return float(np.max(np.abs(self.correlation), initial=0.0))
 
 
-def whiteness(innovation: Array, lags: int = LAGS) -> Whiteness:
+def whiteness(innovation: Array, lags: int = POLICY.lags) -> Whiteness:
     """Whiteness of normalised innovations (N,) by the test of Ljung and Box, Biometrika 65 (1978) 297."""
     e = innovation[np.isfinite(innovation)]
     n = len(e)
@@ -102,9 +101,10 @@ class Check:
 def checks(nis: Array, freedom: Array, innovation: Array, outputs: Sequence[str]) -> tuple[Check, ...]:
     """Checks of the mean NIS (N,), and of the whiteness of each output's normalised innovations (N, m).
 
-    FALSE_REJECTION is divided evenly between them (Bonferroni). Checks with too few samples are left out.
+    The policy's `false_rejection` is divided evenly between them (Bonferroni). Checks with too few samples
+    are left out.
     """
-    level, used = FALSE_REJECTION / (1 + len(outputs)), freedom > 0
+    level, used = POLICY.false_rejection / (1 + len(outputs)), freedom > 0
     band = mean_band(nis[used], freedom[used], 1 - level)
     found = [Check(NIS, band.value, (band.low, band.high), band.within)]
     for name, e in zip(outputs, innovation.T, strict=True):

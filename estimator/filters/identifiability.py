@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.filters.policy import POLICY
 from estimator.record import Array
 from fmus.aside import blocks, set_aside
 
 NUDGE = 1e-3  # finite difference, as share of the prior standard deviation
-INFORMED = 0.9  # ratio of posterior to prior deviation, below which the data determine an unknown
-ALIKE = 0.99  # correlation above which only a combination of two unknowns is determined
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class Identifiability:
     @property
     def informed(self) -> tuple[bool, ...]:
         """Whether the data determine each unknown, at least in part."""
-        return tuple(bool(v < INFORMED) for v in self.left)
+        return tuple(bool(v < POLICY.informed) for v in self.left)
 
     @property
     def alike(self) -> list[tuple[str, str, float]]:
@@ -37,7 +36,8 @@ class Identifiability:
             (self.names[i], self.names[j], float(self.correlation[i, j]))
             for i in range(n)
             for j in range(i)
-            if abs(self.correlation[i, j]) > ALIKE and min(self.left[i], self.left[j]) < INFORMED
+            if abs(self.correlation[i, j]) > POLICY.alike
+            and min(self.left[i], self.left[j]) < POLICY.informed
         ]
         return sorted(found, key=lambda pair: -abs(pair[2]))
 

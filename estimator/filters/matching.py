@@ -1,10 +1,10 @@
 """Adaptation of a filter's noise: innovations that scatter more than predicted raise it, less lower it."""
 
 from estimator.filters.algebra import compiled
+from estimator.filters.policy import POLICY
 from estimator.record import Array, BoolArray
 
-MOST = 2.0  # by which one sample raises a variance at most, so that an outlier is not taken for noise
-DECLARED = 20.0  # samples, as many as the declared noise counts for at the start
+MOST, DECLARED = POLICY.most_raised, POLICY.declared_samples
 
 
 @compiled

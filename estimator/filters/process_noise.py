@@ -1,15 +1,16 @@
 """Process noise of the states if it is not declared, estimated by maximum likelihood of the innovations."""
 
 from collections.abc import Callable
+from math import log10
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from estimator.filters.policy import POLICY
 from estimator.record import Array
 
-LEAST, MOST = -5.0, 0.5  # range of the search, as powers of ten of a state's own motion
+LEAST, MOST = log10(POLICY.least_noise), log10(POLICY.most_noise)
 COARSE = 6  # values of the first grid
-LEARNT_FROM = 800  # number of samples from which the noise is estimated
 
 
 def motion(t: Array, x: Array, nominal: Array) -> Array:

@@ -116,6 +116,12 @@ class Joint:
         self.states = tuple(replace(s, noise=x) for s, x in zip(self.states, noise, strict=True))
         self._steps.clear()
 
+    def set_walks(self, parameters: Sequence[UnknownParameter]) -> None:
+        """Let the parameters wander as these do, which are the same in all else."""
+        walks = {p.name: p.walk for p in parameters}
+        self.parameters = tuple(replace(p, walk=walks[p.name]) for p in self.parameters)
+        self._steps.clear()
+
     def noise(self, dt: float) -> Array:
         """Process noise covariance (n, n) of a step of dt [s]."""
         return self._over(dt)[1]

@@ -19,6 +19,7 @@ from fmus.host.apart.room import closing_rooms
 from fmus.host.archive import Archive
 from fmus.host.grading.honest import check_honest
 from fmus.models import model_class
+from scenarios.estimating.alarms import alarms
 from scenarios.estimating.findings import (
     Findings,
     Tell,
@@ -29,7 +30,6 @@ from scenarios.estimating.findings import (
 from scenarios.estimating.page import write_page
 from scenarios.estimating.result import (
     EstimateResult,
-    alarms,
     estimated,
     identified,
     innovations,

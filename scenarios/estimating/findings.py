@@ -20,7 +20,8 @@ from estimator.filters.identifiability import (
     information,
 )
 from estimator.filters.named import Request
-from estimator.filters.process_noise import LEARNT_FROM, likeliest
+from estimator.filters.policy import POLICY as OF_FILTER
+from estimator.filters.process_noise import likeliest
 from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
 from estimator.filters.ukf import Spread
@@ -29,7 +30,6 @@ from fmus.aside import all_set_aside
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.form import (
-    LEARNT,
     Form,
     begun_again,
     consistent,
@@ -38,13 +38,11 @@ from scenarios.estimating.form import (
     wandering,
     widened,
 )
+from scenarios.estimating.policy import POLICY
 from scenarios.estimating.setup import Setup, finely
 from scenarios.experiment.estimated import Options
 
 Tell = Callable[[str], None]
-MOVED = 0.1  # of its first deviation must an unknown move to be elsewhere than it was believed
-AT_BOUND = 0.01  # of the width between the bounds, or with one bound of the first deviation
-REACH = 2.0  # standard errors: a value at its bound is not told apart from it
 
 
 @dataclass(frozen=True)
@@ -157,19 +155,19 @@ def _wandering(s: Setup, archive: Archive, share: float) -> Setup:
     """
     first, names = _learnt_from(s), [name for name in s.asked if name not in s.options.walk]
 
-    def walking(size: float) -> Setup:
-        return replace(s, parameters=wandering(s.parameters, names, size))
+    with s.joint(archive, share) as joint:  # one for all, as in _noise_share
 
-    def log_likelihood(size: float) -> float:
-        with walking(size).joint(archive, share) as joint:
+        def log_likelihood(size: float) -> float:
+            joint.set_walks(wandering(s.parameters, names, size))
             return _log_likelihood(s, joint, first)
 
-    return walking(largest_wandering(log_likelihood))
+        size = largest_wandering(log_likelihood)
+    return replace(s, parameters=wandering(s.parameters, names, size))
 
 
 def _learnt_from(s: Setup) -> Samples:
     """The beginning of the record, from which a filter with an open form learns where to begin."""
-    return s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + LEARNT)))
+    return s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + POLICY.learnt)))
 
 
 def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
@@ -189,7 +187,7 @@ def request(o: Options, noise: Array, dt: float, u: Array) -> Request:
 
 def _noise_share(s: Setup, archive: Archive) -> float:
     """By maximum likelihood over the first samples."""
-    first = s.samples.first(LEARNT_FROM)
+    first = s.samples.first(OF_FILTER.noise_samples)
     with s.joint(archive, 0.0) as joint:  # one for all, since the ways into the FMU are tried out for each
 
         def log_likelihood(part: float) -> float:
@@ -272,7 +270,7 @@ def standings(found: Findings) -> dict[str, Standing]:
     last, error = (of[0].tolist() for of in joint.values(h.x[-1:], h.std[-1:]))
     ended: dict[str, Standing] = {}
     for i, name in enumerate(h.names[n:], n):
-        moved = bool(abs(h.x[-1, i] - begun.x[i]) > MOVED * std[i])
+        moved = bool(abs(h.x[-1, i] - begun.x[i]) > POLICY.moved * std[i])
         p = joint.parameters[i - n] if i - n < len(joint.parameters) else None
         side, bound = _at_bound(p, last[i], error[i]) if p and moved else ("", np.nan)
         ended[name] = Standing(first[i], last[i], moved, side, bound)
@@ -282,7 +280,7 @@ def standings(found: Findings) -> dict[str, Standing]:
 def _at_bound(p: UnknownParameter, value: float, error: float) -> tuple[str, float]:
     """Which bound a value with its standard error lies at, and where that is."""
     low, high = p.transform.low, p.transform.high
-    near = min(AT_BOUND * (high - low if np.isfinite(high - low) else p.std), REACH * error)
+    near = min(POLICY.at_bound * (high - low if np.isfinite(high - low) else p.std), POLICY.reach * error)
     if value - low <= near:
         return "lower", low
     return ("upper", high) if high - value <= near else ("", np.nan)

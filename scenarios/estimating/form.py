@@ -14,14 +14,11 @@ from estimator.filters.history import History
 from estimator.filters.system import Joint, UnknownParameter
 from fmus.host.description import FmuDescription
 from fmus.models import model_class
+from scenarios.estimating.policy import POLICY
 from scenarios.experiment.estimated import Options
 from scenarios.experiment.experiment import Experiment
 
-LEARNT = 30.0  # s of the record from which a second run of the filter takes its start values
-WIDER = 10.0  # times the standard errors of the first run: start deviation of the second
-WANDERINGS = 0.03, 0.1, 0.3  # start deviations in a second: walks that are compared
-REJECTED = 1.92  # log units below the largest likelihood: half of 3.84, for one unknown with 95 %
-INSIDE = 0.02  # share of the width between the bounds that a start value keeps from them
+WALKS = POLICY.walk_small, POLICY.walk_middle, POLICY.walk_large
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ def parameters_of_form(
     for name, (low, high) in model_class(e.model).form.items():
         if name not in given and name not in e.parameters:
             start = float(np.clip(d.variables[name].start or 0.0, *_inside(low, high)))
-            yield UnknownParameter(name, start, (high - low) / 4, bounded((low, high)))
+            yield UnknownParameter(name, start, POLICY.undeclared_std * (high - low), bounded((low, high)))
 
 
 def choices(e: Experiment, o: Options) -> list[dict[str, float]]:
@@ -74,11 +71,11 @@ def begun_again(
 def moved(p: UnknownParameter, value: float, std: float) -> UnknownParameter:
     """The parameter with the value and a multiple of the standard error of a first run as its start."""
     inside = _inside(p.transform.low, p.transform.high)
-    return replace(p, start=float(np.clip(value, *inside)), std=min(p.std, WIDER * std))
+    return replace(p, start=float(np.clip(value, *inside)), std=min(p.std, POLICY.widened * std))
 
 
 def _inside(low: float, high: float) -> tuple[float, float]:
-    return low + INSIDE * (high - low), high - INSIDE * (high - low)
+    return low + POLICY.inside * (high - low), high - POLICY.inside * (high - low)
 
 
 def wandering(
@@ -100,9 +97,9 @@ def largest_wandering(log_likelihood: Callable[[float], float]) -> float:
     while a larger one only costs some information. log_likelihood: function of that size for a filter with
     that walk; -inf if the filter diverges.
     """
-    found = {size: value for size in WANDERINGS if (value := log_likelihood(size)) > -np.inf}
+    found = {size: value for size in WALKS if (value := log_likelihood(size)) > -np.inf}
     best = max(found.values(), default=0.0)
-    return max((size for size, value in found.items() if value >= best - REJECTED), default=0.0)
+    return max((size for size, value in found.items() if value >= best - POLICY.rejected), default=0.0)
 
 
 def consistent(h: History) -> bool:

@@ -22,6 +22,7 @@ from fmus.host.fmu import Fmu, FmuError
 from fmus.model import declared
 from fmus.models import model_class
 from scenarios.estimating.form import choices, parameters_of_form
+from scenarios.estimating.policy import POLICY
 from scenarios.estimating.unknowns import (
     check_options,
     inputs_of,
@@ -32,9 +33,7 @@ from scenarios.estimating.unknowns import (
 from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
-MIN_SAMPLES = 10
 MOST_PARTS = 16  # largest number of parts of a step
-TOLD_APART = 0.1  # share of the noise below which a change of the outputs is neglected
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     if e.estimate and e.estimate.rate:
         every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
     s = samples(run.t, run.u, run.y, every)
-    if len(s.t) < MIN_SAMPLES:
+    if len(s.t) < POLICY.fewest_samples:
         raise BadInput(
             f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher rate"
         )
@@ -130,7 +129,7 @@ def _check_measured(e: Experiment, record: Record, s: Samples) -> None:
                 f"{e.file}: [estimate] rate leaves no measurement of output '{name}'; use a higher rate"
             )
         found = int(np.isfinite(record.runs[0].y[:, j]).sum())
-        if np.isnan(record.noise_std[j]) and found < MIN_SAMPLES:
+        if np.isnan(record.noise_std[j]) and found < POLICY.fewest_samples:
             raise BadInput(
                 f"{e.file}: [outputs.{name}] has {found} measurements, too few to estimate its noise; "
                 "add noise_std = ..."
@@ -197,7 +196,7 @@ def _fine_enough(
     while parts is None and found.held.shape[1] < MOST_PARTS:
         finer = samples(run.t, run.u, run.y, every, 2 * found.held.shape[1])
         other = _free_run(archive, values, finer, record, states)
-        if not np.any(_apart(free, other, len(noise)) > TOLD_APART * noise):
+        if not np.any(_apart(free, other, len(noise)) > POLICY.told_apart * noise):
             break
         found, free = finer, other
     return found, free

@@ -17,11 +17,9 @@ from estimator.filters.unknown_input import (
 from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription, FmuVariable
+from scenarios.estimating.policy import POLICY
 from scenarios.experiment.estimated import EstimatedParameter, Options
 from scenarios.experiment.experiment import Experiment
-
-FIRST = 10.0  # start deviation of a measured state, in standard deviations of its noise
-ROUGH = 0.1  # start deviation of a declared but unmeasured state, as a share of its usual size
 
 
 def check_options(e: Experiment, o: Options, d: FmuDescription) -> None:
@@ -80,8 +78,8 @@ def _transform(wanted: EstimatedParameter, v: FmuVariable, clip: bool, where: st
 
 
 def _std(wanted: EstimatedParameter, start: float) -> float:
-    """A quarter of the distance of the bounds, or of the value."""
-    return (wanted.bounds[1] - wanted.bounds[0]) / 4 if wanted.bounds else abs(start) / 4
+    """Of a parameter whose start deviation is not declared."""
+    return POLICY.undeclared_std * (wanted.bounds[1] - wanted.bounds[0] if wanted.bounds else abs(start))
 
 
 def inputs_of(e: Experiment, o: Options) -> Iterator[UnknownInput]:
@@ -101,11 +99,12 @@ def states_of(
     for name in names:
         v = d.variables[name]
         size = usual(v, e.initial.get(name))
-        start, std = e.initial.get(name, v.start or 0.0), size * (ROUGH if name in e.initial else 1.0)
+        start = e.initial.get(name, v.start or 0.0)
+        std = size * (POLICY.declared_start if name in e.initial else 1.0)
         if name in record.outputs:
             j = record.outputs.index(name)
             seen = y[np.isfinite(y[:, j]), j]
-            std = FIRST * float(noise[j])
+            std = POLICY.measured_start * float(noise[j])
             if len(seen):
                 start = e.initial.get(name, float(seen[0]))
                 std = max(std, abs(start - float(seen[0])))

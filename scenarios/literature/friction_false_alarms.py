@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from estimator.record import Array
 from fmus.contact.forces.friction import CRITICAL
-from scenarios.estimating.result import stretches
+from scenarios.estimating.alarms import stretches
 from scenarios.experiment.estimated import Alarm
 from scenarios.literature.following import Followed
 from scenarios.literature.friction_ukf import CASES as CONDITIONS

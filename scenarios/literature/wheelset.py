@@ -14,8 +14,8 @@ from estimator.filters.ukf import Ukf
 from estimator.filters.unknown_input import Shaped
 from fmus.model import declared
 from fmus.models import model_class
-from scenarios.estimating.form import LEARNT as FORM_LEARNT
 from scenarios.estimating.form import largest_wandering, moved
+from scenarios.estimating.policy import POLICY
 from scenarios.literature.case import Record
 from scenarios.literature.following import Followed, follow
 
@@ -77,7 +77,7 @@ class Task:
 
         A filter that begins with wide uncertainties becomes surer than its linearisation allows.
         """
-        scales, beginning = scales_of_form(), _first(record, FORM_LEARNT)
+        scales, beginning = scales_of_form(), _first(record, POLICY.learnt)
         first = self.known(beginning, scales)
         again = [moved(p, *(float(x[p.name][-1]) for x in (first.value, first.std))) for p in scales]
         size = largest_wandering(lambda size: self._walking(size).known(beginning, again).log_likelihood)

@@ -1,17 +1,24 @@
-"""The limits of fleets, campaigns and streams: unit, meaning and source, and the pages hold them all."""
+"""The limits of estimates, fleets, campaigns and streams: unit, meaning and source; the pages hold all."""
 
 from dataclasses import fields, replace
 
 import pytest
 
+from estimator.filters.policy import POLICY as OF_FILTER
 from estimator.limits import Limits
 from estimator.monitoring.policy import POLICY as OF_TEST
 from scenarios.campaign.policy import POLICY as OF_CAMPAIGN
+from scenarios.estimating.policy import POLICY as OF_ESTIMATE
 from scenarios.fleet.policy import POLICY as OF_FLEET
 from scenarios.watching.policy import POLICY as OF_WATCH
 from tests.helpers.paths import ROOT
 
-POLICIES = {"fleet": [OF_FLEET], "campaign": [OF_CAMPAIGN], "watch": [OF_TEST, OF_WATCH]}
+POLICIES = {
+    "estimate": [OF_FILTER, OF_ESTIMATE],
+    "fleet": [OF_FLEET],
+    "campaign": [OF_CAMPAIGN],
+    "watch": [OF_TEST, OF_WATCH],
+}
 ALL = [p for some in POLICIES.values() for p in some]
 
 

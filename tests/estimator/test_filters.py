@@ -391,7 +391,6 @@ def test_compiled_and_plain_algebra_agree():
         "joseph": (X[0], P, H, Y[0], S), "log_density": (Y[0], S),
         "weigh": (*weighed[0], np.inf, 0, *weighed[1]),
         "weigh with a gate": (*weighed[0], 0.9, 2, *weighed[1]),
-        "match": (Y[0], S, 0.1 * S, 0.2 * S, one, 0.1, (0.5, 2.0), np.array([np.nan, 1.0]), np.ones(2)),
         "matched": (Y[0], S, 0.1 * S, one, 0.01, np.ones(2), np.ones(2), np.ones(2)),
     }.items():  # fmt: skip
         function = getattr(matching if name == "matched" else algebra, name.split(" ")[0])

@@ -13,7 +13,7 @@ from estimator.filters.system import UnknownParameter
 from fmus.models import model_class
 from scenarios.estimating.estimating import estimate
 from scenarios.estimating.form import (
-    WANDERINGS,
+    WALKS,
     choices,
     largest_wandering,
     leading,
@@ -136,7 +136,7 @@ def level(y, noise, walk):
     return x, np.sqrt(P), likelihood
 
 
-@pytest.mark.parametrize("true", [0.0, 0.01, *WANDERINGS])
+@pytest.mark.parametrize("true", [0.0, 0.01, *WALKS])
 def test_the_band_holds_a_level_that_wanders_as_fast_as_nobody_said(true):
     rng, noise, held, constant = np.random.default_rng(1), 1.0, [], []
     for _ in range(60):
@@ -152,8 +152,8 @@ def test_the_band_holds_a_level_that_wanders_as_fast_as_nobody_said(true):
 
 
 def test_the_largest_walk_that_is_not_rejected_is_taken_and_none_where_all_diverge():
-    assert largest_wandering(lambda size: -1e4 * size) == WANDERINGS[0]
-    assert largest_wandering(lambda size: -abs(size - 0.1)) == WANDERINGS[-1]
+    assert largest_wandering(lambda size: -1e4 * size) == WALKS[0]
+    assert largest_wandering(lambda size: -abs(size - 0.1)) == WALKS[-1]
     assert largest_wandering(lambda size: -1e3 * abs(size - 0.1)) == 0.1
     assert largest_wandering(lambda size: -np.inf) == 0.0
     assert largest_wandering(lambda size: -np.inf if size > 0.03 else 0.0) == 0.03

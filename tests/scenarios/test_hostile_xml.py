@@ -53,7 +53,7 @@ def guarded(pipe: Path) -> Iterator[None]:
         yield
         assert not opened.is_set()
     finally:
-        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # open until the thread came, however late it began
+        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # until the thread came, however late
         thread.join()
         os.close(reader)
 

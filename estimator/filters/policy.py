@@ -1,0 +1,69 @@
+"""The limits of filters that can change an estimate, its error or what is said of it, in one object."""
+
+from dataclasses import dataclass
+
+from estimator.limits import Limits, limit
+
+
+@dataclass(frozen=True)
+class FilterPolicy(Limits):
+    """Limits of the consistency tests, of identifiability, and of noise that is learned from the record."""
+
+    false_rejection: float = limit(
+        0.05,
+        "probability",
+        "with which any test of consistency rejects a filter whose model and noise are right; it is divided "
+        "evenly between the tests",
+        "convention: the level of a 95 % band; divided after Bonferroni",
+    )
+    lags: int = limit(
+        20,
+        "samples",
+        "largest lag of the autocorrelation in the test of whiteness",
+        "convention: a usual number for the test of Ljung and Box (1978) on some hundred samples and more",
+    )
+    informed: float = limit(
+        0.9,
+        "posterior over prior standard deviation",
+        "ratio below which the record says something about an unknown",
+        "derivation: at 0.9 the record holds a fifth of the information that the prior and it hold together",
+    )
+    alike: float = limit(
+        0.99,
+        "correlation",
+        "correlation above which only a combination of two unknowns is determined",
+        "derivation: at 0.99 a fixed value of one would make the error of the other a seventh",
+    )
+    most_raised: float = limit(
+        2.0,
+        "ratio",
+        "by which one sample raises a variance that is matched to the innovations at most",
+        "convention: an outlier of ten standard deviations is not noise of a hundred times the power",
+    )
+    declared_samples: int = limit(
+        20,
+        "samples",
+        "as many as the declared noise counts for at the start, where it is matched to the innovations",
+        "derivation: a variance from 20 samples is known to within a third, as well as a data sheet says it",
+    )
+    noise_samples: int = limit(
+        800,
+        "samples",
+        "first samples of the record from which process noise that is not declared is estimated",
+        "derivation: a variance from 800 samples is known to within a twentieth",
+    )
+    least_noise: float = limit(
+        1e-5,
+        "share of a state's own motion",
+        "smallest process noise that the search tries",
+        "convention: a hundred thousandth of the motion is as good as none",
+    )
+    most_noise: float = limit(
+        10**0.5,
+        "share of a state's own motion",
+        "largest process noise that the search tries",
+        "derivation: three times the motion itself explains it by noise alone",
+    )
+
+
+POLICY = FilterPolicy()
