@@ -76,18 +76,18 @@ def wheels(
     """Creepages and creep forces [N] of both wheels, each in its own contact."""
     y, psi, y_dot, psi_dot = x[:4]
     start, rows = table(form.smoothed, p.F_n, form.penetration)
-    _, slope = looked_up(*roll_table(), y - y_irr)
+    slope = float(looked_up(*roll_table(), y - y_irr)[1])
     reduced = (p.k_A + p.k_S) / 2 if form.spin_reduced else 1.0
     found = {}
     for side, sign in WHEELS:
-        growth, delta, *patch = looked_up(start, rows, sign * (y - y_irr))
+        growth, delta, *patch = looked_up(start, rows, sign * (y - y_irr)).tolist()
         r = p.r0 + growth
         along = V - r * V / p.r0 - sign * p.s * psi_dot
         across = y_dot + r * slope * (y_dot - y_irr_dot) - V * psi
         spin = (psi_dot - sign * delta * V / p.r0) / V
         mu = p.mu0 * ((1 - p.A) * np.exp(-p.B * np.hypot(along, across)) + p.A)
         slips = (along / V, across / V, spin)
-        F_x, F_y, _ = creep(patch, p.F_n, float(mu), p.k_A, p.k_S, slips, reduced)
+        F_x, F_y, _ = creep(tuple(patch), p.F_n, float(mu), p.k_A, p.k_S, slips, reduced)
         named = {"xi_x": slips[0], "xi_y": slips[1], "F_x": F_x, "F_y": F_y}
         found |= {f"{name}_{side}": value for name, value in named.items()}
     return found

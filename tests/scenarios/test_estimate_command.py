@@ -9,8 +9,8 @@ import pytest
 
 from fmus.errors import BadInput
 from fmus.host.fmu import Fmu
+from scenarios.estimating.alarms import stretches
 from scenarios.estimating.estimating import estimate
-from scenarios.estimating.result import stretches
 from scenarios.experiment.estimated import Alarm, Options
 from tests.estimator.test_filters_fmu import PYTHON_VDP, SHOW_SPEED
 from tests.helpers.vdp import solved

@@ -40,7 +40,7 @@ class Truth:
 
 
 @lru_cache(maxsize=4)
-def wheel_table(hollow: float) -> tuple[float, list[Row]]:
+def wheel_table(hollow: float) -> tuple[float, Array]:
     """First shift, m, and rows every FINE: growth, delta, a, b, c11 to c33, roll and its slope."""
     c = contacts(LAMBDA, False, hollow)
     fine = np.arange(c.y[0], c.y[-1], FINE)
@@ -48,7 +48,7 @@ def wheel_table(hollow: float) -> tuple[float, list[Row]]:
     columns += [*kalker(columns[2] / columns[3])]
     roll = PchipInterpolator(c.y, c.phi)
     columns += [roll(fine), roll.derivative()(fine)]
-    return float(fine[0]), list(zip(*(x.tolist() for x in columns), strict=True))
+    return float(fine[0]), np.column_stack(columns)
 
 
 def on_rails(truth: Truth, V: float, motion: Row, loads: tuple[float, float]) -> tuple[float, float, float]:
@@ -59,11 +59,11 @@ def on_rails(truth: Truth, V: float, motion: Row, loads: tuple[float, float]) ->
     shift, shift_dot, psi, y_dot, psi_dot, omega = motion
     p, (mu0, A, B, k_A, k_S) = truth.p, truth.friction
     table = wheel_table(truth.hollow)
-    phi, slope = looked_up(*table, shift)[8:]
+    phi, slope = looked_up(*table, shift)[8:].tolist()
     phi_dot, turning = slope * shift_dot, V / p.r0 + omega
     F = M = axle = 0.0
     for side, Q in zip((1.0, -1.0), loads, strict=True):
-        growth, delta, a, b, *c = looked_up(*table, side * shift)[:8]
+        growth, delta, a, b, *c = looked_up(*table, side * shift)[:8].tolist()
         r, leans = p.r0 + growth, delta + side * phi
         along, across = V - r * turning - side * p.s * psi_dot, y_dot + r * phi_dot - V * psi
         spin = psi_dot - side * delta * turning
@@ -71,7 +71,7 @@ def on_rails(truth: Truth, V: float, motion: Row, loads: tuple[float, float]) ->
         N = Q / cos(leans)
         size = (N / LOAD) ** (1 / 3)
         F_x, F_y, M_z = creep(
-            [size * a, size * b, *c], N, mu, k_A, k_S, (along / V, across / V, spin / V), 1.0
+            (size * a, size * b, *c), N, mu, k_A, k_S, (along / V, across / V, spin / V), 1.0
         )
         # the creep force carries a part of the load where the contact is steep
         share = 1 / (1 + side * F_y * sin(leans) / Q)
@@ -87,7 +87,7 @@ def on_rails(truth: Truth, V: float, motion: Row, loads: tuple[float, float]) ->
 
 def rolled(truth: Truth, shift: float) -> tuple[float, float]:
     """Roll of a wheelset, rad, and its slope over the shift, rad/m."""
-    phi, slope = looked_up(*wheel_table(truth.hollow), shift)[8:]
+    phi, slope = looked_up(*wheel_table(truth.hollow), shift)[8:].tolist()
     return phi, slope
 
 

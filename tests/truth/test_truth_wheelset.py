@@ -111,7 +111,7 @@ def test_contact_is_the_one_of_s1002_on_60e1():
 def test_forces_of_creep_are_those_of_the_other_truth():
     patch = other_contact.Patch(6e-3, 4e-3, 55e3, 0.3, 8e10)
     for slips in ((1e-3, 2e-3, 0.3), (-2e-4, 1e-4, -0.8), (0.0, 1e-3, 0.0), (3e-3, 0.0, 0.1)):
-        found = creep([6e-3, 4e-3, *patch.kalker()], 55e3, 0.3, 0.8, 0.3, slips, 1.0)
+        found = creep((6e-3, 4e-3, *patch.kalker()), 55e3, 0.3, 0.8, 0.3, slips, 1.0)
         assert_allclose(found[:2], other_contact.polach(patch, *slips, 0.8, 0.3), rtol=1e-9)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -30,17 +31,20 @@ class Track:
 
     def interpolator(self) -> Callable[[float], tuple[Array, Array]]:
         """u, u_dot (4,) at any time within t: cubic between two samples, with their values and slopes."""
-        h, t0, last = float(self.t[1] - self.t[0]), float(self.t[0]), len(self.t) - 2
+        h, t0 = float(self.t[1] - self.t[0]), float(self.t[0])
         u0, u1, v0, v1 = self.u[:-1], self.u[1:], h * self.u_dot[:-1], h * self.u_dot[1:]
         c2, c3 = 3 * (u1 - u0) - 2 * v0 - v1, 2 * (u0 - u1) + v0 + v1
 
-        def at(t: float) -> tuple[Array, Array]:
-            i = min(max(int((t - t0) / h), 0), last)
-            s = (t - t0) / h - i
-            u = u0[i] + s * (v0[i] + s * (c2[i] + s * c3[i]))
-            return u, (v0[i] + s * (2 * c2[i] + 3 * s * c3[i])) / h
+        return lambda t: cubic(u0, v0, c2, c3, (t - t0) / h, h)
 
-        return at
+
+@njit(cache=True)
+def cubic(u0: Array, v0: Array, c2: Array, c3: Array, place: float, h: float) -> tuple[Array, Array]:
+    """Values (m,) and slopes (m,) of piecewise cubics (n, m) at a place counted in pieces of length h."""
+    i = min(max(int(place), 0), len(u0) - 1)
+    s = place - i
+    u = u0[i] + s * (v0[i] + s * (c2[i] + s * c3[i]))
+    return u, (v0[i] + s * (2 * c2[i] + 3 * s * c3[i])) / h
 
 
 def spectrum_rails(rng: np.random.Generator, length: float, roughness: float = LOW) -> Rails:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.integrate import solve_ivp
 
 from tests.truth.laws import ImpactTrain
@@ -147,6 +148,21 @@ def motion_at(x: Array, d: Array, v: Array) -> At:
     return at
 
 
+@njit(cache=True)
+def deflected(
+    E: Array, R: Array, k: Array, b: Array, x: Array, u: Array, u_dot: Array
+) -> tuple[Array, Array, Array]:
+    """Deflections, their rates and the linear forces (8,) of the suspensions; see Structure."""
+    d, v = E @ x[:7] - R @ u, E @ x[7:14] - R @ u_dot
+    return d, v, -k * d - b * v
+
+
+@njit(cache=True)
+def moving(E: Array, force: Array, push_up: Array, inertia: Array, x: Array) -> Array:
+    """Rates (14,) of x = q, q_dot under forces (8,) of the suspensions and on the coordinates (7,)."""
+    return np.concatenate((x[7:14], (E.T @ force + push_up) / inertia))
+
+
 def motion(track: Track, declared: Vehicle, e: Effects) -> Callable[[float, Array], Array]:
     """Right-hand side for x = q, q_dot (14,), memory."""
     s, rail = structure(declared), track.interpolator()
@@ -155,10 +171,10 @@ def motion(track: Track, declared: Vehicle, e: Effects) -> Callable[[float, Arra
     changes, extra = e.more.changes, acting(e.more, places)
 
     def rates(t: float, x: Array) -> Array:
+        x = np.ascontiguousarray(x)
         k, b, inertia = strengths(changed(declared, changes, t)) if changes else (s.k, s.b, s.inertia)
         u, u_dot = rail(t)
-        d, v = s.E @ x[:7] - s.R @ u, s.E @ x[7:14] - s.R @ u_dot
-        force = -k * d - b * v
+        d, v, force = deflected(s.E, s.R, k, b, x, u, u_dot)
         for i, law in laws:
             force[i] += law.force(t, d[i], v[i], k[i], b[i])
         push_up = np.zeros(7)
@@ -168,10 +184,10 @@ def motion(track: Track, declared: Vehicle, e: Effects) -> Callable[[float, Arra
                 push_up[MOVED[place]] += more
             else:
                 force[ELEMENTS.index(place)] += more
-        Q = s.E.T @ force + push_up
         for j, push in pushes:
-            Q[j] += push.force(t)
-        return np.concatenate([x[7:14], Q / inertia, extra.rates(t, at, z)])
+            push_up[j] += push.force(t)
+        own: Array = moving(s.E, force, push_up, inertia, x)
+        return np.append(own, extra.rates(t, at, z)) if len(z) else own
 
     return rates
 

@@ -1,4 +1,4 @@
-"""Truth model of the plan-view wheelset, independent of the product: plain Python over tables made by NumPy.
+"""Truth model of the plan-view wheelset, independent of the product: scalar code over tables made by NumPy.
 
 Written as virtual work of slips: each creep force acts along the velocity of its own contact point. Differs
 in form from the product's model: contacts linear between 10 um of shift, the track between samples by its
@@ -13,6 +13,7 @@ from functools import lru_cache
 from math import atan, cos, exp, hypot, pi, sin, sqrt
 
 import numpy as np
+from numba import njit
 from scipy.interpolate import PchipInterpolator
 
 from tests.truth.more import At, acting, changed
@@ -85,35 +86,37 @@ OTHER = Form(smoothed=0.04, spin_reduced=True)
 
 
 @lru_cache(maxsize=4)
-def table(smoothed: float, load: float, penetration: bool = False) -> tuple[float, list[Row]]:
+def table(smoothed: float, load: float, penetration: bool = False) -> tuple[float, Array]:
     """First shift, m, and rows of contact at every FINE of shift: growth, delta, a, b, c11 to c33."""
     c = contacts(smoothed, penetration)
     fine = np.arange(c.y[0], c.y[-1], FINE)
     size = np.cbrt(load / LOAD)
     columns = [PchipInterpolator(c.y, v)(fine) for v in (c.growth, c.delta, size * c.a, size * c.b)]
     columns += [*kalker(columns[2] / columns[3])]
-    return float(fine[0]), list(zip(*(x.tolist() for x in columns), strict=True))
+    return float(fine[0]), np.column_stack(columns)
 
 
 @lru_cache(maxsize=1)
-def roll_table() -> tuple[float, list[Row]]:
+def roll_table() -> tuple[float, Array]:
     """First shift, m, and rows of roll, rad, and its slope over the shift, rad/m."""
     c = contacts()
     fine = np.arange(c.y[0], c.y[-1], FINE)
     roll = PchipInterpolator(c.y, c.phi)
-    return float(fine[0]), list(zip(roll(fine).tolist(), roll.derivative()(fine).tolist(), strict=True))
+    return float(fine[0]), np.column_stack([roll(fine), roll.derivative()(fine)])
 
 
-def looked_up(start: float, rows: list[Row], y: float) -> list[float]:
-    """Values at y, linear between rows, held beyond them."""
+@njit(cache=True)
+def looked_up(start: float, rows: Array, y: float) -> Array:
+    """Values (k,) at y, linear between rows (n, k), held beyond them."""
     place = min(max((y - start) / FINE, 0.0), len(rows) - 1.001)
     i = int(place)
     part = place - i
-    return [low + part * (high - low) for low, high in zip(rows[i], rows[i + 1], strict=True)]
+    return rows[i] + part * (rows[i + 1] - rows[i])
 
 
+@njit(cache=True)
 def creep(
-    patch: list[float], N: float, mu: float, k_A: float, k_S: float, slips: tuple[float, ...], spin: float
+    patch: Row, N: float, mu: float, k_A: float, k_S: float, slips: tuple[float, ...], spin: float
 ) -> tuple[float, float, float]:
     """F_x, F_y [N] by Polach with spin, M_z [N.m] by Shen; patch: a, b, c11 to c33; spin: factor on c23."""
     a, b, c11, c22, c23, c33 = patch
@@ -142,29 +145,41 @@ def contact_forces(
 
     motion: shift over the track [m] and its rate, yaw, lateral velocity, yaw rate.
     """
+    spin = (friction[3] + friction[4]) / 2 if form.spin_reduced else 1.0
+    return of_both(
+        (p.r0, p.s, p.F_n, V), friction, motion, spin, 1.0 if form.moment else 0.0,
+        *table(form.smoothed, p.F_n, form.penetration), *roll_table(),
+    )  # type: ignore[no-any-return]  # fmt: skip
+
+
+@njit(cache=True)
+def of_both(
+    wheelset: Row, friction: Row, motion: Row, spin: float, moment: float, start: float, rows: Array,
+    roll_start: float, rolls: Array,
+) -> tuple[float, float, float]:  # fmt: skip
+    """See contact_forces; wheelset: r0, s, F_n and V; moment: 1 if the spin moments act, else 0."""
+    r0, s, F_n, V = wheelset
     shift, shift_dot, psi, y_dot, psi_dot = motion
     mu0, A, B, k_A, k_S = friction
-    spin = (k_A + k_S) / 2 if form.spin_reduced else 1.0
-    start, rows = table(form.smoothed, p.F_n, form.penetration)
-    phi, slope = looked_up(*roll_table(), shift)
-    phi_dot = slope * shift_dot
+    rolled = looked_up(roll_start, rolls, shift)
+    phi, phi_dot = rolled[0], rolled[1] * shift_dot
     F, M = 0.0, 0.0
     for side in (1.0, -1.0):
-        growth, delta, *patch = looked_up(start, rows, side * shift)
-        r = p.r0 + growth
+        row = looked_up(start, rows, side * shift)
+        r, delta = r0 + row[0], row[1]
         # velocity of the contact point: of the centre, of roll and yaw, and of the wheel's rotation
-        along = V - r * V / p.r0 - side * p.s * psi_dot
+        along = V - r * V / r0 - side * s * psi_dot
         across = y_dot + r * phi_dot - V * psi
-        turning = psi_dot - side * delta * V / p.r0
+        turning = psi_dot - side * delta * V / r0
         mu = mu0 * ((1 - A) * exp(-B * hypot(along, across)) + A)
-        slips = along / V, across / V, turning / V
-        F_x, F_y, M_z = creep(patch, p.F_n, mu, k_A, k_S, slips, spin)
+        patch = row[2], row[3], row[4], row[5], row[6], row[7]
+        F_x, F_y, M_z = creep(patch, F_n, mu, k_A, k_S, (along / V, across / V, turning / V), spin)
         leans = delta + side * phi
-        lateral = F_x * psi + F_y * cos(leans) - side * p.F_n * sin(leans)
+        lateral = F_x * psi + F_y * cos(leans) - side * F_n * sin(leans)
         forward = F_x - F_y * cos(leans) * psi
-        arm = side * p.s + r * phi
+        arm = side * s + r * phi
         F += lateral
-        M += -arm * psi * lateral - arm * forward + (M_z * cos(leans) if form.moment else 0.0)
+        M += -arm * psi * lateral - arm * forward + moment * M_z * cos(leans)
     return F, M, phi_dot
 
 
