@@ -21,8 +21,8 @@ test: .venv/ready  ## everything that is fast
 
 test-all: .venv/ready  ## the slow ones too, on examples drawn anew, and other importers of FMUs
 	$(LOCKED) -r requirements-interop.lock
-	$(BIN)/python -m pytest --hypothesis-profile=railfmi -n auto --maxprocesses 4 --dist loadfile
-	$(BIN)/python -m pytest -m slow --hypothesis-profile=railfmi -n auto --maxprocesses 4 --dist worksteal
+	$(BIN)/python -m pytest --hypothesis-profile=railfmi -n auto --maxprocesses 4 --dist loadfile; fast=$$?; \
+	$(BIN)/python -m pytest -m slow --hypothesis-profile=railfmi -n auto --maxprocesses 4 --dist worksteal && exit $$fast
 
 lint: .venv/ready
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""Truth model of the tram wheel test rig, independent of the product: numpy and scipy only.
+"""Truth model of the tram wheel test rig, independent of the product: numpy, scipy and numba only.
 
 Differs in form from the product's model: c11 interpolated here, inputs linear between
 samples, slip smoothed at standstill in its own way, an adaptive stiff integrator.

@@ -1,4 +1,4 @@
-"""Truth model of the vertical vehicle, independent of the product: numpy and scipy only.
+"""Truth model of the vertical vehicle, independent of the product: numpy, scipy and numba only.
 
 Assembled element by element from incidence vectors that come from rigid-body kinematics, integrated
 by an adaptive stiff method over a track that is smooth between its samples.
