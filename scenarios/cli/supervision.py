@@ -12,10 +12,9 @@ import os
 import signal
 import sys
 import tempfile
-from _thread import interrupt_main
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from threading import Timer
+from threading import Timer, main_thread
 from types import FrameType
 from typing import NoReturn
 
@@ -57,9 +56,12 @@ class Interrupts:
         raise KeyboardInterrupt
 
     def comes_again(self, dropped: "sys.UnraisableHookArgs") -> None:
-        """One that fell where Python drops exceptions, such as in a callback of a reference, comes again."""
+        """One that fell where Python drops exceptions, such as in a callback of a reference, comes again.
+
+        As a signal, which also ends a wait in a system call.
+        """
         if self.came and issubclass(dropped.exc_type, KeyboardInterrupt):
-            again = Timer(AGAIN, interrupt_main)
+            again = Timer(AGAIN, signal.pthread_kill, (main_thread().ident, signal.SIGINT))
             again.daemon = True
             again.start()
         else:

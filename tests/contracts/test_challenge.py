@@ -547,6 +547,7 @@ def test_every_policy_of_the_ablation_has_one_other_limit():
     assert len({(name, how) for name, how, _ in variants()}) == len(versions)
 
 
+@pytest.mark.slow
 def test_the_ablation_judges_by_the_default_as_the_chain_did(tmp_path):
     asked = problem(ModelBuilder("drive", tmp_path), record(to_and_fro(2.0), coulomb(40.0), 1))
     found = looked_at("one", asked, ("coulomb_friction",)).found

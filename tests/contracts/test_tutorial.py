@@ -42,6 +42,7 @@ def begun(tmp_path_factory) -> tuple[Path, str]:
     return folder, follow(STEPS[:ANSWER], folder)
 
 
+@pytest.mark.slow
 def test_the_tutorial_comes_to_a_trial(begun):
     folder, said = begun
     assert len(pd.read_csv(folder / "log.csv", skiprows=[1])) == 4000

@@ -77,6 +77,7 @@ def drawn(rng: np.random.Generator) -> tuple[str, Array]:
     return f"constant_force@{law}", noise + size * LAWS[law]
 
 
+@pytest.mark.slow
 def test_of_what_is_said_with_a_probability_as_many_are_right():
     rng = np.random.default_rng(3)
     said, right = [], []

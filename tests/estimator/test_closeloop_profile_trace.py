@@ -70,9 +70,10 @@ def test_intervals_of_a_linear_model_end_where_slopes_say_after_one_simulation_e
     assert problem.simulated - before == 2 * n
     units = np.sqrt(h.fit.inflation)
     alone = WIDTH * units * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
-    widest = alone * units.max() / units  # a place at the end of another unknown's interval may lie as far out
+    widest = alone * units.max() / units  # an end of another unknown's interval may lie as far out
     for reach in (high - h.fit.values, h.fit.values - low):
-        assert np.all((1 - 1e-3) * alone <= reach) and np.all(reach <= (1 + 1e-3) * widest)
+        assert np.all(reach >= (1 - 1e-3) * alone)
+        assert np.all(reach <= (1 + 1e-3) * widest)
 
 
 # ---- friction that hardly falls with the slip velocity: only the product (1 - A) B shows

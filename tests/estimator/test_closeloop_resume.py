@@ -106,6 +106,7 @@ def found(out: Path) -> str:
     return json.dumps({key: value for key, value in result.items() if key not in CLOCK})
 
 
+@pytest.mark.slow
 def test_every_checkpoint_of_a_run_can_be_read_back(carriage: Path, tmp_path: Path) -> None:
     """A run that is broken off at its end has nothing to work out again."""
     out = tmp_path / "out"

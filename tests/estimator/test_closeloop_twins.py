@@ -93,6 +93,7 @@ def test_no_experiment_is_advised_for_what_acts_alike_under_any_inputs(asked) ->
     assert "different amounts" not in words
 
 
+@pytest.mark.slow
 def test_what_is_alike_by_the_symmetry_of_a_record_is_not_alike_in_another(asked) -> None:
     """If all wheels rise alike, both front dampers act alike on the bounce; on other tracks they differ."""
     u = {f"u_{c}": 1e-3 for c in ("fl", "fr", "rl", "rr")}

@@ -118,6 +118,7 @@ def torque():
     return t, (350 * np.sin(4 * t) + 350)[:, None]
 
 
+@pytest.mark.slow
 def test_nees_of_the_rig_lies_within_its_band_over_50_seeds(built, torque):
     """Truth drawn from the system that the filter believes in; 300 seeds give 3.8 in a band of 3.7 to 4.3."""
     t, u = torque

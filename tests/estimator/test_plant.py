@@ -21,7 +21,8 @@ from fmus.models import MODELS
 from fmus.variables import Input
 from tests.helpers.carriage import coulomb, problem, record, to_and_fro
 from tests.helpers.native import native
-from tests.helpers.runs import every_model, names, stirred
+from tests.helpers.runs import names, stirred
+from tests.helpers.sizes import by_size
 
 N = 40  # samples of a run
 
@@ -194,7 +195,7 @@ def test_of_many_rows_only_the_new_ones_are_simulated():
         assert plant.simulate_rows(run, refused) is None
 
 
-@every_model
+@by_size
 def test_starts_in_turn_give_what_each_gives_alone(name):
     run = driven(name, dt=MODELS[name]().step_size)
     with Fmu(native(name)) as fmu:

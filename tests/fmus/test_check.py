@@ -199,6 +199,7 @@ def test_a_crash_in_the_middle_leaves_the_rest(foreign):
     assert "process in the trials tunable parameters and refusals" in found.isolation
 
 
+@pytest.mark.slow
 def test_a_run_without_end_is_ended(foreign, built):
     found = grade(foreign("while dt < 0:\n    time.sleep(1)\n" + GOOD), patience=12.0)
     assert [c.passed for c in found.checks][-1] is False

@@ -32,6 +32,7 @@ from tests.helpers.everything import (
 )
 from tests.helpers.laws import FORCES, PARAMETERS, RATES
 from tests.helpers.paths import ROOT
+from tests.helpers.sizes import SIZES, marks_of
 
 CONTRACT = """
     constant_force step_force coulomb_friction stribeck_friction viscous_damping quadratic_damping
@@ -132,7 +133,10 @@ def test_an_effect_that_is_off_changes_no_step(name, kind):
             assert_allclose(found, expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize(("name", "kind"), [(m, k) for m in ALL for k in FORCE_LAWS if all_of(m, k)])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [pytest.param(m, k, marks=marks_of(SIZES.get(m, 0))) for m in ALL for k in FORCE_LAWS if all_of(m, k)],
+)
 def test_a_force_law_acts_at_each_part_of_its_place_by_the_motion_there(name, kind):
     base, model = ALL[name](), ALL[name](all_of(name, kind))
     bare, built, rng = equations(base), equations(model), np.random.default_rng(2)

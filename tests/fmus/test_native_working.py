@@ -100,6 +100,7 @@ def _swap(file):
 
 
 @pytest.mark.parametrize("harm", [_damage, _cut_short, _open_to_all, _open_folder, _swap])
+@pytest.mark.slow
 def test_a_library_that_others_could_have_made_is_compiled_again(harm, compiled, tmp_path):
     first = build_working(MODELS["drive"](), tmp_path / "1.fmu").read_bytes()
     harm(next(folder().iterdir()))

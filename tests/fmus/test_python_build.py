@@ -219,6 +219,7 @@ def test_an_fmu_runs_where_this_repository_is_not(built, name, tmp_path):
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
 @pytest.mark.parametrize("ours", [True, False])
+@pytest.mark.slow
 def test_the_end_of_a_process_touches_no_freed_memory(built, foreign, tmp_path, ours):
     """PythonFMU 0.7 frees its interpreter twice, and now and then the host aborts."""
     script = """

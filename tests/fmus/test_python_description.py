@@ -214,6 +214,7 @@ def test_a_native_build_before_changes_no_byte(tmp_path):
     assert sums(build_python(MODELS["wheelset"](), tmp_path / "new_model.fmu")) == before
 
 
+@pytest.mark.slow
 def test_a_build_elsewhere_has_the_same_bytes(built, tmp_path):
     script = """
         import sys

@@ -23,6 +23,7 @@ def taken(process: int | str) -> tuple[int, int]:
 
 @pytest.mark.parametrize(("instances", "simulations"), SIZES)
 @pytest.mark.parametrize("isolation", [None, ISOLATED], ids=["here", "apart"])
+@pytest.mark.slow
 def test_nothing_is_kept_of_instances_and_steps(isolation, instances, simulations):
     t = np.arange(100_001) * 1e-4
     force = {"F": 50 * np.sin(7 * t)}

@@ -145,6 +145,7 @@ def errors(found, expected):
     )
 
 
+@pytest.mark.slow
 def test_three_fmus_of_the_master_run_as_the_one_fmu(tmp_path, vehicle):
     """Second order in the step with linear extrapolation; at 1 ms 8e-5 of the largest value of an output."""
     names = ("y_1", "psi_2", "y_f", "psi_f", "phi_f", "y_4", "psi_r", "y_c", "phi_c", "Q_1_left", "Y_3_right")

@@ -9,7 +9,7 @@ from fmus.model import equations
 from fmus.models import MODELS
 from tests.helpers.everything import EVERY_MODEL
 
-LARGE = 2_000  # instructions; beyond it a compiler or the trials with every effect take 5 s to 40 s
+LARGE = 1_000  # instructions; beyond it a compiler or the trials with every effect take 3 s to 40 s
 ALL = ("all",)  # effects
 
 
@@ -28,8 +28,13 @@ def _marks(slow):
     return pytest.mark.slow if slow else ()
 
 
+def marks_of(size):
+    """Marks of a test of a model with so many instructions."""
+    return _marks(size > LARGE)
+
+
 by_size = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=_marks(SIZES[name] > LARGE)) for name in EVERY_MODEL]
+    "name", [pytest.param(name, marks=marks_of(SIZES[name])) for name in EVERY_MODEL]
 )
 quick_if_smallest = pytest.mark.parametrize(
     "name", [pytest.param(name, marks=_marks(name != SMALLEST)) for name in EVERY_MODEL]
@@ -38,7 +43,6 @@ bare_and_with_all_effects = pytest.mark.parametrize(
     ("name", "effects"),
     [pytest.param(name, (), id=f"{name}-bare") for name in EVERY_MODEL]
     + [
-        pytest.param(name, ALL, id=f"{name}-all effects", marks=_marks(SIZES[name] > LARGE))
-        for name in EVERY_MODEL
+        pytest.param(name, ALL, id=f"{name}-all effects", marks=marks_of(SIZES[name])) for name in EVERY_MODEL
     ],
 )

@@ -133,7 +133,8 @@ def write_foreign(folder: Path, fmu: Path, text: str = FOREIGN) -> tuple[np.ndar
     return t, u, x
 
 
-@pytest.mark.parametrize("initial", ["exact", pytest.param("calculated", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("initial", ["exact", "calculated"])
 def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
     initial: str, foreign: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -43,6 +43,7 @@ def other_contact(folder, seed, duration, more=""):
     return file
 
 
+@pytest.mark.slow
 def test_friction_with_another_contact_is_near_the_truth_and_its_doubt_is_said(tmp_path):
     result = estimate(other_contact(tmp_path, 3, 20.0))
     mu0 = result.estimated["mu0"]

@@ -112,6 +112,7 @@ def test_a_loop_that_the_fmu_ends_has_not_finished(tmp_path, foreign, jobs):
     assert not (tmp_path / "out" / "result.json").exists()
 
 
+@pytest.mark.slow
 def test_a_command_that_finishes_keeps_its_exit_code(tmp_path, foreign):
     text = SCENARIO.format(fmu=foreign("self.x *= 0.9"))
     for that, code in (("< 9", 0), ("> 9", 1), ("< nonsense", 2)):

@@ -304,7 +304,7 @@ def command(_):
         thing = Thing()
         held = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGINT))
         del thing
-        time.sleep(60)
+        time.sleep(3600)
     except KeyboardInterrupt:
         return 130
     return 0

@@ -91,6 +91,7 @@ def test_a_truth_goes_through_all_its_jumps_within_the_run(small):
 
 
 @pytest.mark.parametrize("model", ANY_MODEL)
+@pytest.mark.slow
 def test_twin_and_truth_measure_what_a_case_asks_for(model):
     dt = 1e-3 if model == "wheelset" else 0.01
     row = {
@@ -203,6 +204,7 @@ def test_every_row_is_whole(row: Row):
 # ---- the filters, on short runs of the truth
 
 
+@pytest.mark.slow
 def test_friction_is_found_from_known_alignment_and_the_step_within_three_seconds():
     case = case_of("friction_ukf", "wet-very_low", duration=9.0, when=6.0)
     found = friction.task(case, fmu_of("friction_ukf")).known(truth(case))
@@ -264,6 +266,7 @@ def test_the_primary_spring_is_found_and_its_drop():
 
 
 @pytest.mark.parametrize("way", ["ukf", "least squares"])
+@pytest.mark.slow
 def test_the_secondary_spring_is_found(way):
     case = case_of("secondary_stiffness", "static", duration=25.0)
     record, fmu = truth(case), fmu_of("secondary_stiffness")
@@ -275,6 +278,7 @@ def test_the_secondary_spring_is_found(way):
     assert found.value["k1"][-1] == pytest.approx(secondary.TRUE, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_weak_spring_is_found_at_its_corner():
     case = case_of("secondary_stiffness", "one corner", duration=20.0, when=5.0)
     found = secondary.joint_ukf(truth(case), fmu_of("secondary_stiffness"), secondary.healths())
@@ -366,6 +370,7 @@ def test_the_region_of_a_true_gauge_is_the_curve():
     np.testing.assert_allclose(low[inner], curves.value[inner], atol=1e-4)  # left and right mirrored
 
 
+@pytest.mark.slow
 def test_the_profile_is_found_bin_by_bin_and_gauge_blurs_it():
     errors = {}
     for name in ("alignment", "gauge too"):
@@ -379,6 +384,7 @@ def test_the_profile_is_found_bin_by_bin_and_gauge_blurs_it():
         assert blurred > 5 * alone
 
 
+@pytest.mark.slow
 def test_with_its_gauge_known_the_sum_of_the_radii_stays_in_the_region_and_that_of_the_angles_does_not():
     """As Ward et al. 2010 say of their Fig. 7; without the gauge, both leave it."""
     case = case_of("profile_rls", "gauge too", duration=30.0)
@@ -390,6 +396,7 @@ def test_with_its_gauge_known_the_sum_of_the_radii_stays_in_the_region_and_that_
     assert share["gauge known, r_L - r_R"] == share["gauge known, delta_L - delta_R"] == 1.0
 
 
+@pytest.mark.slow
 def test_the_regressors_as_printed_find_the_differences_and_lose_the_sums_by_the_gauge():
     """With free coefficients the equations share no combination, so that the sums are less certain."""
     true, errors = profile.geometry(), []

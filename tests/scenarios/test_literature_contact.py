@@ -124,6 +124,7 @@ def test_least_squares_find_the_conicity_where_one_cubic_cannot():
     assert rough > 5 * fine
 
 
+@pytest.mark.slow
 def test_the_irregularity_must_be_estimated_along():
     record = truth(case_of("conicity", "generic", duration=12.0))
     late, true = record.t > 2.0, record.columns["conicity" + TRUE]
@@ -213,6 +214,7 @@ def test_the_command_lists_the_rows():
     assert all(name in found.stdout for name in ROWS)
 
 
+@pytest.mark.slow
 def test_the_command_rebuilds_a_row_from_records(tmp_path):
     case = case_of("conicity", "generic", duration=4.0)
     truth(case).write(tmp_path / "records" / "generic.csv")

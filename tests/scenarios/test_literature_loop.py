@@ -66,6 +66,7 @@ def off(one, shift):
     return rmse(one.shift, shift) / shift.std()
 
 
+@pytest.mark.slow
 def test_the_loop_leads_from_different_assumptions_to_the_same_geometry(known):
     _, shift, found = known
     for rounds in found.values():
@@ -155,6 +156,7 @@ def generic():
     return truth(case_of("conicity", "generic", duration=12.0))
 
 
+@pytest.mark.slow
 def test_filter_and_least_squares_in_turns_find_the_curve_that_neither_knew(generic):
     found = cone.in_turns(generic)
     low, high = np.percentile(shift_of(generic), (5, 95))
@@ -165,6 +167,7 @@ def test_filter_and_least_squares_in_turns_find_the_curve_that_neither_knew(gene
     )  # which know the track
 
 
+@pytest.mark.slow
 def test_it_is_the_roll_of_the_source_that_tells_conicity_from_irregularity(generic):
     """A wheelset that rolls over the track, as real ones do, loses the hybrid's curve."""
     real = of_charles(case_of("conicity", "generic", duration=12.0), rolls_over_track=True)
@@ -176,6 +179,7 @@ def test_it_is_the_roll_of_the_source_that_tells_conicity_from_irregularity(gene
 
 
 @pytest.mark.parametrize("way", cone.BANKS)
+@pytest.mark.slow
 def test_several_models_and_particles_follow_the_conicity_from_the_outputs_alone(generic, way):
     found, late = cone.banked(way, generic, seed=1), generic.t > cone.START_UP
     true = generic.columns["conicity" + TRUE][late]

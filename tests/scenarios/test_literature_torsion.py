@@ -21,6 +21,7 @@ def case_of(name, **changed):
 
 
 @pytest.mark.parametrize("name", ["wet", "wet_fastsim", "worst_fastsim"])
+@pytest.mark.slow
 def test_friction_is_found_from_one_pull_to_the_limit(name):
     case = case_of(name, duration=1.6)
     found = torsion.followed(case, truth(case), native("traction"))

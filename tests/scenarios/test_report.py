@@ -82,6 +82,7 @@ def test_the_page_says_what_the_result_says(page: str, demo: tuple[Result, Path]
         assert a.kind.replace("_", " ") in text.lower()
 
 
+@pytest.mark.slow
 def test_a_record_without_a_discrepancy_has_its_page_and_names_are_escaped(tmp_path: Path) -> None:
     made = write_null_record(tmp_path, 6998)
     text = made.read_text()
