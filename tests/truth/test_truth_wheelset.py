@@ -67,7 +67,7 @@ def test_it_knows_nothing_of_the_product():
         names = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}
         names |= {n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)}
         roots = {name.split(".")[0] for name in names}
-        assert roots <= {"numpy", "scipy", "tests"} | set(sys.stdlib_module_names)
+        assert roots <= {"numba", "numpy", "scipy", "tests"} | set(sys.stdlib_module_names)
 
 
 def test_the_wheel_has_no_steps_but_those_of_its_standard():
