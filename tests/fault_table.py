@@ -4,12 +4,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tests.contracts import test_fuzzed_files
+from tests.helpers.full_disk import TEMPORARY
 from tests.helpers.fuzzing import targets
 from tests.helpers.interrupting import SIGNALS
 from tests.helpers.misbehaving import AT_THE_END, DEATHS, ENDLESS, HARMLESS, NOT_FINITE, REFUSALS
 from tests.helpers.small_commands import EVERY_COMMAND
 from tests.scenarios import (
     test_command_line,
+    test_contained,
     test_full_disk,
     test_hostile_xml,
     test_interrupts_at_random,
@@ -61,8 +63,9 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
             told = "one line, exit code 2, no half file"
             yield f"disk full from rename {n + 1} on", command, told, _file(test_output)
     for command, (_, most) in test_full_disk.CASES.items():
+        whose = " of temporary files" * (test_full_disk.WHERE.get(command) == TEMPORARY)
         told = f"one line, exit code 2, no part of a file, at each of up to {most} places"
-        yield "disk full from any change of a file on", command, told, _file(test_full_disk)
+        yield f"disk{whose} full from any change of a file on", command, told, _file(test_full_disk)
     for command in EVERY_COMMAND:
         for number in SIGNALS:
             told = (
@@ -79,6 +82,10 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
     for name in targets():
         told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
         yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)
+    for what in test_contained.MAT:
+        formats = "HDF5 or MAT 7.3" if what in test_contained.H5 else "MAT 7.3"
+        told = "one line, exit code 2; no other file is opened"
+        yield f"a record of {formats} with {what}", "all that read it", told, _file(test_contained)
     for what in test_hostile_xml.ATTACKS:
         told = "it is read without it, or one line and exit code 2; no other file is opened"
         yield f"XML with {what}", "all that read an FMU or an SSP package", told, _file(test_hostile_xml)

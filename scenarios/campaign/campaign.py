@@ -67,7 +67,11 @@ def campaign(
     from scenarios.campaign.work import simulated
     from scenarios.tasks.running import Crew, run
 
-    reasons = run(plan.tasks, simulated, store, Crew(workers, scheduler, plan.files), tell, "points")
+    crew = Crew(workers, scheduler, plan.files)
+    try:
+        reasons = run(plan.tasks, simulated, store, crew, tell, "points")
+    finally:
+        store.remove_builds(crew.builds)
     tell("writing the tables and the page")
     answers = {t.key: a for t in plan.tasks if (a := store.read(t.key)) is not None}
     found = assembled(plan, answers, reasons, time.monotonic() - begun)

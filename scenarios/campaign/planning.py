@@ -15,7 +15,7 @@ from scenarios.experiment.validation import of_file, read_file, read_table, read
 from scenarios.simulating.declaration import Declaration as Scenario
 from scenarios.simulating.expression import expression
 from scenarios.simulating.reading import SINGLE, load_scenario, merged
-from scenarios.tasks.hashes import hash_of, hash_of_file, hash_of_program
+from scenarios.tasks.hashes import hash_of, hash_of_data, hash_of_file, hash_of_program
 from scenarios.tasks.running import Task
 
 NOT_RUN = ("variants", "figure")  # keys of a scenario that a point leaves out
@@ -57,7 +57,7 @@ def plan_of(path: str | Path, isolation: Isolation | None) -> Plan:
     said = [
         d.measure,
         common["isolation"],
-        {n: hash_of_file(f) for n, f in beside.items()},
+        {n: hash_of_data(f) for n, f in beside.items()},
         hash_of_program(),
     ]
     tasks = []

@@ -16,7 +16,7 @@ from scenarios.simulating.building import Builder
 from scenarios.simulating.case import prepared
 from scenarios.simulating.declaration import Declaration
 from scenarios.simulating.expression import expression
-from scenarios.tasks.running import Passing, Place
+from scenarios.tasks.running import Place, may_pass
 from scenarios.tasks.store import FAILED, Answer
 
 
@@ -24,13 +24,13 @@ def simulated(given: Mapping[str, Any], place: Place) -> Answer:
     """The answer of a point: its measures, or the reason why there are none.
 
     given: `table` (the scenario with the values of the point), `file`, `measure`, `fmus` (checksums by name)
-    and `isolation`. Raises OSError or Passing for a reason that may pass.
+    and `isolation`. Raises the error of a reason that may pass.
     """
     try:
         return {"verdict": "done", "values": _measured(given, place)}
-    except (OSError, MemoryError, Passing):
-        raise
     except Exception as error:  # whatever one point does, it is one row
+        if may_pass(error):
+            raise
         said = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
         return {"verdict": FAILED, "reason": place.without(" ".join(said.split())), "values": {}}
 

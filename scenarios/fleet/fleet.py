@@ -86,10 +86,13 @@ def _done(plan: Plan, store: Store, workers: int | None, scheduler: str | None, 
     from scenarios.tasks.running import Crew, run
 
     crew = Crew(workers, scheduler, plan.files)
-    first = [j.task for j in plan.jobs if j.task and not j.triaged]
-    reasons = run(first, answered, store, crew, tell, "tasks")
-    second = [j.task for j in rejected(plan, store) if j.task]
-    return reasons | run(second, answered, store, crew, tell, "tasks after triage")
+    try:
+        first = [j.task for j in plan.jobs if j.task and not j.triaged]
+        reasons = run(first, answered, store, crew, tell, "tasks")
+        second = [j.task for j in rejected(plan, store) if j.task]
+        return reasons | run(second, answered, store, crew, tell, "tasks after triage")
+    finally:
+        store.remove_builds(crew.builds)
 
 
 def rejected(plan: Plan, store: Store) -> list[Job]:

@@ -15,7 +15,7 @@ from scenarios.experiment.experiment import check_names, placed
 from scenarios.experiment.validation import of_file, read_file, read_table, read_toml
 from scenarios.fleet.declaration import Command, Declaration, Setup
 from scenarios.fleet.records import FleetRecord, read_records, with_record
-from scenarios.tasks.hashes import hash_of, hash_of_file, hash_of_program
+from scenarios.tasks.hashes import hash_of, hash_of_data, hash_of_file, hash_of_program
 from scenarios.tasks.running import Task
 
 ORDER: tuple[Command, ...] = ("check", "estimate", "close-loop")
@@ -95,10 +95,13 @@ def plan_of(path: str | Path, isolation: Isolation | None) -> Plan:
 
 
 def _data_hash(data: Path) -> str | OSError:
-    """The checksum of a record's data, or why there is none; a device or a pipe is not waited for."""
+    """The checksum of a record's data with the files beside them, or why there is none.
+
+    A device or a pipe is not waited for.
+    """
     try:
         check_file(data)
-        return hash_of_file(data)
+        return hash_of_data(data)
     except BadInput as error:
         return OSError(str(error).removeprefix(f"{data}: "))
     except OSError as error:

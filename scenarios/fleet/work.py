@@ -23,8 +23,8 @@ from scenarios.experiment.declaration import Declaration
 from scenarios.experiment.experiment import Experiment, placed
 from scenarios.experiment.validation import of_file, read_table
 from scenarios.fleet.declaration import CALIBRATED
-from scenarios.tasks.hashes import hash_of_file
-from scenarios.tasks.running import Passing, Place
+from scenarios.tasks.hashes import hash_of_data
+from scenarios.tasks.running import Passing, Place, may_pass
 from scenarios.tasks.store import FAILED, Answer
 
 Row = dict[str, Any]
@@ -34,16 +34,16 @@ def answered(given: Mapping[str, Any], place: Place) -> Answer:
     """The answer of a task: rows of what was found, or one row with the reason why nothing was.
 
     given: `command`, `model` or `fmu` (its checksum), `isolation`, and of a record `table` (its experiment),
-    `file` (which messages name), `data_sha256` and `seed`. Raises Passing or OSError for a reason that may
-    pass, such as a full disk.
+    `file` (which messages name), `data_sha256` and `seed`. Raises the error of a reason that may pass,
+    such as a full disk.
     """
     try:
         return {"check": _check, "estimate": _estimate, "close-loop": _close_loop}[given["command"]](
             given, place
         )
-    except (OSError, MemoryError, Passing):
-        raise
     except Exception as error:  # whatever one record does, it is one row
+        if may_pass(error):
+            raise
         said = str(error) if isinstance(error, BadInput) else f"{type(error).__name__}: {error}"
         return failed(place.without(said).replace(f"{Path(given.get('file', '')).parent}/", ""))
     finally:
@@ -65,7 +65,7 @@ def _experiment(given: Mapping[str, Any], place: Place) -> Experiment:
     with of_file(file):
         e = placed(read_table(Declaration, table), file)
     for data in e.data_files:
-        if hash_of_file(data) != given["data_sha256"]:
+        if hash_of_data(data) != given["data_sha256"]:
             raise Passing(f"{data}: has changed since the fleet was planned; run the command again")
     return e
 

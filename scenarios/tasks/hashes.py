@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from scenarios.experiment.beside import read_with
+
 ROOT = Path(__file__).parents[2]
 # what an answer follows from; pages, commands and the assembly of results are no part of it
 ANSWERING = (
@@ -20,6 +22,13 @@ def hash_of_file(file: Path) -> str:
     """SHA-256 of a file, read in blocks; raises OSError."""
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def hash_of_data(data: Path) -> str:
+    """SHA-256 over a data file and those beside it that say how it is read; raises OSError."""
+    return hash_of(
+        [hash_of_file(file) if file == data or file.is_file() else None for file in read_with(data)]
+    )
 
 
 def hash_of(value: Any) -> str:

@@ -4,6 +4,7 @@ The workers are processes of one thread each. A worker that is killed is replace
 another one. What was finished lies in the store, so that nothing else has to survive.
 """
 
+import errno
 import logging
 import os
 import tempfile
@@ -79,6 +80,13 @@ class Place:
 
 class Passing(Exception):
     """A task could not be done now, for a reason that may pass; it is tried again by the next run."""
+
+
+def may_pass(error: Exception) -> bool:
+    """Whether a task failed for a reason that may pass, such as a full disk, also where others tell of it."""
+    if isinstance(error, (OSError, MemoryError, Passing)):
+        return True
+    return any(os.strerror(number) in str(error) for number in (errno.ENOSPC, errno.EDQUOT))
 
 
 Work = Callable[[Mapping[str, Any], Place], Answer]  # a function of a module, so that workers find it
@@ -197,7 +205,8 @@ def _perform(task: Task, work: Work, folder: str, builds: str, program: str) -> 
         except (OSError, MemoryError) as error:
             raise Passing(f"{type(error).__name__}: {error}") from None
         answer = {**answer, "seconds": round(time.monotonic() - begun, 3)}
-        store.finish(task.key, answer)
+        with suppress(OSError):  # who asked keeps it, or says that the disk is full and asks no more
+            store.finish(task.key, answer)
     return answer
 
 

@@ -7,6 +7,7 @@ lost, and the next run does what is missing.
 import fcntl
 import json
 import os
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -57,6 +58,10 @@ class Store:
         for key in keys:
             if (self.read(key) or {}).get("verdict") == FAILED:
                 self.file(key).unlink(missing_ok=True)
+
+    def remove_builds(self, name: str) -> None:
+        """Remove the FMUs that the workers of one command have built, so that a full disk has more room."""
+        shutil.rmtree(self.folder.parent / BUILDS / name, ignore_errors=True)
 
     @contextmanager
     def claimed(self, key: str) -> Iterator[None]:

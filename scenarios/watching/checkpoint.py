@@ -14,6 +14,7 @@ from fmus.errors import BadInput
 from fmus.export.provenance import checksum
 from fmus.files import write_at_once
 from scenarios.experiment.experiment import Experiment
+from scenarios.tasks.hashes import hash_of_data
 from scenarios.watching import commission
 from scenarios.watching.capturing import Piece, Waiting
 from scenarios.watching.declaration import Watched
@@ -65,7 +66,10 @@ TYPES = (
 
 
 def key_of(w: Watched, e: Experiment, fmu: Path | None) -> str:
-    """What a checkpoint belongs to: this version with its limits, and all that two files and an FMU say."""
+    """What a checkpoint belongs to: this version, its limits, and all that files, FMU and record say.
+
+    The record counts with the units beside it, by which windows are converted.
+    """
     declared = sorted(e.model_dump(exclude={"file", "data_dir"}).items())
     said = repr((w.stream.continues, w.test, w.trigger, declared))
     whole = [
@@ -73,6 +77,7 @@ def key_of(w: Watched, e: Experiment, fmu: Path | None) -> str:
         OF_TEST.version,
         sha256(said.encode()).hexdigest(),
         *([checksum(fmu)] if fmu else []),
+        *map(hash_of_data, e.every_file),
     ]
     return " ".join(whole)
 
@@ -94,8 +99,8 @@ def read(folder: Path, key: str) -> Checkpoint | None:
             found = codec.read(stream, key, TYPES)
     except (OSError, codec.Unreadable) as error:
         raise BadInput(
-            f"{file}: {error}; the experiment, the watch.toml, the FMU or railfmi have changed since; give "
-            "another --out, or --anew to begin anew"
+            f"{file}: {error}; the experiment, its record, the watch.toml, the FMU or railfmi have changed "
+            "since; give another --out, or --anew to begin anew"
         ) from error
     if not isinstance(found, Checkpoint):
         raise BadInput(f"{file}: holds no checkpoint of a stream; give another --out")

@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fmus.files import write_at_once
+
 FILE, OLD = "windows.csv", "windows.1.csv"
 LONGEST = 50_000_000  # bytes, from which on a new file is begun; the one before is kept
 COLUMNS = ("window", "begin", "end", "rows", "state", "nis", "statistic", "height", "milliseconds", "notes")
@@ -25,7 +27,7 @@ class Log:
         elif file.exists() and file.stat().st_size > size:
             os.truncate(file, size)
         if not file.exists():
-            self._write([*COLUMNS, *self._estimates])
+            self._begin()
 
     @property
     def size(self) -> int:
@@ -36,15 +38,30 @@ class Log:
         """Add a line; what is not given stays empty."""
         if self.size > LONGEST:
             (self._folder / FILE).replace(self._folder / OLD)
-            self._write([*COLUMNS, *self._estimates])
+            self._begin()
         first = [_cell(cells.get(c, "")) for c in COLUMNS]
-        self._write(first + [repr(estimates[n]) if n in estimates else "" for n in self._estimates])
+        estimated = [repr(estimates[n]) if n in estimates else "" for n in self._estimates]
+        self._add(_line([*first, *estimated]))
 
-    def _write(self, cells: list[str]) -> None:
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerow(cells)
-        with (self._folder / FILE).open("ab") as stream:
-            stream.write(text.getvalue().encode("utf-8"))
+    def _begin(self) -> None:
+        """Write the names of the columns to a new file."""
+        write_at_once(self._folder / FILE, _line([*COLUMNS, *self._estimates]))
+
+    def _add(self, line: bytes) -> None:
+        """Add a line, and nothing of it where the disk does not take it whole."""
+        whole = self.size
+        try:
+            with (self._folder / FILE).open("ab") as stream:
+                stream.write(line)
+        except OSError:
+            os.truncate(self._folder / FILE, whole)
+            raise
+
+
+def _line(cells: Sequence[object]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue().encode("utf-8")
 
 
 def _cell(value: object) -> str:

@@ -260,6 +260,22 @@ def test_a_task_is_known_by_all_that_its_answer_follows_from(tmp_path):
         assert not {t.key for t in changed.tasks} & {t.key for t in first.tasks}
 
 
+def test_data_and_their_units_are_part_of_the_tasks(tmp_path):
+    step, one = STEP.read_text(encoding="utf-8"), '"vehicle.u_fl" = "1e-3 * step(t - 1)"'
+    assert one in step
+    push = '"vehicle.u_fl" = {data = "push.csv", time = "t", column = "u"}'
+    (tmp_path / "step.toml").write_text(step.replace(one, push))
+    file = written(tmp_path, (str(STEP), "step.toml"))
+    found = []
+    for name, text in (
+        ("push.csv", "t,u\n0,0\n1,1\n"), ("push.csv", "t,u\n0,0\n1,2\n"),
+        ("push.csv.units.json", '{"u": "m"}'), ("push.csv.units.json", '{"u": "mm"}'),
+    ):  # fmt: skip
+        (tmp_path / name).write_text(text)
+        found.append({t.key for t in plan_of(file, ISOLATED).tasks})
+    assert len(set.union(*found)) == 2 * 4
+
+
 def answers_of(plan, value) -> dict:
     """Answers of all points, from a function of their values."""
     return {

@@ -1,5 +1,6 @@
 """Fleets: the table of records, the tasks, rows and pooling, clear errors, and a whole run."""
 
+import errno
 import json
 import os
 import signal
@@ -26,6 +27,7 @@ pytest.importorskip("distributed", reason="the extra 'fleet' is not installed")
 
 import psutil
 
+from scenarios.fleet import work
 from scenarios.fleet.fleet import Assembled, assembled, rejected, write_tables
 from scenarios.fleet.page import write_page
 from scenarios.fleet.planning import Plan, plan_of
@@ -166,6 +168,26 @@ def test_a_task_is_known_by_model_record_and_setup(tmp_path):
     assert not {*keys(plan_of(file, ISOLATED))[1:]} & {*keys(first)[1:]}
 
 
+def test_units_beside_a_record_are_part_of_its_task(tmp_path):
+    """Else the answer in the old units would be taken over when only they are corrected."""
+    file, place = written(tmp_path), Place(tmp_path / "builds", tmp_path / "shipped")
+    units = tmp_path / "00.csv.units.json"
+    without = keys(plan_of(file, ISOLATED))
+    found = [without]
+    for text in ('{"omega_w": "rpm"}', '{"omega_w": "rad/s"}'):
+        units.write_text(text)
+        plan = plan_of(file, ISOLATED)
+        for before in found:
+            assert sum(a != b for a, b in zip(keys(plan), before, strict=True)) == 2, "those of this record"
+        found.append(keys(plan))
+    planned = next(j.task for j in plan.jobs if j.record and j.record.data.name == "00.csv")
+    units.write_text('{"omega_w": "rpm"}')
+    with pytest.raises(Passing, match=r"00\.csv: has changed since the fleet was planned"):
+        answered(planned.given, place)
+    units.unlink()
+    assert keys(plan_of(file, ISOLATED)) == without
+
+
 def test_a_record_without_data_is_a_row_with_the_reason(tmp_path):
     file = written(tmp_path)
     (tmp_path / "00.csv").unlink()
@@ -208,6 +230,17 @@ def test_a_broken_record_is_an_answer_with_the_reason_and_changed_data_none(tmp_
     assert str(place.builds) not in row["reason"]
     with pytest.raises(Passing, match="has changed since"):
         answered({**job.task.given, "data_sha256": "0" * 64}, place)
+
+
+def test_a_full_disk_is_no_answer_about_the_fmu(tmp_path, monkeypatch):
+    """Else the next run would take it over when there is room again."""
+
+    def full(given, place):
+        raise BadInput(f"x.fmu: cannot be unpacked ({os.strerror(errno.ENOSPC)}); free space")
+
+    monkeypatch.setattr(work, "_check", full)
+    with pytest.raises(BadInput, match="No space left"):
+        answered({"command": "check"}, Place(tmp_path / "builds", tmp_path / "shipped"))
 
 
 def estimate(value: float, verdict: str = "consistent") -> Answer:

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from scenarios.cli.app import run_safely
-from tests.helpers.full_disk import library, tried
+from tests.helpers.full_disk import EVERYWHERE, OUT, TEMPORARY, library, tried
 from tests.helpers.misbehaving import Fault, bad_fmu
 
 CASES = {  # command, arguments, and at how many of its changes the disk fails
@@ -24,8 +24,36 @@ CASES = {  # command, arguments, and at how many of its changes the disk fails
     "close-loop": (["close-loop", "experiment.toml", "--jobs", "1"], 12),
     "row": (["row", "conicity_step"], 4),
     "conicity-norm": (["conicity-norm", "--pair", "A", "--draws", "1"], 10),
+    "fleet": (["fleet", "fleet.toml", "--workers", "2"], 8),
+    "campaign": (["campaign", "campaign.toml", "--workers", "2"], 8),
+    "watch": (["watch", "watch.toml", "--once"], 12),
+    "check": (["check", "bad.fmu"], 8),
 }
 QUICK = ("init",)
+WHERE = {"fleet": EVERYWHERE, "campaign": EVERYWHERE, "watch": EVERYWHERE, "check": TEMPORARY}
+FLEET = """id = "two"
+records = "records.csv"
+[setups.bad]
+experiment = "experiment.toml"
+commands = ["check", "estimate"]
+"""
+CAMPAIGN = """id = "two"
+scenario = "scenario.toml"
+sample = "grid"
+[vary]
+"fmus.m.parameters.k" = {values = [1.5, 2.5]}
+[measure]
+highest = "max(m.x)"
+"""
+WATCH = """experiment = "experiment.toml"
+[stream]
+folder = "windows"
+settle = 0.0
+[test]
+learn = 0.5
+[trace]
+run = false
+"""
 
 
 @pytest.fixture
@@ -37,6 +65,21 @@ def folder(tmp_path, tmp_path_factory, monkeypatch):
     return tmp_path
 
 
+def many(folder):
+    """The inputs of the commands that work on many records, points or windows."""
+    shutil.copy(folder / "data.csv", folder / "again.csv")
+    records = "record,vehicle,data\na,v1,data.csv\nb,v2,again.csv\n"
+    for name, text in (
+        ("fleet.toml", FLEET), ("records.csv", records), ("campaign.toml", CAMPAIGN), ("watch.toml", WATCH),
+    ):  # fmt: skip
+        (folder / name).write_text(text)
+    names, *rows = (folder / "data.csv").read_text().splitlines(keepends=True)
+    (folder / "windows").mkdir()
+    for i in range(4):
+        part = rows[i * len(rows) // 4 : (i + 1) * len(rows) // 4]
+        (folder / "windows" / f"w{i}.csv").write_text("".join([names, *part]))
+
+
 @pytest.mark.parametrize(
     "case", [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
 )
@@ -46,7 +89,8 @@ def test_no_part_of_a_file_wherever_it_fails(case, folder):
         assert run_safely(["run", "scenario.toml", "--out", "results"]) == 0
     if case == "import-ssp":
         assert run_safely(["export-ssp", "scenario.toml", "--out", "bad.ssp"]) == 0
-    sound, *full = tried(arguments, folder / "out", most, library(folder))
+    many(folder)
+    sound, *full = tried(arguments, folder / "out", most, library(folder), WHERE.get(case, OUT))
     assert sound.code in (0, 1), sound.said
     assert sound.changes >= len(full) > 0
     assert not sound.broken

@@ -1,5 +1,6 @@
 """A stream through one filter: cuts and restarts change no bit, alarms come soon, bad windows are told."""
 
+import resource
 import shutil
 from io import BytesIO
 from pathlib import Path
@@ -27,6 +28,7 @@ from scenarios.watching.commission import Making, commissioned
 from scenarios.watching.following import LEARNING, OUTSIDE, PAST, TESTED, Following
 from scenarios.watching.joining import Joining
 from scenarios.watching.logging import FILE as LOG
+from scenarios.watching.logging import Log
 from scenarios.watching.watching import watch
 from scenarios.watching.windows import Reading, follow_on
 from tests.helpers.streams import (
@@ -173,6 +175,22 @@ def _key(out: Path) -> str:
 
     declared = load_watching(out.parent)
     return checkpoint.key_of(declared, load_experiment(out.parent / "experiment.toml"), None)
+
+
+def test_a_checkpoint_belongs_to_the_record_and_the_units_beside_it(tmp_path):
+    """By them windows are converted: with others, the filter would go on in other units."""
+    data = record(3, 1.0)
+    file = write_experiment(tmp_path, data)
+    file.write_text(file.read_text().replace("data.parquet", "data.csv"))
+    write_watch(tmp_path)
+    found = []
+    for name, text in (
+        ("data.csv", data.to_csv(index=False)), ("data.csv.units.json", '{"T_P": "kN.m"}'),
+        ("data.csv.units.json", '{"T_P": "N.m"}'), ("data.csv", data.iloc[1:].to_csv(index=False)),
+    ):  # fmt: skip
+        (tmp_path / name).write_text(text)
+        found.append(_key(tmp_path / "out"))
+    assert len({*found}) == 4
 
 
 @pytest.mark.parametrize(("seed", "correlated"), [(31, False), (32, True)])
@@ -370,3 +388,20 @@ def test_memory_is_constant(rig, tmp_path):
         assert f.counts.windows == 80 * (lap + 1)
     tracemalloc.stop()
     assert sizes[-1] - sizes[1] < 20_000
+
+
+def test_a_line_that_the_disk_takes_in_part_is_not_in_the_log(tmp_path):
+    log = Log(tmp_path, ["x"], None)
+    log.line({"window": "a"}, {"x": 1.0})
+    file = tmp_path / "windows.csv"
+    before = file.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, limits[1]))
+    try:
+        with pytest.raises(OSError, match="File too large"):
+            log.line({"window": "b" * 100}, {"x": 2.0})
+        assert file.read_bytes() == before
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    log.line({"window": "c"}, {"x": 3.0})
+    assert file.read_bytes() == before + b"c,,,,,,,,,,3.0\n"

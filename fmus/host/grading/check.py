@@ -1,11 +1,12 @@
 """Grade an FMU for use here: what an estimator relies on is tried out, not believed."""
 
+import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -14,11 +15,14 @@ from typing import Any
 
 from fmus.errors import BadInput
 from fmus.host.archive import describe
+from fmus.host.grading.cost import WAY_OUT
 from fmus.host.grading.fitness import LETTER, Fit, fitness, simulates
 from fmus.host.grading.trials import TRIALS
 
 PATIENCE = 120.0  # s, for all trials together
 LEAST = 2.0  # s, for the time of a step where the trials took all
+MOST = 1_000_000  # bytes, that the trials may tell; an FMU may write there, too
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)  # errors of a disk
 ENDS, LATE = "It brings down the process that runs it", "It did not come to an end"
 RUN, COST = "fmus.host.grading.trials", "fmus.host.grading.cost"
 
@@ -85,32 +89,49 @@ def grade(path: str | Path, patience: float = PATIENCE) -> Grade:
 
 def _cost(path: Path, patience: float) -> float | None:
     """Processor time of a step, s; None where it cannot be measured."""
-    with tempfile.TemporaryDirectory(prefix="railfmi_check_") as folder:
-        results = Path(folder) / "cost.json"
-        _process(COST, [str(path), str(results)], patience)
-        try:
-            return float(json.loads(results.read_bytes()))
-        except (OSError, ValueError, TypeError):
-            return None
+    lines, _ = _told(COST, path, patience)
+    try:
+        return float(lines[0]["seconds"])
+    except (LookupError, ValueError, TypeError):
+        return None
 
 
 def _tried(path: Path, first: int, patience: float) -> list[Check]:
     """Outcomes from trial number `first` on, to the last or to the one that ended the process."""
-    with tempfile.TemporaryDirectory(prefix="railfmi_check_") as folder:
-        results = Path(folder) / "results.jsonl"
-        results.touch()
-        end = _process(RUN, [str(path), str(results), str(first)], patience)
-        lines = list(_lines(results.read_bytes()))
-    for line in lines:
-        if "unusable" in line:
-            raise BadInput(str(line["unusable"]))
-        if "traceback" in line:
-            raise RuntimeError(f"{path}: the check itself failed:\n{line['traceback']}")
+    lines, end = _told(RUN, path, patience, str(first))
     done = [Check(**line) for line in lines if line.keys() == KEYS]
     missing = list(TRIALS)[first + len(done) :]
     if missing:
         done.append(Check(missing[0], False, end or "It ended the process that ran it."))
     return done
+
+
+def _told(module: str, path: Path, patience: float, *more: str) -> tuple[list[dict[str, Any]], str]:
+    """What a module tells of an FMU, and a sentence where it did not come to its end.
+
+    It tells it in memory, since an FMU is not to blame for a disk that is full.
+    """
+    memory = os.memfd_create("railfmi_check", os.MFD_CLOEXEC)
+    try:
+        end = _process(module, [str(path), f"/proc/{os.getpid()}/fd/{memory}", *more], patience)
+        lines = list(_lines(os.pread(memory, MOST, 0)))
+    finally:
+        os.close(memory)
+    for line in lines:
+        if "unusable" in line:
+            raise BadInput(str(line["unusable"]))
+        if "traceback" in line:
+            raise _mistake(path, str(line["traceback"]))
+    return lines, end
+
+
+def _mistake(path: Path, told: str) -> Exception:
+    """The error of a check that failed itself: of a full disk where the traceback ends with one."""
+    last = told.rstrip().rpartition("\n")[2]
+    number = re.match(r"OSError: \[Errno (\d+)\]", last)
+    if number and int(number[1]) in FULL:
+        return BadInput(f"{path}: cannot be unpacked ({os.strerror(int(number[1]))}); {WAY_OUT}")
+    return RuntimeError(f"{path}: the check itself failed:\n{told}")
 
 
 def _lines(data: bytes) -> Iterator[dict[str, Any]]:

@@ -18,6 +18,7 @@ from fmus.limits import MEMORY
 STEPS = 200  # of one simulation
 LONG_ENOUGH = 0.3  # s, for all simulations together
 MOST = 20  # simulations
+WAY_OUT = "free space, or name another folder in the variable TMPDIR"
 
 
 def step_cost(bench: Bench) -> float:
@@ -40,12 +41,21 @@ def step_cost(bench: Bench) -> float:
 
 
 def main(path: str, results: str) -> None:
-    """Write the time of a step as JSON; nothing where the FMU cannot be simulated."""
-    with Archive(path) as archive:
-        try:
-            found = step_cost(Bench(archive))
-        except (FmuError, BadInput):
-            return
+    """Write the time of a step as JSON, or why the FMU cannot be unpacked; nothing if it refuses to run."""
+    found: dict[str, str | float]
+    try:
+        archive = Archive(path)
+    except (OSError, BadInput) as error:  # the trials have unpacked it before
+        said = (
+            str(error) if isinstance(error, BadInput) else f"{path}: cannot be unpacked ({error}); {WAY_OUT}"
+        )
+        found = {"unusable": said}
+    else:
+        with archive:
+            try:
+                found = {"seconds": step_cost(Bench(archive))}
+            except (FmuError, BadInput):
+                return
     Path(results).write_text(json.dumps(found), encoding="utf-8")
 
 

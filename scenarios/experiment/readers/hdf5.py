@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.experiment.readers.channels import Channel, sheet_of
+from scenarios.experiment.readers.contained import check_contained
 from scenarios.experiment.readers.reader import Reader, library
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -28,6 +29,7 @@ class Hdf5(Reader):
         """Only the data sets wanted are read from the disk."""
         h5py = library("h5py", "h5py", file)
         with h5py.File(file, "r", **options) as source:
+            check_contained(file, source, {time, *(columns or ())})
             sets: list[Any] = []
             source.visititems(lambda _, node: sets.append(node) if isinstance(node, h5py.Dataset) else None)
             return sheet_of(file, [c for node in sets for c in _channels(node)], time, columns)

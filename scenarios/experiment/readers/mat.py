@@ -8,6 +8,7 @@ import numpy as np
 
 from fmus.errors import BadInput
 from scenarios.experiment.readers.channels import Channel, sheet_of
+from scenarios.experiment.readers.contained import check_contained
 from scenarios.experiment.readers.mat73 import channels_of_hdf5
 from scenarios.experiment.readers.reader import Reader, library
 from scenarios.experiment.readers.sheet import Sheet
@@ -33,6 +34,7 @@ class Mat(Reader):
         if begins.startswith(HDF5):
             h5py = library("h5py", "h5py", file)
             with h5py.File(file, "r") as source:
+                check_contained(file, source)
                 channels, objects = channels_of_hdf5(source)
                 found = sheet_of(file, channels, time, columns)
         else:
