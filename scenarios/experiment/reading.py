@@ -8,9 +8,9 @@ import numpy as np
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput, did_you_mean
+from scenarios.experiment.advice import check_no_colons, named_below, read_with_advice
 from scenarios.experiment.checks import check_time
 from scenarios.experiment.experiment import Experiment
-from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits, dates_apart
 from scenarios.experiment.sampling import (
@@ -115,7 +115,7 @@ def _wanted(e: Experiment) -> dict[str | None, dict[str, str]]:
 
 def _record(e: Experiment, file: Path, wanted: dict[str, str]) -> _Source:
     """The record itself, on the times that are named for it."""
-    sheet = read_sheet(file, e.time, {**wanted, e.time: ""}, e.data_options)
+    sheet = read_with_advice(file, e.time, {**wanted, e.time: ""}, e.data_options, "[data]")
     for name in e.derived:
         if name in sheet.known:
             raise BadInput(f"{e.file}: [derived.{name}] has the name of a column of {file}; take another one")
@@ -127,7 +127,7 @@ def _other(e: Experiment, name: str, record: Path, wanted: dict[str, str], first
     declared = e.files[name]
     file = record if declared.file is None else e.data_dir / declared.file
     options = declared.options or (e.data_options if declared.file is None else {})
-    sheet = read_sheet(file, declared.time, {**wanted, declared.time: ""}, options)
+    sheet = read_with_advice(file, declared.time, {**wanted, declared.time: ""}, options, f"[files.{name}]")
     where = f"[files.{name}] time"
     found = _source(e, name, sheet, wanted, where, (declared.time, declared.time_unit))
     try:
@@ -148,10 +148,12 @@ def _source(
             raise BadInput(f"{e.file}: {where}: column '{column}' of {sheet.file} {sheet.apart[column]}{own}")
         if column not in sheet.cells:
             known = did_you_mean(column, [*sheet.known, *([] if name else e.derived)])
-            raise BadInput(f"{e.file}: {where}: column '{column}' is not in {sheet.file}; {known}")
+            way = known + named_below(sheet, column, f"[files.{name}]" if name else "[data]")
+            raise BadInput(f"{e.file}: {where}: column '{column}' is not in {sheet.file}; {way}")
     stated = StatedUnits(sheet)
     _check_units(e, name, stated)
     prefix = f"{name}: " if name else ""
+    check_no_colons(sheet, time[0])
     t = stated.seconds(time[0], f"{e.file}: {named}", time[1])
     columns = {prefix + c: t if c == time[0] else sheet.numbers(c) for c in wanted}
     check_time(str(sheet.file), time[0], t, np.arange(t.size) + sheet.first, sheet.row)

@@ -12,8 +12,8 @@ import pandas as pd
 from estimator.noise import white_noise
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
+from scenarios.experiment.advice import check_no_colons, read_with_advice
 from scenarios.experiment.checks import GAP, check_time, output_notes, time_notes
-from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import is_number, is_unit, spelled
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits
@@ -21,7 +21,6 @@ from scenarios.preparing.lines_above import lines_above
 from scenarios.preparing.quantities import words_of
 
 TIME = re.compile(r"(^|[^a-z])(t|time|times|timestamp|zeit|temps|clock)([^a-z]|$)", re.IGNORECASE)
-TIME_OF_DAY = re.compile(r"'\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?'")
 TIME_UNITS = {"ms": "ms", "msec": "ms", "millis": "ms", "milliseconds": "ms", "us": "us", "usec": "us"}
 FEWEST = 4  # numbers that a channel needs to be one
 
@@ -95,7 +94,7 @@ def survey(file: Path, time: str | None = None) -> list[Raster]:
     options = {"skiprows": above} if above else {}
     if time is None:
         try:
-            sheet = read_sheet(file, options=options)
+            sheet = read_with_advice(file, options=options)
         except BadInput:  # several rasters, or a file that cannot be read at all
             found = [*_rasters(file)]
             if not found:
@@ -109,7 +108,7 @@ def survey(file: Path, time: str | None = None) -> list[Raster]:
 def _rasters(file: Path) -> Iterator[Raster]:
     """The rasters of a file with several, each once."""
     seen = set()
-    for name in read_sheet(file, "", ()).known:
+    for name in read_with_advice(file, "", ()).known:
         if not TIME.search(name):
             continue
         try:
@@ -123,7 +122,7 @@ def _rasters(file: Path) -> Iterator[Raster]:
 
 
 def _with_time(file: Path, time: str, options: Mapping[str, Any]) -> Sheet:
-    sheet = read_sheet(file, time, options=options)
+    sheet = read_with_advice(file, time, options=options)
     if time not in sheet.cells:
         raise BadInput(f"{file}: has no time column '{time}'; {did_you_mean(time, sheet.known)}")
     return sheet
@@ -152,13 +151,11 @@ def _why_no_time(sheet: Sheet) -> str:
     """Why no column is the time: what is wrong with the one that is called so, or that none increases."""
     for column in (str(name) for name in sheet.cells if TIME.search(str(name))):
         try:
+            check_no_colons(sheet, column)
             t = _plain(sheet).seconds(column, "")
             check_time(str(sheet.file), column, t, np.arange(t.size) + sheet.first, sheet.row)
         except BadInput as error:
-            said = str(error)
-            if TIME_OF_DAY.search(said):
-                said += " (times of day are read with their date only, such as 2026-11-26T12:00:00.5)"
-            return said
+            return str(error)
     return f"{sheet.file}: no column increases from row to row, so none is the time; add one"
 
 
@@ -176,6 +173,7 @@ def _rises(sheet: Sheet, column: str) -> bool:
 
 
 def _raster(sheet: Sheet, time: str, options: Mapping[str, Any]) -> Raster:
+    check_no_colons(sheet, time)
     stated = StatedUnits(sheet)
     named = next((TIME_UNITS[w] for w in words_of(time) if w in TIME_UNITS), None)
     unit = None if time in sheet.units or stated.begin(time) is not None else named

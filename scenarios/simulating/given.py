@@ -12,8 +12,8 @@ from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
 from fmus.host.master.signals import Source
 from fmus.units import column_conversion, model_unit
+from scenarios.experiment.advice import check_no_colons, read_with_advice
 from scenarios.experiment.checks import check_time
-from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.experiment.table import Number, Table
 from scenarios.experiment.validation import read_table
@@ -79,7 +79,7 @@ def _source(given: Any, name: str, fmus: Descriptions, folder: Path) -> Source:
 
 def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) -> tuple[Array, Array]:
     try:
-        sheet = read_sheet(folder / c.data, c.time, (c.time, c.column))
+        sheet = read_with_advice(folder / c.data, c.time, (c.time, c.column))
     except BadInput as error:
         raise BadInput(f"key '{key}.data': {error}") from error
     for what, column in (("time", c.time), ("column", c.column)):
@@ -89,6 +89,7 @@ def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) ->
             raise BadInput(
                 f"key '{key}.{what}': column '{column}' {why or f'is not in {sheet.file}; {near}'}"
             )
+    check_no_colons(sheet, c.time)
     stated = StatedUnits(sheet)
     times, values = stated.seconds(c.time, f"key '{key}.time'"), sheet.numbers(c.column)
     check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row)

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-from fmus.errors import BadInput
 from scenarios.simulating import run
 from tests.helpers.paths import SHIPPED
 
@@ -80,8 +79,3 @@ def edited(text: str, *changes: tuple[str, str]) -> str:
         assert old in text, old
         text = text.replace(old, new)
     return text
-
-
-def loop_unknown(error: BadInput) -> bool:
-    """Whether a loop was refused as a PythonFMU does not say which output follows which input at once."""
-    return "assumed, as the FMU states no dependencies" in str(error)

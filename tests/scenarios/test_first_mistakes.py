@@ -67,6 +67,14 @@ def test_without_names_no_line_is_above_them(tmp_path):
     assert lines_above(DEMO / "experiment.toml") == 0
 
 
+def test_what_no_experiment_can_mend_is_told_without_one(tmp_path):
+    with pytest.raises(BadInput, match="is a folder; give the path of the data file in it"):
+        survey(tmp_path)
+    file = edited(tmp_path, lambda lines: [*lines[:60], "1,2,3,4,5,6", *lines[61:]])
+    with pytest.raises(BadInput, match=r"line 61: has 6 cells, and the lines above it have 4; mend it$"):
+        survey(file)
+
+
 def test_an_experiment_is_drafted_from_a_record_with_lines_above_its_names(tmp_path):
     file = edited(tmp_path, lambda lines: ["Logger 7 export", "Serial;1234", "", *lines])
     lines, _, e = told(tmp_path, file)
@@ -106,7 +114,7 @@ def blank(cell):
         (lambda lines: [*lines[:102], *lines[52:]], ["line 103: time column 'time' goes from"]),
         (
             lambda lines: [*lines[:2], *(f"12:00:{i:05.2f},1,2,3" for i in range(50))],
-            ["holds '12:00:00.00'", "times of day are read with their date only"],
+            ["line 3: time column 'time' holds '12:00:00.00', a time of day without a date; write seconds"],
         ),
     ],
     ids=["an empty cell", "a word", "it goes back", "times of day"],

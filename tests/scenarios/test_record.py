@@ -1,9 +1,11 @@
 """Measured data: what arrives at the estimators, what is refused, what is noted."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,8 +14,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from estimator.record import Record
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription
+from scenarios.experiment.advice import check_no_colons
 from scenarios.experiment.checks import clipped
 from scenarios.experiment.experiment import load_experiment
+from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.record import load_record
 from tests.helpers.experiment_files import (
     GOOD,
@@ -162,6 +166,7 @@ BAD_USE = [
     ('"torque"', '"torqe"', "[inputs] T_P: column 'torqe' is not in"),
     ('time = "time"', 'time = "t"', "key 'time': column 't' is not in"),
     ("[derived.accel]", "[derived.torque]", "[derived.torque] has the name of a column"),
+    ('"data.csv"', '"."', ": is a folder; give the path of the data file in it"),
     ('"data.csv"', '"nodata.csv"', "cannot be read (No such file or directory)"),
     ('"data.csv"', '"data.mf4"', "cannot be read (No such file or directory)"),
     (
@@ -190,7 +195,25 @@ BAD_DATA = [
     (lambda lines: [], "is empty or has no column names in line 1"),
     (lambda lines: lines[:1], "has no data below line 1"),
     (lambda lines: [lines[0].replace("torque", "omega"), *lines[1:]], "column 'omega' occurs twice"),
-    (replace_row(7, "0.05,1.5,12,9,9"), "Expected 4 fields in line 7, saw 5"),
+    (
+        replace_row(7, "0.05,1.5,12,9,9"),
+        "line 7: has 5 cells, and the lines above it have 4; mend it; if other lines stand above the "
+        "names, write how many as skiprows in [data]",
+    ),
+    (
+        lambda lines: ["Logger 7", "Serial,1234", "", *lines],
+        "line 4: has 4 cells, and the lines above it have 2; mend it; if other lines stand above",
+    ),
+    (lambda lines: ["Logger 7", *lines], "line 2 has more cells than line 1 has names; name each column; if"),
+    (
+        lambda lines: ["a,b,c,d", *lines],
+        "; line 2 holds it: if the names stand there, write skiprows = 1 in [data]",
+    ),
+    (replace_row(7, '0.05,"1.5,12,9'), "line 7: a quotation mark is opened there and never closed; close it"),
+    (
+        lambda lines: [lines[0], *(f"12:00:{i / 100:05.2f},0,12,110" for i in range(1001))],
+        "line 2: time column 'time' holds '12:00:00.00', a time of day without a date; write seconds, or",
+    ),
     (lambda lines: [lines[0], *(line + ",1" for line in lines[1:])], "line 2 has more cells than line 1"),
     (replace_row(7, "0.05,off,12,110"), "line 7: column 'torque' holds 'off', not a number"),
     (replace_row(7, "0.05,,12,110"), "column 'torque' has no number in 1 of 1001 rows, first at 0.05 s"),
@@ -211,6 +234,36 @@ def test_bad_data_files(tmp_path, edit, words):
     with pytest.raises(BadInput) as refused:
         read(file)
     assert_one_clear_line(refused, file, words)
+
+
+@pytest.mark.parametrize("above", [["a,b,c,d"], ["1,2,3,4", "", "rig;7"]])
+def test_a_file_is_read_as_its_refusal_says(tmp_path, above):
+    write(tmp_path)
+    data = tmp_path / "data.csv"
+    data.write_text("\n".join([*above, *csv_lines(table())]))
+    with pytest.raises(BadInput) as refused:
+        read(tmp_path / "experiment.toml")
+    option = re.search(r"write (skiprows = \d+) in \[data\]", str(refused.value))[1]
+    told = write(
+        tmp_path, GOOD.replace('data = "data.csv"\n', "") + f'\n[data]\nfile = "data.csv"\n{option}\n'
+    )
+    data.write_text("\n".join([*above, *csv_lines(table())]))
+    assert read(told).runs[0].t[-1] == 10.0
+
+
+@pytest.mark.parametrize("cell", ["12:00", "12:00:01", "0:01.5", "12:00:01,5", "1:02:03 PM", "100:00:00"])
+def test_times_with_colons_are_no_time_in_any_form(cell):
+    sheet = Sheet(Path("log.csv"), pd.DataFrame({"t": [cell, cell]}), ("t",), row="line", first=2)
+    with pytest.raises(
+        BadInput, match=f"line 2: time column 't' holds '{cell}', a time of day without a date"
+    ):
+        check_no_colons(sheet, "t")
+
+
+@pytest.mark.parametrize("cell", [1.5, "1,5", "2026-11-26T12:00:01.5", pd.Timedelta("12:00:01"), np.nan])
+def test_other_times_are_left_to_the_reader(cell):
+    check_no_colons(Sheet(Path("log.csv"), pd.DataFrame({"t": [cell]}), ("t",)), "t")
+    check_no_colons(Sheet(Path("log.csv"), pd.DataFrame({"t": []}), ("t",)), "t")
 
 
 def test_blank_rows_at_the_end_and_beyond_the_split_do_no_harm(tmp_path):

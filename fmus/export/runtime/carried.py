@@ -1,16 +1,22 @@
-"""The FMU inside another one, by FMI 2.0 or 3.0: started in steps of its own, then run by raw calls."""
+"""The FMU inside another one, by FMI 2.0 or 3.0: started in steps of its own, then run by raw calls.
+
+Also what its model description says beside its variables, which the FMU around it says again.
+"""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from ctypes import byref, c_bool, c_double, c_uint
 from typing import Any
+from xml.etree.ElementTree import Element
 
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
 WARNING = 1  # highest FMI status of a call that was done
+TIMES = ("startTime", "stopTime", "tolerance", "stepSize")  # of <DefaultExperiment>
 
 
 class Carried(ABC):
@@ -149,6 +155,47 @@ class Fmi3(Carried):
 
 
 CARRIED: dict[str, type[Carried]] = {"2.0": Fmi2, "3.0": Fmi3}
+
+
+def experiment(description: Element) -> dict[str, float]:
+    """What the <DefaultExperiment> of a model description states in finite numbers; empty without one."""
+    found = {}
+    for key, stated in next(description.iterfind("DefaultExperiment"), Element("none")).attrib.items():
+        try:
+            value = float(stated) if key in TIMES else math.nan
+        except ValueError:
+            continue
+        if math.isfinite(value):
+            found[key] = value
+    return found
+
+
+def display(description: Element) -> dict[str, dict[str, str]]:
+    """By variable of a model description the attributes of its <DisplayUnit> by FMI 2.0, where it has one.
+
+    FMI 3.0 also knows display units that go with the inverse of the value, which FMI 2.0 cannot say.
+    """
+    types = {t.get("name"): _about(t) for t in description.iterfind("TypeDefinitions/*")}
+    known = {
+        (unit.get("name"), shown.get("name")): shown.attrib
+        for unit in description.iterfind("UnitDefinitions/Unit")
+        for shown in unit.iterfind("DisplayUnit")
+        if shown.get("inverse", "false") in ("false", "0")
+    }
+    found = {}
+    for v in description.iterfind("ModelVariables/*"):
+        about = {**types.get(_about(v).get("declaredType"), {}), **_about(v)}
+        shown = known.get((about.get("unit"), about.get("displayUnit")))
+        if shown is not None:
+            found[v.attrib["name"]] = {k: shown[k] for k in ("name", "factor", "offset") if k in shown}
+    return found
+
+
+def _about(node: Element) -> Mapping[str, str]:
+    """Attributes of a real variable or type: of the node by FMI 3.0, of <Real> in it by FMI 2.0."""
+    if node.tag in ("ScalarVariable", "SimpleType"):
+        return next((real.attrib for real in node.iterfind("Real")), {})
+    return node.attrib
 
 
 def _c_arrays(references: list[int], memory: Any, first: int) -> tuple[Any, Any]:

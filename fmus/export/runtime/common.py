@@ -97,6 +97,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         """For each output, what it is computed from, by place in the description; None where nobody knows."""
         return None
 
+    def experiment(self) -> dict[str, float]:
+        """Times, s, tolerance and step of the usual experiment; empty where nobody states one."""
+        return dict(MODEL.get("experiment", {}))
+
+    def display(self) -> dict[str, dict[str, str]]:
+        """By variable the <DisplayUnit> of its unit in which a person reads it, where one is stated."""
+        return {}
+
     def fail(self, reason: str) -> None:
         """Log a reason; the instance refuses to step until it is reset or restored."""
         self.failure = reason
@@ -205,12 +213,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
         for key, value in {"generationTool": made_by, **MODEL.get("rights", {})}.items():
             root.set(key, value)
         place = [node.tag for node in root].index("LogCategories")
-        if "experiment" in MODEL:
-            times = {k: repr(float(v)) for k, v in MODEL["experiment"].items()}
+        experiment, display = self.experiment(), self.display()
+        if experiment:
+            times = {k: repr(float(v)) for k, v in experiment.items()}
             root.insert(place + 1, Element("DefaultExperiment", times))
-        root.insert(place, units_xml())
+        root.insert(place, units_xml(display))
         for node, v in zip(root.iter("ScalarVariable"), VARIABLES, strict=True):
-            complete(node, v)
+            complete(node, v, display.get(v["name"]))
         structure = root.findall("ModelStructure")[0]
         computed = range(SETTABLE, len(VARIABLES))
         if computed:
@@ -234,11 +243,13 @@ def why_not(i: int, value: float) -> str:
     return f"{name} = {value:g} is outside {low:g} to {high:g}"
 
 
-def complete(node: Element, v: dict[str, Any]) -> None:
-    """Unit, limits, nominal and start of one <ScalarVariable>."""
+def complete(node: Element, v: dict[str, Any], shown: dict[str, str] | None) -> None:
+    """Unit, display unit, limits, nominal and start of one <ScalarVariable>."""
     real = node.findall("Real")[0]
     if v["unit"]:
         real.set("unit", v["unit"])
+    if shown:
+        real.set("displayUnit", shown["name"])
     for key in ("min", "max", "nominal", "start"):
         if v[key] is not None and (key != "start" or v["starts"]):
             real.set(key, repr(float(v[key])))
@@ -257,9 +268,13 @@ def state_dependencies(structure: Element, needed: list[list[int]]) -> None:
             unknown.set("dependencies", " ".join(str(i + 1) for i in of if i in known))
 
 
-def units_xml() -> Element:
-    """<UnitDefinitions> from the exponents found when the FMU was built."""
+def units_xml(display: dict[str, dict[str, str]]) -> Element:
+    """<UnitDefinitions> from the exponents found when the FMU was built; display: units by variable."""
     node = Element("UnitDefinitions")
     for name, base in MODEL["units"].items():
-        SubElement(SubElement(node, "Unit", name=name), "BaseUnit", base)
+        unit = SubElement(node, "Unit", name=name)
+        SubElement(unit, "BaseUnit", base)
+        shown = (display[v["name"]] for v in VARIABLES if v["unit"] == name and v["name"] in display)
+        for about in {given["name"]: given for given in shown}.values():
+            SubElement(unit, "DisplayUnit", about)
     return node

@@ -8,8 +8,11 @@ import sys
 import tempfile
 from array import array
 from collections.abc import Sequence
+from functools import cache
 from multiprocessing.util import Finalize
+from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import Element, parse
 
 import fmpy
 from pythonfmu.enums import Fmi2Status
@@ -61,6 +64,15 @@ class Slave(common.Slave):
     def __del__(self) -> None:
         if hasattr(self, "base"):
             IDLE.append(self.base)
+
+    def experiment(self) -> dict[str, float]:
+        """That of the carried FMU."""
+        return carried.experiment(_description())
+
+    def display(self) -> dict[str, dict[str, str]]:
+        """Those of the carried FMU, for its variables."""
+        own = {common.VARIABLES[i]["name"] for i, reference in enumerate(REFERENCES) if reference >= 0}
+        return {name: shown for name, shown in carried.display(_description()).items() if name in own}
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
         """Remember the start time."""
@@ -142,6 +154,12 @@ class Slave(common.Slave):
         order = sorted(indices & PASSED)
         if order:
             self.base.set(_references(order), [self.values[i] for i in order])
+
+
+@cache
+def _description() -> Element:
+    """The model description of the carried FMU."""
+    return parse(Path(FOLDER) / "modelDescription.xml").getroot()
 
 
 def _references(indices: Sequence[int]) -> list[int]:

@@ -1,0 +1,88 @@
+"""Read a data file, and say what to do about one that cannot be used, in the words of an experiment.
+
+A reader says what is wrong with a file. What helps often stands in the experiment, of which it knows nothing.
+"""
+
+import re
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from fmus.errors import BadInput
+from scenarios.experiment.readers import read_sheet
+from scenarios.experiment.readers.reader import NO_OPTIONS
+from scenarios.experiment.readers.sheet import Sheet
+
+WIDER = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # as pandas says it
+UNCLOSED = re.compile(r"EOF inside string starting at row (\d+)")  # likewise, rows from 0
+WITH_COLONS = re.compile(r"\d+:\d{2}(:\d{2})?([.,]\d+)?(\s*[ap]\.?m\.?)?", re.IGNORECASE)
+LOOKED_AT = 200  # rows in which the line of the names is looked for
+
+
+def read_with_advice(
+    file: Path,
+    time: str | None = None,
+    columns: Collection[str] | None = None,
+    options: Mapping[str, Any] = NO_OPTIONS,
+    table: str | None = None,
+) -> Sheet:
+    """As readers.read_sheet; a refusal says what to do.
+
+    table: that of the experiment in which the options stand, None without an experiment.
+    """
+    if file.is_dir():
+        raise BadInput(f"{file}: is a folder; give the path of the data file in it")
+    try:
+        return read_sheet(file, time, columns, options)
+    except BadInput as error:
+        said = _unlike_lines(error, file, table)
+        if said:
+            raise BadInput(said) from error
+        raise
+
+
+def _unlike_lines(error: BadInput, file: Path, table: str | None) -> str:
+    """What to do about a text file whose lines do not make up a table; empty for any other refusal."""
+    cause, above = error.__cause__, ""
+    if table:
+        above = (
+            f"; if other lines stand above the names, write how many as skiprows in {table} "
+            "('railfmi inspect' counts them)"
+        )
+    if isinstance(cause, pd.errors.ParserWarning):
+        return f"{error}{above}"
+    said = str(cause) if isinstance(cause, pd.errors.ParserError) else ""
+    if wider := WIDER.search(said):
+        few, line, many = wider.groups()
+        return f"{file} line {line}: has {many} cells, and the lines above it have {few}; mend it{above}"
+    if unclosed := UNCLOSED.search(said):
+        row = int(unclosed[1])
+        return f"{file} line {row + 1}: a quotation mark is opened there and never closed; close it"
+    return ""
+
+
+def named_below(sheet: Sheet, column: str, table: str) -> str:
+    """What to do about a missing column whose name stands in a lower line of a text file; else empty.
+
+    table: that of the experiment in which the options of the file stand.
+    """
+    if sheet.row != "line":
+        return ""
+    word = re.compile(rf"(?<!\w){re.escape(column)}(?!\w)")
+    for i, row in enumerate(sheet.cells.head(LOOKED_AT).itertuples(index=False)):
+        if any(isinstance(cell, str) and word.search(cell) for cell in row):
+            line = i + sheet.first
+            return f"; line {line} holds it: if the names stand there, write skiprows = {line - 1} in {table}"
+    return ""
+
+
+def check_no_colons(sheet: Sheet, column: str) -> None:
+    """Raise BadInput for a time column of times of day or durations with colons, which are not read."""
+    cells = sheet.cells[column]
+    if cells.size and WITH_COLONS.fullmatch(str(cells.iloc[0]).strip()):
+        raise BadInput(
+            f"{sheet.file} {sheet.row} {sheet.first}: time column '{column}' holds '{cells.iloc[0]}', a time "
+            "of day without a date; write seconds, or dates with times, such as 2026-11-26T12:00:00.5"
+        )
