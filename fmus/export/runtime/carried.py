@@ -182,12 +182,12 @@ def display(description: Element) -> dict[str, dict[str, str]]:
         for shown in unit.iterfind("DisplayUnit")
         if shown.get("inverse", "false") in ("false", "0")
     }
-    found = {}
+    found: dict[str, dict[str, str]] = {}
     for v in description.iterfind("ModelVariables/*"):
         about = {**types.get(_about(v).get("declaredType"), {}), **_about(v)}
         shown = known.get((about.get("unit"), about.get("displayUnit")))
         if shown is not None:
-            found[v.attrib["name"]] = {k: shown[k] for k in ("name", "factor", "offset") if k in shown}
+            found[v.attrib["name"]] = {k: x for k, x in shown.items() if k in ("name", "factor", "offset")}
     return found
 
 
