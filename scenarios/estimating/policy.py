@@ -44,7 +44,7 @@ class EstimatePolicy(Limits):
         "s",
         "beginning of the record from which the parameters of a model's form learn where to begin, and how "
         "far they may wander",
-        "convention: some thirty periods of a wheelset's hunting, yet a small part of a record of minutes",
+        "convention: some thirty periods of hunting, yet a small part of a record of minutes",
     )
     widened: float = limit(
         10.0,

@@ -12,6 +12,7 @@ from estimator.closeloop.fitting.fit import REFUSED, fit
 from estimator.closeloop.fitting.profile_trace import WIDTH, ends
 from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.fitting.slopes_within_error import within_error
+from estimator.closeloop.hypotheses.fitted import WIDE
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
@@ -58,6 +59,13 @@ def free(n: int, start: float = 0.0) -> list[Unknown]:
     return [Unknown(f"p{i}", start, -np.inf, np.inf, 1.0) for i in range(n)]
 
 
+def information(matrix: Array, i: int) -> float:
+    """What a linear record says about an unknown, if the others are held by their wide prior alone."""
+    gram, o = matrix.T @ matrix, np.arange(matrix.shape[1]) != i
+    held = gram[np.ix_(o, o)] + 12 / WIDE**2 * np.eye(int(o.sum()))
+    return float(gram[i, i] - gram[i, o] @ np.linalg.solve(held, gram[o, i]))
+
+
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 5), at_once=st.integers(1, 8))
 def test_intervals_of_a_linear_model_end_where_slopes_say_after_one_simulation_each(seed, n, at_once):
@@ -69,8 +77,9 @@ def test_intervals_of_a_linear_model_end_where_slopes_say_after_one_simulation_e
     low, high = reached(problem, h)
     assert problem.simulated - before == 2 * n
     units = np.sqrt(h.fit.inflation)
-    alone = WIDTH * units * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
-    widest = alone * units.max() / units  # an end of another unknown's interval may lie as far out
+    alone = WIDTH * units / np.sqrt([information(matrix, i) for i in range(n)])
+    # an end of another unknown's interval, whose noise may be more correlated, may lie further out
+    widest = WIDTH * units.max() * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
     for reach in (high - h.fit.values, h.fit.values - low):
         assert np.all(reach >= (1 - 1e-3) * alone)
         assert np.all(reach <= (1 + 1e-3) * widest)
