@@ -68,7 +68,7 @@ def test_whitened_squares_are_the_exponent_of_the_density(seed, share, time, std
 
 
 def runs(y: np.ndarray):
-    """Innovations of noise (N,) as a function of logarithms of its std and time and the logit of its share."""
+    """Innovations of noise (N,) as a function of the logarithms of std and time, and the logit of share."""
 
     def run(at):
         std, time, share = np.exp(at[0]), np.exp(at[1]), 1 / (1 + np.exp(-at[2]))
@@ -93,7 +93,7 @@ LOW, HIGH = np.array([-7.0, np.log(DT), -7.0]), np.array([7.0, 3.0, 7.0])
 
 def test_the_score_is_the_slope_of_the_likelihood():
     run = runs(drawn(TRUE, 300, np.random.default_rng(1)))
-    at = AT + [0.2, -0.3, 0.4]
+    at = AT + np.array([0.2, -0.3, 0.4])
     score, information = _slopes(run, at, run(at), HIGH)
     for i, step in enumerate(1e-4 * np.eye(3)):
         slope = (run(at + step).log_likelihood - run(at - step).log_likelihood) / 2e-4
