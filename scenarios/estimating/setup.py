@@ -21,6 +21,7 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from fmus.model import declared
 from fmus.models import model_class
+from scenarios.estimating.delays import undelayed
 from scenarios.estimating.form import choices, parameters_of_form
 from scenarios.estimating.policy import POLICY
 from scenarios.estimating.sensors import Sought, check_noise, noise_of, sought
@@ -111,9 +112,10 @@ class Setup:
 def set_up(e: Experiment, options: Options, record: Record, archive: Archive) -> Setup:
     """All that the filter needs before its first sample; raises BadInput for wrong names or values."""
     d = archive.description
-    run = record.runs[0]
     check_options(e, options, d)
     check_noise(e, options)
+    record = undelayed(e, record)
+    run = record.runs[0]
     every = 1
     if e.estimate and e.estimate.rate:
         every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))

@@ -119,11 +119,15 @@ class Options(Table):
 
 
 class Estimate(Table):
-    """What the filter estimates beside the states it needs anyway, and how; `rate` in Hz."""
+    """What the filter estimates beside the states it needs anyway, and how; `rate` in Hz.
+
+    delay: by output, how much later than the motion that it shows it is measured, s.
+    """
 
     parameters: dict[str, EstimatedParameter] = Field(default_factory=dict)
     states: tuple[str, ...] = ()
     rate: Positive | None = None
     inputs: dict[str, EstimatedInput] = Field(default_factory=dict)
     noise: dict[str, OutputNoise] = Field(default_factory=dict)
+    delay: dict[str, Positive] = Field(default_factory=dict)
     options: Options = Options()

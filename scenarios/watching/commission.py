@@ -61,6 +61,8 @@ def commissioned(e: Experiment, archive: Archive, record: Record, tell: Tell) ->
     options = e.estimate.options
     if options.smooth:
         raise BadInput(f"{e.file}: [estimate.options] smooth needs a whole record; leave it out for a stream")
+    if e.estimate.delay:
+        raise BadInput(f"{e.file}: [estimate.delay] needs a whole record; leave it out for a stream")
     setup = set_up(e, options, record, archive)
     if len(setup.choices) > 1:
         names = ", ".join(setup.choices[0])

@@ -1,12 +1,18 @@
 """Noise of the sensors in `railfmi estimate`: correlated in time, of a size that is not declared, delayed."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
 
 from estimator.filters.sensor_noise import SensorNoise
+from estimator.record import Record, Run
 from fmus.errors import BadInput
+from scenarios.estimating.delays import undelayed
 from scenarios.estimating.estimating import estimate
 from scenarios.estimating.result import EstimateResult
 from scenarios.experiment.estimated import Estimate, Options
@@ -201,3 +207,66 @@ def test_bands_hold_the_truth_under_correlated_noise(tmp_path):
         passed += result.consistent
     assert sum(held) >= 34
     assert passed >= 16  # 19 expected, with a deviation of 1
+
+
+def late(y: np.ndarray, t: np.ndarray) -> Record:
+    """A record (N, m) of two outputs."""
+    whole = np.ones(len(t), np.bool_)
+    run = Run(t, np.column_stack([t, t**2]), y, whole, ~whole, ~whole)
+    return Record((run,), ("a", "b"), ("p", "q"), np.ones(2))
+
+
+def delayed(**delays: float) -> SimpleNamespace:
+    return SimpleNamespace(file="e.toml", estimate=SimpleNamespace(delay=delays, rate=None))
+
+
+@given(st.floats(0.001, 0.5), st.floats(0.001, 0.5), st.floats(-1e3, 1e3))
+def test_every_delayed_sample_is_at_the_time_that_it_shows(p, q, begin):
+    t = begin + 0.1 * np.arange(30)
+    shows = np.column_stack([t - p, t - q])  # each output shows the time itself
+    run = undelayed(delayed(p=p, q=q), late(shows, t)).runs[0]
+    assert np.all(np.diff(run.t) > 0)
+    for j, delay in enumerate((p, q)):
+        seen = np.isfinite(run.y[:, j])
+        assert_allclose(run.y[seen, j], run.t[seen], atol=2e-7)
+        assert seen.sum() == np.sum(t - delay >= begin - 1e-7)
+    assert_allclose(run.u[:, 0], run.t, atol=1e-9)
+    assert np.isin(t, run.t).all()
+    assert len(run.t) <= 3 * len(t)
+
+
+def test_whole_samples_are_shifted_without_further_rows():
+    t = 0.1 * np.arange(30)
+    y = np.random.default_rng(1).normal(size=(30, 2))
+    run = undelayed(delayed(q=0.3), late(y, t)).runs[0]
+    assert_array_equal(run.t, t)
+    assert_array_equal(run.y[:, 0], y[:, 0])
+    assert_array_equal(run.y[:-3, 1], y[3:, 1])
+    assert np.isnan(run.y[-3:, 1]).all()
+
+
+@pytest.mark.parametrize(
+    ("e", "said"),
+    [
+        (delayed(r=0.1), "[estimate.delay] 'r' is none of [outputs]"),
+        (delayed(q=30.0), "[estimate.delay] q = 30 s is longer than the record of 2.9 s"),
+    ],
+)
+def test_delays_that_cannot_be_are_refused(e, said):
+    t = 0.1 * np.arange(30)
+    with pytest.raises(BadInput) as refused:
+        undelayed(e, late(np.zeros((30, 2)), t))
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.13])
+def test_a_sensor_that_is_late_misleads_no_more(delay, vdp, tmp_path):
+    """Two samples, and two and a half."""
+    file = write_vdp(tmp_path, vdp, n=800, delay=delay)
+    options = Options(process_std={"x0": 1e-3, "x1": 1e-3})
+    assert not estimate(file, options=options).consistent
+    file.write_text(file.read_text() + f"[estimate.delay]\nx0 = {delay}\n")
+    result = estimate(file, options=options)
+    assert result.consistent
+    mu = result.estimated["mu"]
+    assert mu["value"] == pytest.approx(0.8, abs=3 * mu["std_error"])
