@@ -1,8 +1,8 @@
 """Outputs that are measured late, brought to the times of what they show.
 
 An estimate of a whole record may use a measurement where it belongs, however late it arrived. This is the
-exact correction. A filter that keeps past outputs as states (Simon, Optimal State Estimation, 2006, 10.5) knows
-no more at the end, and has more states by the number of samples of every delay.
+exact correction. A filter that keeps past outputs as states (Simon, Optimal State Estimation, 2006, 10.5)
+knows no more at the end, and has more states by the number of samples of every delay.
 """
 
 from dataclasses import replace
@@ -40,8 +40,8 @@ def undelayed(e: Experiment, record: Record) -> Record:
     t = _with_rows_between(run.t, shown, SAME * run.sample)
     if len(t) > len(run.t) and e.estimate and e.estimate.rate:
         raise BadInput(
-            f"{e.file}: [estimate] rate needs delays of whole samples, which are {run.sample:g} s apart; leave "
-            "it out, or thin the record by 'rate' beside 'data'"
+            f"{e.file}: [estimate] rate needs delays of whole samples, which are {run.sample:g} s apart; "
+            "leave it out, or thin the record by 'rate' beside 'data'"
         )
     u = np.array([np.interp(t, run.t, column) for column in run.u.T]).T.reshape(len(t), -1)
     y = np.full((len(t), len(record.outputs)), np.nan)
