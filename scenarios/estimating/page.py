@@ -95,9 +95,9 @@ def channels(result: EstimateResult) -> Iterator[Row]:
 
 def _noise(of: Mapping[str, Any]) -> str:
     """The noise of an output, with the 95 % bands of what was estimated of it."""
-    said = {what: _number(of[what]) for what in ("std", "share", "time")}
+    said = {what: short(of[what], 3) for what in ("std", "share", "time") if of[what] is not None}
     for what, band in of["band_95"].items():
-        said[what] += f" ({' to '.join(number(end) for end in band)})"
+        said[what] += f" ({' to '.join(short(end, 3) for end in band)})"
     if of["time"] is None:
         return said["std"]
     return f"{said['std']}, share {said['share']} of the variance correlated over {said['time']} s"
