@@ -16,11 +16,12 @@ from scenarios.experiment.experiment import Experiment
 SAME = 1e-6  # of a time step: times that differ less are the same
 
 
-def undelayed(e: Experiment, record: Record) -> Record:
+def undelayed(e: Experiment, record: Record, any_step: bool) -> Record:
     """The record with each delayed output at the times that it shows; raises BadInput for wrong delays.
 
-    Where a delay is no whole number of samples, the record gets rows between its own, in which that output
-    alone is measured. What an output shows from before the record is left out.
+    any_step: whether the FMU takes steps of any length. Where a delay is no whole number of samples, the record
+    gets rows between its own, in which that output alone is measured. What an output shows from before the
+    record is left out.
     """
     wanted = e.estimate.delay if e.estimate else {}
     for name in wanted:
@@ -38,10 +39,11 @@ def undelayed(e: Experiment, record: Record) -> Record:
                 f"{run.t[-1] - run.t[0]:g} s; it is in seconds"
             )
     t = _with_rows_between(run.t, shown, SAME * run.sample)
-    if len(t) > len(run.t) and e.estimate and e.estimate.rate:
+    if len(t) > len(run.t) and (not any_step or (e.estimate and e.estimate.rate)):
+        needs = "[estimate] rate needs" if any_step else "an FMU that takes steps of one length alone needs"
         raise BadInput(
-            f"{e.file}: [estimate] rate needs delays of whole samples, which are {run.sample:g} s apart; "
-            "leave it out, or thin the record by 'rate' beside 'data'"
+            f"{e.file}: {needs} delays of whole samples, which are {run.sample:g} s apart; round the delays, "
+            "or use another rate"
         )
     u = np.array([np.interp(t, run.t, column) for column in run.u.T]).T.reshape(len(t), -1)
     y = np.full((len(t), len(record.outputs)), np.nan)

@@ -114,7 +114,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     d = archive.description
     check_options(e, options, d)
     check_noise(e, options)
-    record = undelayed(e, record)
+    record = undelayed(e, record, d.variable_step)
     run = record.runs[0]
     every = 1
     if e.estimate and e.estimate.rate:

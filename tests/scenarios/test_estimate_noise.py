@@ -216,15 +216,15 @@ def late(y: np.ndarray, t: np.ndarray) -> Record:
     return Record((run,), ("a", "b"), ("p", "q"), np.ones(2))
 
 
-def delayed(**delays: float) -> SimpleNamespace:
-    return SimpleNamespace(file="e.toml", estimate=SimpleNamespace(delay=delays, rate=None))
+def delayed(rate: float | None = None, **delays: float) -> SimpleNamespace:
+    return SimpleNamespace(file="e.toml", estimate=SimpleNamespace(delay=delays, rate=rate))
 
 
 @given(st.floats(0.001, 0.5), st.floats(0.001, 0.5), st.floats(-1e3, 1e3))
 def test_every_delayed_sample_is_at_the_time_that_it_shows(p, q, begin):
     t = begin + 0.1 * np.arange(30)
     shows = np.column_stack([t - p, t - q])  # each output shows the time itself
-    run = undelayed(delayed(p=p, q=q), late(shows, t)).runs[0]
+    run = undelayed(delayed(p=p, q=q), late(shows, t), True).runs[0]
     assert np.all(np.diff(run.t) > 0)
     for j, delay in enumerate((p, q)):
         seen = np.isfinite(run.y[:, j])
@@ -238,7 +238,7 @@ def test_every_delayed_sample_is_at_the_time_that_it_shows(p, q, begin):
 def test_whole_samples_are_shifted_without_further_rows():
     t = 0.1 * np.arange(30)
     y = np.random.default_rng(1).normal(size=(30, 2))
-    run = undelayed(delayed(q=0.3), late(y, t)).runs[0]
+    run = undelayed(delayed(q=0.3), late(y, t), False).runs[0]
     assert_array_equal(run.t, t)
     assert_array_equal(run.y[:, 0], y[:, 0])
     assert_array_equal(run.y[:-3, 1], y[3:, 1])
@@ -246,16 +246,18 @@ def test_whole_samples_are_shifted_without_further_rows():
 
 
 @pytest.mark.parametrize(
-    ("e", "said"),
+    ("e", "any_step", "said"),
     [
-        (delayed(r=0.1), "[estimate.delay] 'r' is none of [outputs]"),
-        (delayed(q=30.0), "[estimate.delay] q = 30 s is longer than the record of 2.9 s"),
+        (delayed(r=0.1), True, "[estimate.delay] 'r' is none of [outputs]"),
+        (delayed(q=30.0), True, "[estimate.delay] q = 30 s is longer than the record of 2.9 s"),
+        (delayed(q=0.12), False, "takes steps of one length alone needs delays of whole samples"),
+        (delayed(rate=5.0, q=0.12), True, "rate needs delays of whole samples, which are 0.1 s apart"),
     ],
 )
-def test_delays_that_cannot_be_are_refused(e, said):
+def test_delays_that_cannot_be_are_refused(e, any_step, said):
     t = 0.1 * np.arange(30)
     with pytest.raises(BadInput) as refused:
-        undelayed(e, late(np.zeros((30, 2)), t))
+        undelayed(e, late(np.zeros((30, 2)), t), any_step)
     assert said in str(refused.value)
 
 
