@@ -19,9 +19,9 @@ SAME = 1e-6  # of a time step: times that differ less are the same
 def undelayed(e: Experiment, record: Record, any_step: bool) -> Record:
     """The record with each delayed output at the times that it shows; raises BadInput for wrong delays.
 
-    any_step: whether the FMU takes steps of any length. Where a delay is no whole number of samples, the record
-    gets rows between its own, in which that output alone is measured. What an output shows from before the
-    record is left out.
+    any_step: whether the FMU takes steps of any length. Where a delay is no whole number of samples, the
+    record gets rows between its own, in which that output alone is measured. What an output shows from before
+    the record is left out.
     """
     wanted = e.estimate.delay if e.estimate else {}
     for name in wanted:
