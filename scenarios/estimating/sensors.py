@@ -53,8 +53,8 @@ def check_noise(e: Experiment, o: Options) -> None:
             raise BadInput(f"{where} is none of [outputs]; {did_you_mean(name, e.outputs)}")
         if ESTIMATED in (noise.std, noise.time, noise.share) and not likelihood_says(o):
             raise BadInput(
-                f'{where}: noise is "{ESTIMATED}" by the likelihood of all samples, for which filter = '
-                f"'{o.filter}', gate or adapt does not allow; give numbers, or change these options"
+                f'{where}: "{ESTIMATED}" compares the likelihoods of all samples, which '
+                f"filter = '{o.filter}', gate or adapt does not allow; give numbers, or change these options"
             )
 
 
