@@ -51,10 +51,11 @@ def check_noise(e: Experiment, o: Options) -> None:
         where = f"{e.file}: [estimate.noise.{name}]"
         if name not in e.outputs:
             raise BadInput(f"{where} is none of [outputs]; {did_you_mean(name, e.outputs)}")
-        if ESTIMATED in (noise.std, noise.time, noise.share) and not likelihood_says(o):
+        open_ones = ESTIMATED in (noise.std, noise.time, noise.share) or e.outputs[name].noise_std is None
+        if open_ones and not likelihood_says(o):
             raise BadInput(
-                f'{where}: "{ESTIMATED}" compares the likelihoods of all samples, which '
-                f"filter = '{o.filter}', gate or adapt does not allow; give numbers, or change these options"
+                f"{where}: what is estimated of noise needs the likelihood of all samples, which filter = "
+                f"'{o.filter}', gate or adapt does not allow; give numbers and noise_std, or change these options"
             )
 
 
