@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.filters.history import Indices
 from estimator.record import Array, Record, Run
 from fmus.errors import BadInput, did_you_mean
 from scenarios.experiment.experiment import Experiment
@@ -62,6 +63,6 @@ def _with_rows_between(t: Array, shown: Array, tolerance: float) -> Array:
     return np.sort(np.concatenate([t, more]))
 
 
-def _nearest(t: Array, times: Array) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def _nearest(t: Array, times: Array) -> Indices:
     """Indices (n,) of the elements of t (N,) that are nearest to times (n,)."""
     return np.searchsorted((t[1:] + t[:-1]) / 2, times)

@@ -55,7 +55,7 @@ def check_noise(e: Experiment, o: Options) -> None:
         if open_ones and not likelihood_says(o):
             raise BadInput(
                 f"{where}: what is estimated of noise needs the likelihood of all samples, which filter = "
-                f"'{o.filter}', gate or adapt does not allow; give numbers and noise_std, or change these options"
+                f"'{o.filter}', gate or adapt does not allow; give numbers and noise_std, or change these"
             )
 
 
