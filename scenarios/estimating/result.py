@@ -255,7 +255,8 @@ def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: A
 
 def main_values(estimated: Mapping[str, Mapping[str, Any]]) -> str:
     """The estimated parameters, or all quantities if there are none, with errors and a remark at a bound."""
-    wanted = {n: e for n, e in estimated.items() if e["kind"] == "parameter"} or estimated
+    wanted = {n: e for n, e in estimated.items() if e["kind"] == "parameter"}
+    wanted = wanted or {n: e for n, e in estimated.items() if e["kind"] != "noise"}
     said = [_headed(n, e) for n, e in wanted.items()]
     return ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
 
