@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
+from typing import Any
 
 import numpy as np
 from scipy.special import expit, logit
@@ -109,7 +110,7 @@ def sought(e: Experiment, o: Options, record: Record, noise: Sequence[SensorNois
 
 def changed(noise: Sequence[SensorNoise], wanted: Sequence[Sought], at: Array) -> tuple[SensorNoise, ...]:
     """The noise with the sought quantities at coordinates (p,)."""
-    new: dict[str, dict[str, float]] = {n.output: {} for n in noise}
+    new: dict[str, dict[str, Any]] = {n.output: {} for n in noise}
     for s, coordinate in zip(wanted, at.tolist(), strict=True):
         new[s.output][s.what] = s.value(coordinate)
     return tuple(replace(n, **new[n.output]) for n in noise)

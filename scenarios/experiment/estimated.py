@@ -1,6 +1,6 @@
 """`[estimate]`: what the filter estimates, and how."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
@@ -40,7 +40,7 @@ class EstimatedInput(Table):
     rate_input: str | None = None
 
 
-ESTIMATED = "estimated"  # in place of a number that the record is to say
+ESTIMATED: Final = "estimated"  # in place of a number that the record is to say
 
 
 def _or_estimated(value: object) -> float | str:
