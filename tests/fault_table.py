@@ -24,9 +24,12 @@ from tests.scenarios import (
 FILE = Path(__file__).parents[1] / "docs" / "faults.md"
 HEAD = """# Faults that the tests try
 
-Written by `python -m tests.fault_table` from the cases of the tests. Misbehaving FMUs are compiled from
-[one C file](../tests/helpers/c/misbehaving.c). A fault in `late` is one in `fmi2DoStep` at t = 0.05 s. "All
-commands" are {commands}.
+Written by `python -m tests.fault_table` from the cases of the tests. The FMUs that misbehave are compiled
+from [one C file](../tests/helpers/c/misbehaving.c), in which the fault has the name that stands in backticks
+here. The word after "in" says in which call it happens: `load`, `instantiate` and so on up to `free`; a
+fault in `late` happens in `fmi2DoStep` at t = 0.05 s. "One line" and "one sentence" are printed on the error
+stream. "All commands" are
+{commands}.
 
 | fault | command | what happens | test |
 |---|---|---|---|

@@ -16,7 +16,7 @@ def export_scenario(
     out: Annotated[Path, typer.Option("--out", help="folder, or a file ending in .ssp")] = RESULTS
     / "export-ssp",
     kind: Annotated[str, typer.Option(help="kind of FMUs: native or python")] = "native",
-    variant: Annotated[str | None, typer.Option(help="variant of the scenario, by default the first")] = None,
+    variant: Annotated[str | None, typer.Option(help="variant to write; needed if there are several")] = None,
     fmi: Annotated[int, typer.Option(help="FMI version, 2 or 3; 3 is native")] = 2,
     platform: Annotated[
         list[str] | None, typer.Option(help="platforms of native FMUs; see railfmi build")

@@ -31,6 +31,7 @@ REAPER = 36  # of the call prctl: orphans among the descendants become children
 PAGE = 1 << 13  # bytes
 AGAIN = 0.05  # s, until an interrupt that was dropped comes again
 FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary files
+ROOMY = "/var/tmp"  # on a disk, as long arrays need (fmus/aside.py); the usual folder may lie in memory
 MEMORY_HINT = "; where memory runs out, the system does this"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress line hides
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -84,7 +85,7 @@ def supervised(command: Command, arguments: Sequence[str]) -> int:
     """
     if not hasattr(os, "fork"):
         return command(arguments)
-    place = Path(tempfile.gettempdir())
+    place = _place()
     remove_left(place, FOLDER)
     try:
         with passing_folder(place, FOLDER) as folder:
@@ -93,6 +94,11 @@ def supervised(command: Command, arguments: Sequence[str]) -> int:
         why = error.strerror or error
         _say(f"the command cannot be started ({why}); free space, or set TMPDIR to another folder")
         return FAILED
+
+
+def _place() -> Path:
+    """Where the folder for temporary files is made: where the user said, else on a disk if there is one."""
+    return Path(tempfile.gettempdir() if "TMPDIR" in os.environ or not os.access(ROOMY, os.W_OK) else ROOMY)
 
 
 def _watched(command: Command, arguments: Sequence[str], folder: Path) -> int:

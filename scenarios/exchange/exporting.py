@@ -74,7 +74,7 @@ def export_ssp(
     included. FMUs given as files are copied unchanged.
     variant: the variant to write, if the scenario has several.
     tell: called with lines on the progress, and on parts of the scenario that other tools cannot use.
-    The same scenario gives the same bytes, except for FMUs built by PythonFMU, which contain a date.
+    The same scenario gives the same bytes, unless a member is a PythonFMU source, whose FMU contains a date.
     Raises BadInput if the scenario is wrong.
     """
     read = load_scenario(scenario)
