@@ -137,7 +137,8 @@ class Shooting:
         """End less beginning (n,) in sizes of the states."""
         x, period, p = self._si(place)
         ends = self.flow.ends(x[None], np.array([p]), period, steps)[0]
-        return (ends - x) / self.flow.nominal
+        missed: Array = (ends - x) / self.flow.nominal
+        return missed
 
     def _slopes(self, place: Array, size: float, steps: int) -> Array:
         """Slopes (n, n + 2) of what is missed by states, period and parameter, by central differences."""
