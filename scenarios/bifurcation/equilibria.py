@@ -134,11 +134,17 @@ def _single(equilibria: Equilibria, low: Rest, high: Rest, deep: int) -> Iterato
 def _crossing(
     equilibria: Equilibria, finer: Equilibria, low: float, high: float, number: int, reach: float
 ) -> Crossing:
+    def growth(of: Equilibria, p: float) -> float:
+        return float(of.at(p).rates[number].real)
+
     def root(of: Equilibria, more: float = 0.0) -> float:
         begin, end = low - more * (high - low), high + more * (high - low)
-        return float(brentq(lambda p: of.at(p).rates[number].real, begin, end, xtol=SHARP * reach))
+        return float(brentq(lambda p: growth(of, p), begin, end, xtol=SHARP * reach))
 
-    at = root(equilibria)
+    try:
+        at = root(equilibria)
+    except ValueError:  # it is an end of the interval, where rounding decides about the sign
+        at = min((low, high), key=lambda p: abs(growth(equilibria, p)))
     try:
         error = abs(root(finer, AROUND) - at)
     except ValueError:  # with half the step it lies outside the interval
