@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -37,10 +38,10 @@ PATIENCE = 60.0  # s
 def runs(process):
     """Whether a process has not ended; one that nobody waits for has."""
     try:
-        with open(f"/proc/{process}/stat") as about:
-            return about.read().rpartition(")")[2].split()[0] != "Z"
+        about = Path(f"/proc/{process}/stat").read_text(errors="replace")
     except OSError:
         return False
+    return about.rpartition(")")[2].split()[0] != "Z"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what runs is read from /proc")
