@@ -72,7 +72,7 @@ def _values(given: Sequence[str]) -> dict[str, float]:
         try:
             values[name.strip()] = float(value)
         except ValueError:
-            raise BadInput(f"--set {text}: give NAME=VALUE, such as b_d=0") from None
+            raise BadInput(f"--set {text}: give NAME=VALUE, such as k=0") from None
         if not (equals and name.strip()):
-            raise BadInput(f"--set {text}: give NAME=VALUE, such as b_d=0")
+            raise BadInput(f"--set {text}: give NAME=VALUE, such as k=0")
     return values
