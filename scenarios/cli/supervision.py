@@ -12,9 +12,10 @@ import os
 import signal
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from threading import Timer, main_thread
+from threading import Thread, Timer, main_thread
 from types import FrameType
 from typing import NoReturn
 
@@ -30,6 +31,7 @@ DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
 REAPER = 36  # of the call prctl: orphans among the descendants become children
 PAGE = 1 << 13  # bytes
 AGAIN = 0.05  # s, until an interrupt that was dropped comes again
+LOOK = 1.0  # s, between looks of a worker at whether its command still runs
 FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary files
 ROOMY = "/var/tmp"  # on a disk, as long arrays need (fmus/aside.py); the usual folder may lie in memory
 MEMORY_HINT = "; where memory runs out, the system does this"
@@ -135,6 +137,29 @@ def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # what was asked for is done, and what is left is short
         os.write(tells, bytes([code]))
     sys.exit(code)
+
+
+@contextlib.contextmanager
+def workers_end_too() -> Iterator[None]:
+    """Workers that joblib starts for this command end with it, also where it is killed."""
+    from joblib import parallel_config  # takes a tenth of a second, which most commands do not need
+
+    with parallel_config("loky", initializer=_end_with, initargs=(os.getpid(),)):
+        yield
+
+
+def _end_with(command: int) -> None:
+    """Let this process end when its parent, by its number, has ended.
+
+    A worker waits for work at pipes whose other ends it holds itself, and so never finds them closed.
+    """
+
+    def watch() -> None:
+        while os.getppid() == command:
+            time.sleep(LOOK)
+        os._exit(FAILED)
+
+    Thread(target=watch, name="railfmi-command", daemon=True).start()
 
 
 @contextlib.contextmanager

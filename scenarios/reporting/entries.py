@@ -22,6 +22,7 @@ PAGES = (
     "report.html",
     "estimate.html",
     "conicity.html",
+    "bifurcation.html",
     "plan.html",
     "norm.html",
     "fleet.html",
@@ -163,6 +164,13 @@ def _conicity(t: Table) -> Said:
     return Said(f"{_both(t['wheel'])} on {_both(t['rail'])}", f"equivalent conicity {said}", "good")
 
 
+def _bifurcation(t: Table) -> Said:
+    critical = {name: t[f"{name}_critical"] for name in ("linear", "nonlinear")}
+    said = [f"{name} critical {t['parameter']} {v['value']:.4g}" for name, v in critical.items() if v]
+    name = f"{t['fmu']}, {t['parameter']} from {t['low']:g} to {t['high']:g}"
+    return Said(name, ", ".join(said) or "rest stays as it is over the range", "good")
+
+
 def _both(sides: Any) -> str:
     """A profile, or the two of unlike sides."""
     return " / ".join(dict.fromkeys(map(str, sides))) if isinstance(sides, list) else str(sides)
@@ -207,6 +215,7 @@ KINDS = (
     Kind("compare", frozenset({"a_sha256", "outputs"}), _compare),
     Kind("row", frozenset({"row", "findings"}), _row),
     Kind("conicity", frozenset({"wheel_found", "conicity"}), _conicity),
+    Kind("bifurcation", frozenset({"parameter", "crossings", "branches"}), _bifurcation),
     Kind("plan", frozenset({"visible", "classes"}), _plan),
     Kind("conicity-norm", frozenset({"step1", "reader"}), _norm),
     Kind("fleet", frozenset({"fleet", "drifts", "deviates"}), _fleet),

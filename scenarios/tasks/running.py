@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from secrets import token_hex
 from threading import Thread
@@ -38,7 +39,7 @@ except ImportError as missing:
 
 CONNECTING = 30  # s, to reach a scheduler
 FIRST_WORKER = 120  # s, until a scheduler has at least one worker
-CLOSING = 2  # s, for workers to end
+CLOSING, HURRY = 30, 2  # s, for workers to end; after an interrupt
 SHIPPED = "shipped"  # folder in that of a worker
 SETTINGS = {
     "distributed.worker.daemon": False,  # the FMUs of a worker run in processes of their own
@@ -230,16 +231,21 @@ def _client(crew: Crew) -> Iterator[Any]:
                 n_workers=crew.workers or cpu_count(), threads_per_worker=1, host="127.0.0.1",
                 dashboard_address="127.0.0.1:0", local_directory=folder, silence_logs="CRITICAL",
             )  # fmt: skip
-            stack.callback(_close, cluster)
+            stack.push(partial(_closed_at_the_end, cluster))
             client = Client(cluster, timeout=CONNECTING)
-            stack.callback(_close, client)
+            stack.push(partial(_closed_at_the_end, client))
         yield client
 
 
-def _close(part: Any) -> None:
+def _closed_at_the_end(part: Any, kind: type[BaseException] | None, *_: object) -> None:
+    """See _close; kind: of what ended the work, if it did not come to its end."""
+    _close(part, CLOSING if kind is None else HURRY)
+
+
+def _close(part: Any, patience: float = HURRY) -> None:
     """Close the client, or the workers and their scheduler."""
     with undisturbed(), suppress(TimeoutError):
-        part.close(timeout=CLOSING)
+        part.close(timeout=patience)
 
 
 def _reached(address: str, stack: ExitStack) -> Any:

@@ -13,7 +13,10 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 [BLOCK] = re.findall(r"```sh\n(.*?)```", README, re.S)
 COMMANDS = [shlex.split(line, comments=True)[1:] for line in BLOCK.splitlines()]
 # compiles, or takes minutes
-LONG = ("--platform", "--kind", "run", "export-ssp", "compare", "plan", "close-loop", "fleet", "campaign")
+LONG = (
+    "--platform", "--kind", "run", "bifurcation", "export-ssp", "compare", "plan", "close-loop", "fleet",
+    "campaign",
+)  # fmt: skip
 
 
 def expanded(arguments: list[str]) -> list[str]:

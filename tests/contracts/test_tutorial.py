@@ -62,6 +62,7 @@ def test_the_tutorial_comes_to_a_trial(begun):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(2400)  # it closes the loop twice, with an FMU in Python
 def test_the_tutorial_comes_to_the_right_answer(begun):
     folder, _ = begun
     said = follow(STEPS[ANSWER : ANSWER + 1], folder)

@@ -27,6 +27,10 @@ INPUTS = {  # by the name of a parameter, or of a command and its parameter
     "watching": str(SHIPPED / "watch"),
     "import-ssp.package": "results/bad.ssp",
     "folder": "results",
+    "bifurcation.parameter": "k",
+    "bifurcation.low": "1",
+    "bifurcation.high": "4",
+    "bifurcation.output": "y",
     "conicity.wheel": "S1002",
     "conicity.rail": "60E1",
     # what makes a command small, or lets it start other processes

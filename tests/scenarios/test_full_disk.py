@@ -23,6 +23,10 @@ CASES = {  # command, arguments, and at how many of its changes the disk fails
     "plan": (["plan", "experiment.toml"], 8),
     "close-loop": (["close-loop", "experiment.toml", "--jobs", "1"], 12),
     "row": (["row", "conicity_step"], 4),
+    "bifurcation": (
+        ["bifurcation", "bad.fmu", "--parameter", "k", "--from", "1", "--to", "4", "--output", "y"],
+        8,
+    ),
     "conicity-norm": (["conicity-norm", "--pair", "A", "--draws", "1"], 10),
     "fleet": (["fleet", "fleet.toml", "--workers", "2"], 8),
     "campaign": (["campaign", "campaign.toml", "--workers", "2"], 8),

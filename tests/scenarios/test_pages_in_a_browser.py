@@ -19,6 +19,7 @@ FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
     "--enable-logging=stderr", "--allow-file-access-from-files", "--virtual-time-budget=3000",
 )  # fmt: skip
+FORCED = "--parameter u --from 0.6 --to 1.2 --output x0 --set mu=0.3 --step 0.2"
 LARGEST = 4_000_000  # bytes
 # a frame has any width, which the window of a headless browser has not
 FRAME = """<body style="margin:0"><iframe src="{page}" style="border:0;width:{width}px;height:900px"></iframe>
@@ -59,7 +60,7 @@ def looked_at(page: Path, width: int, folder: Path) -> tuple[dict, list[str]]:
 
 
 @pytest.fixture(scope="module")
-def pages(demo: tuple[Result, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def pages(demo: tuple[Result, Path], vdp: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a page of every command that writes one, with the closed loop of the session."""
     out = tmp_path_factory.mktemp("pages")
     (out / "close-loop").symlink_to(demo[1])
@@ -69,6 +70,7 @@ def pages(demo: tuple[Result, Path], tmp_path_factory: pytest.TempPathFactory) -
         ("plan", str(shipped / "rig-drag")),
         ("conicity", "--wheel", "S1002", "--rail", "60E1"),
         ("conicity-norm", "--pair", "A", "--draws", "1"),
+        ("bifurcation", str(vdp), *FORCED.split()),
     ):
         assert run_safely([name, *more, "--out", str(out / name)]) == 0
     both = [str(shipped / name) for name in ("rig-drag", "rig-friction")]
@@ -81,7 +83,7 @@ def every_page() -> list[str]:
     """The pages by their place in the folder."""
     return [
         "close-loop/report.html", "estimate/estimate.html", "plan/plan.html", "conicity/conicity.html",
-        "conicity-norm/norm.html", "several/index.html", "summary.html",
+        "conicity-norm/norm.html", "bifurcation/bifurcation.html", "several/index.html", "summary.html",
     ]  # fmt: skip
 
 

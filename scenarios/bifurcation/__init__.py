@@ -1,0 +1,1 @@
+"""The command `bifurcation`: positions of rest and limit cycles of an FMU over one parameter."""
