@@ -57,6 +57,11 @@ class Dual(Estimator):
             raise BadInput(
                 f"[estimate.options] filter = '{cls.name}' does not support gate and adapt; leave them out"
             )
+        if joint.sensor_noise:
+            raise BadInput(
+                f"[estimate.options] filter = '{cls.name}' takes all but the states for constant, which "
+                "noise that is correlated in time is not; choose 'ukf', or leave out [estimate.noise]"
+            )
         return cls(joint, len(joint.states), start, joint.noise, asked.R, asked.dt, asked.spread)
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:

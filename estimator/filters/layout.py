@@ -21,8 +21,8 @@ from estimator.record import Array
 class Layout:
     """The order of values in x and in a row.
 
-    x: n states, coordinates of the parameters, states of the unknown inputs. Row: n states, other states,
-    parameters, known inputs, inputs that are driven by unknown inputs.
+    x: n states, coordinates of the parameters, states of the unknown inputs and of the sensors' noise. Row: n
+    states, other states, parameters, known inputs, inputs that are driven by unknown inputs.
     """
 
     n: int
@@ -39,8 +39,8 @@ class Layout:
     def rows(self, X: Array, u: Array, carried: Array, F: Array) -> tuple[Array, Array]:
         """Rows (k, width) for a step from X (k, n_x), and X after the step without the FMU's states.
 
-        u: (inputs,); carried: (others,); F: (n_w, n_w) transition of the states of the unknown inputs, which
-        act with the mean of their values at both ends.
+        u: (inputs,); carried: (others,); F: (n_w, n_w) transition of the states after the parameters; unknown
+        inputs act with the mean of their values at both ends.
         """
         values, after = np.empty((len(X), self.width)), np.empty(X.shape)
         fill(X, u, carried, F, self.n, *self.transforms, self.fed, values, after)

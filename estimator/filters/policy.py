@@ -64,6 +64,24 @@ class FilterPolicy(Limits):
         "largest process noise that the search tries",
         "derivation: three times the motion itself explains it by noise alone",
     )
+    noise_learnt: int = limit(
+        20_000,
+        "samples",
+        "first samples of the record from which noise of a sensor that is not declared is estimated",
+        "derivation: a variance from 20 000 samples is known to within a hundredth",
+    )
+    least_white: float = limit(
+        1e-3,
+        "share of the variance that correlated noise gains in a sample",
+        "smallest variance of the white noise beside it",
+        "derivation: innovations are then correlated by a thousandth, which shows in a million samples",
+    )
+    least_share: float = limit(
+        1e-3,
+        "share of the variance of a sensor's noise",
+        "smallest part that is correlated, and smallest part that is white, where this is estimated",
+        "convention: a part of 3 % of the noise's standard deviation is as good as none",
+    )
 
 
 POLICY = FilterPolicy()

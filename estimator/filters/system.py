@@ -17,6 +17,7 @@ from estimator.access.recipe import Way
 from estimator.filters.bounds import Transform
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.filters.layout import collect, layout
+from estimator.filters.sensor_noise import SensorNoise
 from estimator.filters.unknown_input import UnknownInput
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
@@ -62,9 +63,11 @@ class UnknownState:
 class Joint:
     """A System (see estimator.filters.estimator) that simulates an FMU.
 
-    x = states, coordinates of the parameters (`transform`), states of the unknown inputs; y = outputs. The
-    other states of the FMU are not estimated; they follow the mean. Close the object after use.
-    way: an access to use instead of the one that the probe chooses; compiled: False avoids numba.
+    x = states, coordinates of the parameters (`transform`), states of the unknown inputs, noise of sensors
+    that is correlated in time; y = outputs with this noise. The other states of the FMU are not estimated;
+    they follow the mean. Close the object after use.
+    way: an access to use instead of the one that the probe chooses; compiled: False avoids numba;
+    sensor_noise: of outputs, correlated in time.
     """
 
     def __init__(
@@ -80,15 +83,17 @@ class Joint:
         t0: float = 0.0,
         way: Way | None = None,
         compiled: bool = True,
+        sensor_noise: Sequence[SensorNoise] = (),
     ) -> None:
         self._stack = ExitStack()
         self._steps: dict[float, tuple[Array, Array]] = {}
         self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
         self.outputs, self.inputs = tuple(outputs), tuple(inputs)
         self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
+        self.sensor_noise = tuple(sensor_noise)
         fed = [n for w in unknown for n in w.feeds]
         mine = [s.name for s in states]
-        self.names = (*mine, *(p.name for p in parameters), *(n for w in unknown for n in w.states))
+        self.names = (*mine, *(p.name for p in parameters), *(n for w in self._shaped for n in w.states))
         known = self.archive.description.states or continuous_states(self.archive)
         self.others = tuple(n for n in known if n not in mine)
         self._constants = dict(constants or {})
@@ -106,14 +111,18 @@ class Joint:
         """The prior estimate before the first sample at t."""
         x = [*(s.start for s in self.states), *(p.z for p in self.parameters)]
         variance = [*(s.std**2 for s in self.states), *(p.in_z(p.std) ** 2 for p in self.parameters)]
-        for w in self.unknown:
+        for w in self._shaped:
             x += [0.0] * len(w.states)
             variance += w.variance.tolist()
         return Estimate(t, np.array(x), np.diag(variance), carried=self._first_carried)
 
-    def set_noise(self, noise: Sequence[float]) -> None:
-        """Drive the states by this process noise, unit/sqrt(s), in their order, in place of what they had."""
+    def set_noise(self, noise: Sequence[float], sensor_noise: Sequence[SensorNoise] | None = None) -> None:
+        """Drive the states by this process noise, unit/sqrt(s), in their order, in place of what they had.
+
+        sensor_noise: of the same outputs as before; None leaves it as it is.
+        """
         self.states = tuple(replace(s, noise=x) for s, x in zip(self.states, noise, strict=True))
+        self.sensor_noise = self.sensor_noise if sensor_noise is None else tuple(sensor_noise)
         self._steps.clear()
 
     def set_walks(self, parameters: Sequence[UnknownParameter]) -> None:
@@ -121,6 +130,11 @@ class Joint:
         walks = {p.name: p.walk for p in parameters}
         self.parameters = tuple(replace(p, walk=walks[p.name]) for p in self.parameters)
         self._steps.clear()
+
+    @property
+    def _shaped(self) -> tuple[UnknownInput | SensorNoise, ...]:
+        """The random processes whose states follow those of the FMU and the parameters in x."""
+        return (*self.unknown, *self.sensor_noise)
 
     def noise(self, dt: float) -> Array:
         """Process noise covariance (n, n) of a step of dt [s]."""
@@ -141,16 +155,17 @@ class Joint:
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """See System; the FMU is evaluated only if an output is not a state."""
         if self._direct is not None:
-            return X[:, self._direct]
-        values = self.rows(X, u, carried)
-        return self._asked(self.copies.evaluate, values, t)[:, self._seen]
+            seen = X[:, self._direct]
+        else:
+            seen = self._asked(self.copies.evaluate, self.rows(X, u, carried), t)[:, self._seen]
+        return seen + X[:, -len(self._adds) :] @ self._adds if len(self._adds) else seen
 
     def rows(self, X: Array, u: Array, carried: Array) -> Array:
         """Values to set in the FMU for each row (k, n) of X, with the present unknown inputs, (k, n_put)."""
         return self.layout.rows(X, u, carried, self._still)[0]
 
     def transition(self, dt: float) -> Array:
-        """Transition matrix of the states of the unknown inputs over dt [s], (n_w, n_w)."""
+        """Transition matrix of the states of unknown inputs and sensor noise over dt [s], (n_w, n_w)."""
         return self._over(dt)[0]
 
     def settled(self, x: Array) -> Array:
@@ -208,7 +223,7 @@ class Joint:
         self.close()
 
     def _over(self, dt: float) -> tuple[Array, Array]:
-        """Transition matrix of the unknown inputs and process noise covariance over dt, cached."""
+        """Transition matrix of the random processes and process noise covariance over dt, cached."""
         if dt not in self._steps:
             if len(self._steps) >= KEPT:
                 self._steps.clear()
@@ -217,7 +232,7 @@ class Joint:
 
     def _worked_out(self, dt: float) -> tuple[Array, Array]:
         walks = np.array([*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)])
-        shaped = [w.discrete(dt) for w in self.unknown]
+        shaped = [w.discrete(dt) for w in self._shaped]
         F = block_diag(*(F for F, _ in shaped)) if shaped else np.empty((0, 0))
         Q = block_diag(np.diag(walks**2 * dt), *(Q for _, Q in shaped))
         return np.ascontiguousarray(F, dtype=float), np.ascontiguousarray(Q, dtype=float)
@@ -229,6 +244,7 @@ class Joint:
         self._clipped = [(i, t) for i, t in enumerate(transforms, n) if t.kind == "clip"]
         self._still = np.eye(len(self.names) - n - len(transforms))
         self._seen = [get.index(name) for name in self.outputs]
+        self._adds = np.array([[float(n.output == o) for o in self.outputs] for n in self.sensor_noise])
         self._direct: slice | list[int] | None = None
         if all(i < n for i in self._seen):
             row = self._seen == list(range(len(self._seen)))

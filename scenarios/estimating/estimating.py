@@ -35,8 +35,10 @@ from scenarios.estimating.result import (
     innovations,
     nis,
     passes,
+    sensor_noise,
     write_csv,
 )
+from scenarios.estimating.sensors import TIME
 from scenarios.estimating.setup import set_up
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.estimated import Options
@@ -150,16 +152,28 @@ def _notes(found: Findings) -> list[str]:
             for a, b, c in found.after.alike
         ]
     notes += _notes_on_form(found)
-    undeclared = [
-        o for o, known in zip(found.setup.outputs, found.setup.declared_noise, strict=True) if not known
-    ]
-    notes += [
-        f"the noise of '{o}' was not declared; it was estimated from the roughness of the measurements"
-        for o in undeclared
-    ]
+    notes += _notes_on_noise(found)
     if found.joint.others:
         notes.append(f"states that are simulated, not estimated: {', '.join(found.joint.others)}")
     return notes
+
+
+def _notes_on_noise(found: Findings) -> Iterator[str]:
+    """How the noise of each output was found that was not declared, or was to be estimated."""
+    s = found.setup
+    for n in s.sensors:
+        wanted = {w.what for w in s.sought if w.output == n.output}
+        declared = s.experiment.outputs[n.output].noise_std is not None
+        lead = f"the noise of '{n.output}' was " + ("to be estimated" if declared else "not declared")
+        bands = s.bands.get(n.output, {})
+        said = [
+            f"{what} {getattr(n, what):.3g} ({low:.3g} to {high:.3g}{' s' if what == TIME else ''})"
+            for what, (low, high) in bands.items()
+        ]
+        if said:
+            yield f"{lead}; the likelihood of the record is largest with {', '.join(said)}"
+        elif not declared or wanted:
+            yield f"{lead}; it was estimated from the roughness of the measurements"
 
 
 def _notes_on_form(found: Findings) -> Iterator[str]:
@@ -199,6 +213,7 @@ def result_of(
         log_likelihood=h.log_likelihood,
         identifiability=identified(found.before, found.after),
         alarms=alarms(joint, h, s.options),
+        sensor_noise=sensor_noise(s.sensors, s.bands),
         process_noise={state.name: state.noise for state in joint.states},
         process_noise_share=found.share,
         access=access.sentence,

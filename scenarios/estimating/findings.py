@@ -5,26 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.filters import filters
-from estimator.filters.estimator import (
-    Adaptation,
-    Diverged,
-    Estimate,
-    Gate,
-)
-from estimator.filters.history import History, Samples, Steps, filtered
+from estimator.filters.estimator import Diverged
+from estimator.filters.history import History, Samples, filtered
 from estimator.filters.identifiability import (
     Identifiability,
     afterwards,
     before,
     information,
 )
-from estimator.filters.named import Request
-from estimator.filters.policy import POLICY as OF_FILTER
-from estimator.filters.process_noise import likeliest
+from estimator.filters.sensor_noise import whitened
 from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
-from estimator.filters.ukf import Spread
 from estimator.record import Array
 from fmus.aside import all_set_aside
 from fmus.host.archive import Archive
@@ -38,9 +29,9 @@ from scenarios.estimating.form import (
     wandering,
     widened,
 )
+from scenarios.estimating.likelihood import filter_of, likelihood_of, noise_share, with_noise
 from scenarios.estimating.policy import POLICY
 from scenarios.estimating.setup import Setup, finely
-from scenarios.experiment.estimated import Options
 
 Tell = Callable[[str], None]
 
@@ -113,8 +104,9 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
         if keep:
             history = _smoothed(history)
         value, std = all_set_aside(joint.values(history.x, history.std))
-        unknown = len(joint.names) - len(s.states)
-        learnt = afterwards(joint.names, start.P, history.last.P, unknown) if unknown else None
+        n = len(joint.names) - len(joint.sensor_noise)
+        unknown, P0, P = n - len(s.states), start.P[:n, :n], history.last.P[:n, :n]
+        learnt = afterwards(joint.names[:n], P0, P, unknown) if unknown else None
     except BaseException:
         joint.close()
         raise
@@ -124,9 +116,12 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
 def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
     """The setup with what its record says before the filter begins, and the share of motion that is noise."""
     share = None
-    if set(s.options.process_std) < {state.name for state in s.states}:
+    if s.sought:
+        tell("finding the noise of the sensors and of the states' motion")
+        s, share = with_noise(s, archive)
+    elif s.moving:
         tell("finding how much of the states' motion is noise")
-        share = _noise_share(s, archive)
+        share = noise_share(s, archive)
     if s.form:
         tell("learning where the parameters of the model's form begin")
         s = _begun_again(s, archive, share or 0.0)
@@ -155,11 +150,11 @@ def _wandering(s: Setup, archive: Archive, share: float) -> Setup:
     """
     first, names = _learnt_from(s), [name for name in s.asked if name not in s.options.walk]
 
-    with s.joint(archive, share) as joint:  # one for all, as in _noise_share
+    with s.joint(archive, share) as joint:  # one for all, as in noise_share
 
         def log_likelihood(size: float) -> float:
             joint.set_walks(wandering(s.parameters, names, size))
-            return _log_likelihood(s, joint, first)
+            return likelihood_of(s, joint, first)
 
         size = largest_wandering(log_likelihood)
     return replace(s, parameters=wandering(s.parameters, names, size))
@@ -168,42 +163,6 @@ def _wandering(s: Setup, archive: Archive, share: float) -> Setup:
 def _learnt_from(s: Setup) -> Samples:
     """The beginning of the record, from which a filter with an open form learns where to begin."""
     return s.samples.first(int(np.searchsorted(s.samples.t, s.samples.t[0] + POLICY.learnt)))
-
-
-def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
-    """The filter that the options ask for."""
-    asked = request(s.options, s.noise, s.samples.step, s.samples.u[0])
-    return filters()[s.options.filter].of(joint, start, asked)
-
-
-def request(o: Options, noise: Array, dt: float, u: Array) -> Request:
-    """What the options ask of a filter; noise: (m,) standard deviations; u: (n_u,) first inputs."""
-    gate = None if o.gate is None else Gate(o.gate)
-    adapt = (
-        Adaptation(measurement="measurement" in o.adapt, process="process" in o.adapt) if o.adapt else None
-    )
-    return Request(np.diag(noise**2), dt, u, gate, adapt, Spread(o.alpha, o.beta, o.kappa))
-
-
-def _noise_share(s: Setup, archive: Archive) -> float:
-    """By maximum likelihood over the first samples."""
-    first = s.samples.first(OF_FILTER.noise_samples)
-    with s.joint(archive, 0.0) as joint:  # one for all, since the ways into the FMU are tried out for each
-
-        def log_likelihood(part: float) -> float:
-            joint.set_noise(s.noise_of(part))
-            return _log_likelihood(s, joint, first)
-
-        return likeliest(log_likelihood)
-
-
-def _log_likelihood(s: Setup, joint: Joint, samples: Samples) -> float:
-    """Of samples, by the filter of a setup and its joint system; -inf if it diverges."""
-    try:
-        found = filtered(filter_of(s, joint, joint.start(float(samples.t[0]))), samples)
-    except Diverged:
-        return -np.inf
-    return -np.inf if found.broken else found.log_likelihood
 
 
 def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:
@@ -223,10 +182,11 @@ def _before(s: Setup, archive: Archive, joint: Joint) -> Identifiability | None:
                 values[p.name] = float(p.transform.theta(coordinate))
             y = fmu.simulate(t, inputs, s.outputs, {**s.constants, **values}, every=parts)
             y[~np.isfinite(s.samples.y)] = np.nan
-            return y
+            return whitened(y, s.samples.steps, s.sensors)
 
         try:
-            return before(names, information(simulate, z, std, s.noise), std, len(s.parameters))
+            found = information(simulate, z, std, np.ones(len(s.outputs)))
+            return before(names, found, std, len(s.parameters))
         except FmuError:
             return None
 
@@ -269,7 +229,7 @@ def standings(found: Findings) -> dict[str, Standing]:
     first = joint.values(begun.x[None], std[None])[0][0].tolist()
     last, error = (of[0].tolist() for of in joint.values(h.x[-1:], h.std[-1:]))
     ended: dict[str, Standing] = {}
-    for i, name in enumerate(h.names[n:], n):
+    for i, name in enumerate(h.names[n : len(h.names) - len(joint.sensor_noise)], n):
         moved = bool(abs(h.x[-1, i] - begun.x[i]) > POLICY.moved * std[i])
         p = joint.parameters[i - n] if i - n < len(joint.parameters) else None
         side, bound = _at_bound(p, last[i], error[i]) if p and moved else ("", np.nan)

@@ -22,6 +22,7 @@ from scenarios.estimating.page_figures import band_plots, correlation_plots, inn
 from scenarios.estimating.result import EstimateResult, main_values
 
 HERE = Path(__file__).parent
+MEANING = {"input": "rate of the input in the row above", "noise": "noise of the sensor that is correlated"}
 WAYS = {way.name.lower(): way.words for way in Way}
 Row = dict[str, Any]
 Truth = Mapping[str, tuple[Array, Array]]
@@ -67,9 +68,7 @@ def quantities(found: Findings, result: EstimateResult) -> Iterator[Row]:
         yield {
             "name": name,
             "kind": e["kind"],
-            "meaning": variables[name].description
-            if name in variables
-            else "rate of the input in the row above",
+            "meaning": variables[name].description if name in variables else MEANING[e["kind"]],
             "value": with_error(e["value"], e["std_error"]),
             "unit": unit(e["unit"]),
             "band": " to ".join(short(v, _digits(v, e["std_error"])) for v in (low, high)),
@@ -85,13 +84,23 @@ def channels(result: EstimateResult) -> Iterator[Row]:
         gated = c["gated_share"]
         yield {
             "name": name,
-            "noise": _number(c["noise"]),
+            "noise": _noise(result.sensor_noise[name]),
             "rms": _number(c["rms_over_expected"]),
             "mean": _number(c["mean_over_expected"]),
             "correlation": f"{_number(c['largest_correlation'])} ({_number(c['white_below'])})",
             "p": _number(c["p_white"]),
             "gated": NOTHING if gated is None else percent(gated),
         }
+
+
+def _noise(of: Mapping[str, Any]) -> str:
+    """The noise of an output, with the 95 % bands of what was estimated of it."""
+    said = {what: short(of[what], 3) for what in ("std", "share", "time") if of[what] is not None}
+    for what, band in of["band_95"].items():
+        said[what] += f" ({' to '.join(short(end, 3) for end in band)})"
+    if of["time"] is None:
+        return said["std"]
+    return f"{said['std']}, share {said['share']} of the variance correlated over {said['time']} s"
 
 
 def checked(result: EstimateResult) -> Iterator[Row]:

@@ -1,7 +1,7 @@
 """The result of estimate, as it is written to result.json and estimate.csv."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,12 +20,14 @@ from estimator.filters.consistency import (
 from estimator.filters.history import History
 from estimator.filters.identifiability import Identifiability
 from estimator.filters.policy import POLICY as OF_FILTER
+from estimator.filters.sensor_noise import SensorNoise
 from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.aside import blocks, let_go
 from scenarios.drawing.typography import quantity, with_error
 from scenarios.estimating.alarms import Raised
 from scenarios.estimating.policy import POLICY
+from scenarios.estimating.setup import Bands
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
@@ -42,6 +44,8 @@ class EstimateResult(Shown):
     innovations: by output, the noise, the rms over its expected value (1 if model and noise are right), the
     largest correlation, the p value of whiteness, and the share of measurements rejected by the gate.
     checks: the consistency tests of the filter; consistent: whether it passes all of them.
+    sensor_noise: by output, the standard deviation of its noise, the share of its variance that is correlated
+    and over what time, s, with the 95 % bands of what was estimated of it.
     rms_error: errors of the estimates, only if true values were given.
     """
 
@@ -55,6 +59,7 @@ class EstimateResult(Shown):
     log_likelihood: float
     identifiability: dict[str, Any]
     alarms: list[Raised]
+    sensor_noise: dict[str, dict[str, Any]]
     process_noise: dict[str, float]
     process_noise_share: float | None
     access: str
@@ -153,15 +158,18 @@ def estimated(
         return {}
     kinds = ["state"] * len(joint.states)
     kinds += ["form" if p.name in form else "parameter" for p in joint.parameters]
-    kinds += ["input"] * (len(h.names) - len(kinds))
+    kinds += ["input"] * (len(h.names) - len(kinds) - len(joint.sensor_noise))
+    kinds += ["noise"] * len(joint.sensor_noise)
     value, std = joint.values(h.x[-1:], h.std[-1:])
     low, high = (joint.values(h.x[-1:] + s * BAND * h.std[-1:], h.std[-1:])[0][0] for s in (-1, 1))
     variables = joint.archive.description.variables
+    unit = {n: v.unit for n, v in variables.items()}
+    unit |= {name: unit[n.output] for n in joint.sensor_noise for name in n.states}
     believed = {p.name: [p.start, p.std] for p in joint.parameters if not p.walk and p.name not in form}
     return {
         name: {
             "kind": kind,
-            "unit": variables[name].unit if name in variables else None,
+            "unit": unit.get(name),
             "value": float(value[0, i]),
             "std_error": float(std[0, i]),
             "band_95": [float(low[i]), float(high[i])],
@@ -190,6 +198,17 @@ def innovations(h: History, outputs: tuple[str, ...], noise: Array) -> dict[str,
             "gated_share": finite(float(h.gated[:, j].sum()) / len(seen) if len(seen) else np.nan),
         }
     return found
+
+
+def sensor_noise(sensors: Sequence[SensorNoise], bands: Bands) -> dict[str, dict[str, Any]]:
+    """The noise of each output that the filter assumed; bands: of what was estimated of it, by output."""
+    return {
+        n.output: {
+            "std": n.std, "share": n.share, "time": n.time if n.share else None,
+            "band_95": {what: list(band) for what, band in bands.get(n.output, {}).items()},
+        }
+        for n in sensors
+    }  # fmt: skip
 
 
 def nis(h: History) -> dict[str, float | None]:
@@ -236,7 +255,8 @@ def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: A
 
 def main_values(estimated: Mapping[str, Mapping[str, Any]]) -> str:
     """The estimated parameters, or all quantities if there are none, with errors and a remark at a bound."""
-    wanted = {n: e for n, e in estimated.items() if e["kind"] == "parameter"} or estimated
+    wanted = {n: e for n, e in estimated.items() if e["kind"] == "parameter"}
+    wanted = wanted or {n: e for n, e in estimated.items() if e["kind"] != "noise"}
     said = [_headed(n, e) for n, e in wanted.items()]
     return ", ".join(said[:4]) + (", …" if len(said) > 4 else "")
 

@@ -1,7 +1,7 @@
 """Prepare the system of a filter from an experiment: samples, unknowns, noise."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -11,9 +11,9 @@ from estimator.access.recipe import Way
 from estimator.filters.history import Samples, samples
 from estimator.filters.observability import needed
 from estimator.filters.process_noise import motion
+from estimator.filters.sensor_noise import SensorNoise, correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.unknown_input import UnknownInput
-from estimator.noise import white_noise
 from estimator.record import Array, Record
 from fmus.aside import mean_square, set_aside
 from fmus.errors import BadInput, did_you_mean
@@ -21,8 +21,10 @@ from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from fmus.model import declared
 from fmus.models import model_class
+from scenarios.estimating.delays import undelayed
 from scenarios.estimating.form import choices, parameters_of_form
 from scenarios.estimating.policy import POLICY
+from scenarios.estimating.sensors import Sought, check_noise, noise_of, sought
 from scenarios.estimating.unknowns import (
     check_options,
     inputs_of,
@@ -34,6 +36,7 @@ from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
 MOST_PARTS = 16  # largest number of parts of a step
+Bands = Mapping[str, Mapping[str, tuple[float, float]]]
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class Setup:
     experiment: Experiment
     options: Options
     samples: Samples
-    noise: Array  # (m,) standard deviations of the measurement noise
-    declared_noise: tuple[bool, ...]
+    sensors: tuple[SensorNoise, ...]  # noise of each output
+    sought: tuple[Sought, ...]  # what of it the record is to say
     constants: dict[str, float]
     states: tuple[UnknownState, ...]
     parameters: tuple[UnknownParameter, ...]
@@ -58,11 +61,31 @@ class Setup:
     free_run: Array  # (N, m) outputs simulated with the start values, nan where it fails
     form: tuple[str, ...] = ()  # parameters that stand for what the model's form leaves open
     choices: tuple[dict[str, float], ...] = ({},)  # of the form, each a set of constants
+    bands: Bands = field(default_factory=dict)  # 95 % bands of what was sought, by output
 
     @property
     def asked(self) -> list[str]:
         """Names of the unknown parameters without those of the form."""
         return [p.name for p in self.parameters if p.name not in self.form]
+
+    @property
+    def noise(self) -> Array:
+        """Standard deviation of each output's noise (m,), of its white and its correlated part together."""
+        return np.array([n.std for n in self.sensors])
+
+    @property
+    def moving(self) -> bool:
+        """Whether the share of the states' motion that is noise is to be found, for want of declarations."""
+        return set(self.options.process_std) < {state.name for state in self.states}
+
+    def sensing(self, sensors: tuple[SensorNoise, ...]) -> "Setup":
+        """The same with other noise of the sensors, which leaves the start of a measured state no surer."""
+        least = {n.output: POLICY.measured_start * n.std for n in sensors}
+        states = tuple(
+            s if s.name in self.options.initial_std else replace(s, std=max(s.std, least.get(s.name, 0.0)))
+            for s in self.states
+        )
+        return replace(self, sensors=sensors, states=states)
 
     def chosen(self, choice: Mapping[str, float]) -> "Setup":
         """The same with one choice of the form."""
@@ -82,15 +105,17 @@ class Setup:
         s = self.samples
         return Joint(
             archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,
-            dt=s.step, t0=float(s.t[0]),
+            dt=s.step, t0=float(s.t[0]), sensor_noise=correlated(self.sensors),
         )  # fmt: skip
 
 
 def set_up(e: Experiment, options: Options, record: Record, archive: Archive) -> Setup:
     """All that the filter needs before its first sample; raises BadInput for wrong names or values."""
     d = archive.description
-    run = record.runs[0]
     check_options(e, options, d)
+    check_noise(e, options)
+    record = undelayed(e, record, d.variable_step)
+    run = record.runs[0]
     every = 1
     if e.estimate and e.estimate.rate:
         every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
@@ -100,7 +125,8 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
             f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher rate"
         )
     _check_measured(e, record, s)
-    noise = noise_of(record)
+    sensors = noise_of(e, record, s.step)
+    noise = np.array([n.std for n in sensors])
     constants = {**e.parameters, **e.initial}
     parameters = tuple(parameters_of(e, options, d))
     form = tuple(parameters_of_form(e, options, d, [p.name for p in parameters]))
@@ -113,7 +139,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     s, run_of = _fine_enough(archive, values, record, states, noise, every, options.input_parts)
     nominal = np.array([usual(d.variables[n], constants.get(n)) for n in states])
     return Setup(
-        e, options, s, noise, tuple(np.isfinite(record.noise_std)), constants,
+        e, options, s, sensors, sought(e, options, record, sensors), constants,
         tuple(states_of(e, options, d, record, noise, states)), (*parameters, *form), unknown,
         motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
         record.inputs, record.outputs, run_of[:, : len(record.outputs)], tuple(p.name for p in form),
@@ -154,16 +180,6 @@ def with_alarms(e: Experiment, options: Options) -> Options:
         if v.alarm_below is not None or v.alarm_above is not None
     }
     return options.model_copy(update={"alarms": alarms})
-
-
-def noise_of(record: Record) -> Array:
-    """Standard deviation of each output's noise (m,), as declared or estimated from third differences."""
-    found = record.noise_std.copy()
-    for j in np.flatnonzero(np.isnan(found)):
-        seen = record.runs[0].y[:, j]
-        seen = seen[np.isfinite(seen)]
-        found[j] = max(white_noise([seen]), 1e-9 * float(np.std(seen)), 1e-300)
-    return found
 
 
 def _needed(archive: Archive, values: Mapping[str, float], s: Samples, record: Record) -> tuple[str, ...]:

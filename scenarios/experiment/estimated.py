@@ -1,10 +1,10 @@
 """`[estimate]`: what the filter estimates, and how."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
-from scenarios.experiment.table import Interval, NotNegative, Number, Positive, Share, Table
+from scenarios.experiment.table import Interval, NotNegative, Number, Positive, Share, Table, is_number
 
 
 def _filter(value: object) -> str:
@@ -38,6 +38,42 @@ class EstimatedInput(Table):
     std: Positive
     frequency: Positive
     rate_input: str | None = None
+
+
+ESTIMATED: Final = "estimated"  # in place of a number that the record is to say
+
+
+def _or_estimated(value: object) -> float | str:
+    if value == ESTIMATED:
+        return ESTIMATED
+    if is_number(value) and isinstance(value, int | float) and value > 0:
+        return float(value)
+    raise ValueError(f'must be a number above 0, or "{ESTIMATED}", not {value!r}')
+
+
+OrEstimated = Annotated[float | str, PlainValidator(_or_estimated)]
+
+
+class OutputNoise(Table):
+    """Noise of an output, beside its noise_std. What is "estimated" is what makes the record likeliest.
+
+    std: "estimated" where noise_std is uncertain; time: s, over which the correlation of the noise falls to
+    1/e; share: of its variance that is correlated in time, the rest of which is white.
+    """
+
+    std: Literal["estimated"] | None = None
+    time: OrEstimated | None = None
+    share: OrEstimated = 1.0
+
+    @model_validator(mode="after")
+    def _says_what_is_correlated(self) -> Self:
+        if self.time is None and "share" in self.model_fields_set:
+            raise ValueError(f'has a share but no time of correlation; add time = ... in s, or "{ESTIMATED}"')
+        if self.time is None and self.std is None:
+            raise ValueError(f'says nothing; add time = ... in s, or std = "{ESTIMATED}"')
+        if isinstance(self.share, float) and self.share > 1:
+            raise ValueError(f"share {self.share:g} is above 1; it is a part of the noise's variance")
+        return self
 
 
 class Alarm(Table):
@@ -83,10 +119,15 @@ class Options(Table):
 
 
 class Estimate(Table):
-    """What the filter estimates beside the states it needs anyway, and how; `rate` in Hz."""
+    """What the filter estimates beside the states it needs anyway, and how; `rate` in Hz.
+
+    delay: by output, how much later than the motion that it shows it is measured, s.
+    """
 
     parameters: dict[str, EstimatedParameter] = Field(default_factory=dict)
     states: tuple[str, ...] = ()
     rate: Positive | None = None
     inputs: dict[str, EstimatedInput] = Field(default_factory=dict)
+    noise: dict[str, OutputNoise] = Field(default_factory=dict)
+    delay: dict[str, Positive] = Field(default_factory=dict)
     options: Options = Options()

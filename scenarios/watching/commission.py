@@ -9,6 +9,7 @@ from estimator.filters.bounds import Transform
 from estimator.filters.carried import Carried, begun_again
 from estimator.filters.estimator import Estimate
 from estimator.filters.history import Steps
+from estimator.filters.sensor_noise import SensorNoise, correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.unknown_input import Shaped, UnknownInput, Wandering
 from estimator.monitoring.directions import FORCE, GAIN, PARAMETER, Effect, Tried
@@ -16,7 +17,8 @@ from estimator.record import Array, Record, Run
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription
-from scenarios.estimating.findings import Tell, prepared, request
+from scenarios.estimating.findings import Tell, prepared
+from scenarios.estimating.likelihood import request
 from scenarios.estimating.setup import Setup, set_up
 from scenarios.estimating.unknowns import states_of, usual
 from scenarios.experiment.experiment import Experiment
@@ -27,7 +29,7 @@ class Commissioned:
     """The numbers that a filter is made of; a codec can write them, so that a restart makes the same one.
 
     states: with their process noise; usual: s between the samples that are used, one in `every`; parts: in
-    which inputs act over a step; u: (n_u,) inputs of a first sample; noise: (m,) of the outputs.
+    which inputs act over a step; u: (n_u,) inputs of a first sample; sensors: noise of each output.
     """
 
     states: tuple[UnknownState, ...]
@@ -36,15 +38,20 @@ class Commissioned:
     constants: dict[str, float]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    noise: Array
+    sensors: tuple[SensorNoise, ...]
     u: Array
     t0: float
     usual: float
     every: int
     parts: int
 
+    @property
+    def noise(self) -> Array:
+        """Standard deviations of the outputs' noise (m,)."""
+        return np.array([n.std for n in self.sensors])
 
-KEPT = (Commissioned, UnknownState, UnknownParameter, Transform, Shaped, Wandering)
+
+KEPT = (Commissioned, UnknownState, UnknownParameter, Transform, Shaped, Wandering, SensorNoise)
 
 
 def commissioned(e: Experiment, archive: Archive, record: Record, tell: Tell) -> Commissioned:
@@ -54,6 +61,8 @@ def commissioned(e: Experiment, archive: Archive, record: Record, tell: Tell) ->
     options = e.estimate.options
     if options.smooth:
         raise BadInput(f"{e.file}: [estimate.options] smooth needs a whole record; leave it out for a stream")
+    if e.estimate.delay:
+        raise BadInput(f"{e.file}: [estimate.delay] needs a whole record; leave it out for a stream")
     setup = set_up(e, options, record, archive)
     if len(setup.choices) > 1:
         names = ", ".join(setup.choices[0])
@@ -73,7 +82,7 @@ def _numbers(s: Setup, share: float, record: Record) -> Commissioned:
     )
     every = max(1, round(s.samples.step / record.runs[0].sample))
     return Commissioned(
-        states, s.parameters, s.unknown, s.constants, s.inputs, s.outputs, s.noise, s.samples.u[0],
+        states, s.parameters, s.unknown, s.constants, s.inputs, s.outputs, s.sensors, s.samples.u[0],
         float(s.samples.t[0]), s.samples.step, every, s.samples.held.shape[1],
     )  # fmt: skip
 
@@ -90,7 +99,7 @@ class Making:
         c = self._c
         return Joint(
             self._archive, c.outputs, c.states, c.parameters, c.unknown, inputs, c.constants,
-            dt=c.usual, t0=c.t0,
+            dt=c.usual, t0=c.t0, sensor_noise=correlated(c.sensors),
         )  # fmt: skip
 
     def carried(self) -> Carried:
@@ -98,7 +107,7 @@ class Making:
         options = self._e.estimate.options if self._e.estimate else None
         if options is None:
             raise ValueError("a filter needs the options of an experiment")
-        asked, kind = request(options, self._c.noise, self._c.usual, self._c.u), filters()[options.filter]
+        asked, kind = request(options, self._c.sensors, self._c.usual, self._c.u), filters()[options.filter]
         if not kind.moments:
             raise BadInput(
                 f"{self._e.file}: [estimate.options] filter = '{options.filter}' knows more than mean and "

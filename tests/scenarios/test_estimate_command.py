@@ -41,11 +41,13 @@ parameters.r_w = {start = 0.348, std = 0.002}
 """
 
 
-def write_vdp(folder, fmu, names=("x0", "mu"), unit="m", text="", n=400):
+def write_vdp(folder, fmu, names=("x0", "mu"), unit="m", text="", n=400, noise=NOISE, delay=0.0):
     rng = np.random.default_rng(3)
     t = 0.05 * np.arange(n)
     u = np.sin(0.7 * t)
-    x = solved(t, (u[1:] + u[:-1]) / 2, MU)[:, 0] + NOISE * rng.standard_normal(n)
+    x = solved(t, (u[1:] + u[:-1]) / 2, MU)[:, 0]
+    x = np.interp(t - delay, t, x) if delay else x
+    x = x + noise * rng.standard_normal(n)
     np.savetxt(folder / "data.csv", np.column_stack([t, u, x]), delimiter=",", header="t,u,x", comments="")
     file = folder / "experiment.toml"
     file.write_text(VDP.format(fmu=fmu, x=names[0], mu=names[1], unit=unit) + text)

@@ -2,6 +2,7 @@
 
 import resource
 import shutil
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -131,6 +132,30 @@ def test_every_filter_goes_on_from_a_checkpoint_to_the_bit(rig, tmp_path, kind):
         one.take(window), two.take(window)
     making.joint.close()
     assert state(one, rig.c) == state(two, rig.c)
+
+
+def test_noise_that_is_correlated_goes_on_from_a_checkpoint_to_the_bit(rig, tmp_path):
+    sensors = tuple(replace(n, share=0.5, time=0.1) for n in rig.c.sensors)
+    c = replace(rig.c, sensors=sensors)
+    making = Making(rig.e, c, rig.archive)
+    assert making.joint.names[-2:] == ("omega_w_noise", "omega_r_noise")
+    first, *rest = windows(rig, tmp_path, rig.data, [300, 700])
+    one, two = (Following(c, making, QUICK, ()) for _ in range(2))
+    one.take(first)
+    kept = codec.read(BytesIO(state(one, c)), types=checkpoint.TYPES)
+    assert kept.commissioned.sensors == sensors
+    two.go_on(kept)
+    for window in rest:
+        one.take(window), two.take(window)
+    making.joint.close()
+    assert state(one, c) == state(two, c)
+
+
+def test_a_stream_has_no_delayed_outputs(rig):
+    asked = rig.e.estimate.model_copy(update={"delay": {"omega_w": 0.02}})
+    e = rig.e.model_copy(update={"estimate": asked})
+    with pytest.raises(BadInput, match=r"\[estimate.delay\] needs a whole record"):
+        commissioned(e, rig.archive, rig.record, lambda _: None)
 
 
 @pytest.mark.parametrize("kind", ["imm", "rbpf"])
