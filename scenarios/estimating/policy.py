@@ -43,7 +43,7 @@ class EstimatePolicy(Limits):
         10.0,
         "times the noise that the roughness of the record shows",
         "second size, beside that noise itself, with which the search for the noise of a sensor begins",
-        "convention: noise that is correlated in time is not rough; the roughness may show a small part of it",
+        "convention: noise that is correlated in time is not rough; roughness may show a small part of it",
     )
     correlation_short: float = limit(
         3.0,
