@@ -12,13 +12,12 @@ import numpy as np
 
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.filters.history import Samples, Steps, filtered
+from estimator.filters.policy import POLICY
 from estimator.record import Array
 
 NUDGE = 0.02  # difference of a coordinate, which is a logarithm, by which the innovations are differentiated
 FARTHEST = 2.0  # of one step in a coordinate
-GAINED = 0.01  # log units; the search ends where a further step promises less
 MOST_STEPS, MOST_HALVED = 20, 6
-WEAK = 0.01  # information that is added, so that a coordinate without any stays, with an error of ten
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def climbed(run: Run, start: Array, low: Array, high: Array) -> Likeliest | None
     for _ in range(MOST_STEPS):
         score, information = _slopes(run, here, now, high)
         step = _step(score, information, here, low, high)
-        moved = _moved(run, here, step, now) if float(score @ step) / 2 > GAINED else None
+        moved = _moved(run, here, step, now) if float(score @ step) / 2 > POLICY.noise_gain else None
         if moved is None:
             break
         here, now = moved
@@ -114,7 +113,7 @@ def _slopes(run: Run, here: Array, now: Innovations, high: Array) -> tuple[Array
         moved.append(de)
         score[i] = -np.trace(turned[i], axis1=1, axis2=2).sum() / 2 - np.sum(weighed * de)
         score[i] += np.einsum("ki,kij,kj->", weighed, dS, weighed) / 2
-    information = WEAK * np.eye(len(here))
+    information = POLICY.noise_unseen * np.eye(len(here))
     for i, j in np.ndindex(information.shape):
         information[i, j] += np.einsum("kab,kba->", turned[i], turned[j]) / 2
         information[i, j] += np.einsum("ka,kab,kb->", moved[i], inverse, moved[j])

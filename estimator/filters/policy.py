@@ -70,6 +70,18 @@ class FilterPolicy(Limits):
         "first samples of the record from which noise of a sensor that is not declared is estimated",
         "derivation: a variance from 20 000 samples is known to within a hundredth",
     )
+    noise_gain: float = limit(
+        0.01,
+        "log units of likelihood",
+        "gain that a further step promises, below which the search for the noise of the sensors ends",
+        "derivation: what is found is then within a seventh of a standard error of the likeliest",
+    )
+    noise_unseen: float = limit(
+        0.01,
+        "information about the logarithm of a size or time, or the logit of a share",
+        "added to what the record holds of each, so that what it does not show stays where it begins",
+        "derivation: its standard error is then ten, a factor of 22 000, which is as good as unknown",
+    )
     least_white: float = limit(
         1e-3,
         "share of the variance that correlated noise gains in a sample",

@@ -86,9 +86,9 @@ def sizes_of(fmu: FmuDescription, states: Sequence[str]) -> Array:
 
 
 def check_restarts(flow: Flow, x: Array, p: float, step: float) -> None:
-    """BadInput where a simulation that is restarted from the states it has reached goes on otherwise.
+    """BadInput where a simulation that is restarted from the states it has reached continues differently.
 
-    Then it depends on time, or has states that are not among those that are set.
+    The FMU then depends on time, or has states that are not among those that are set.
     """
     start = x + NUDGE * flow.nominal
     states, _ = flow.path(start, p, 2 * PARTS * step, 2 * PARTS)
@@ -97,6 +97,6 @@ def check_restarts(flow: Flow, x: Array, p: float, step: float) -> None:
     off = np.abs((again - states[-1]) / flow.nominal).max()
     if not off <= CONTINUES * moved + 1e-12:
         raise BadInput(
-            "a simulation that is restarted from the states it has reached goes on otherwise: the FMU "
+            "a simulation that is restarted from the states it has reached continues differently: the FMU "
             "depends on time, or has states that are not set; name all of its states by --state"
         )

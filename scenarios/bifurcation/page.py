@@ -42,18 +42,19 @@ def headline(found: Bifurcation) -> str:
         return f"Rest is stable wherever {found.parameter} was varied" if not found.rests[0].unstable else (
             f"Rest is unstable from the beginning of the range of {found.parameter} on"
         )  # fmt: skip
-    said = f"Rest is left at {found.parameter} = {found.of_parameter(found.linear[0])}"
+    said = f"Rest is unstable from {found.parameter} = {found.of_parameter(found.linear[0])} on"
     if found.nonlinear is None:
         return said
-    return f"{said}; limit cycles live from {found.of_parameter(found.nonlinear[0])} on"
+    return f"{said}; stable limit cycles exist from {found.of_parameter(found.nonlinear[0])} on"
 
 
 def critical_rows(found: Bifurcation) -> Iterator[Row]:
     """Crossings of the rates, and the smallest cycles."""
     for crossing in found.crossings:
         kind = "Hopf bifurcation" if crossing.frequency else "static"
+        change = "begin" if crossing.begins else "cease"
         yield {
-            "what": f"{kind}, motions about rest {'begin' if crossing.begins else 'cease'} to grow",
+            "what": f"{kind}, motions about rest {change} to grow, by the rates of rest",
             "at": found.of_parameter(crossing.parameter, crossing.error),
             "frequency": f"{crossing.frequency:.4g}" if crossing.frequency else NOTHING,
             "amplitude": "0",

@@ -151,7 +151,8 @@ def workers_end_too() -> Iterator[None]:
 def _end_with(command: int) -> None:
     """Let this process end when its parent, by its number, has ended.
 
-    A worker waits for work at pipes whose other ends it holds itself, and so never finds them closed.
+    A worker waits for work at pipes whose other ends it holds itself, and so never finds them closed. The
+    system's signal at the death of a parent would come as soon as the thread ends that started the worker.
     """
 
     def watch() -> None:

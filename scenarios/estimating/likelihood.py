@@ -19,13 +19,10 @@ from estimator.filters.system import Joint
 from estimator.filters.ukf import Spread
 from estimator.record import Array
 from fmus.host.archive import Archive
+from scenarios.estimating.policy import POLICY
 from scenarios.estimating.sensors import STD, TIME, changed
-from scenarios.estimating.setup import Setup
+from scenarios.estimating.setup import BAND, Setup
 from scenarios.experiment.estimated import Options
-
-BAND = 1.959964  # half width of the 95 % band in standard deviations
-LARGER = (1.0, 10.0)  # times the noise that a record's roughness shows: correlated noise is not rough
-LONGER = (0.3, 3.0, 30.0)  # times the time of correlation with which the search begins
 
 
 def filter_of(s: Setup, joint: Joint, start: Estimate) -> Steps:
@@ -113,8 +110,9 @@ def _starts(s: Setup, low: Array, high: Array) -> Iterator[Array]:
     """Coordinates (p,) from which the search may begin."""
     first = np.array([w.of(noise) for w in s.sought for noise in s.sensors if noise.output == w.output])
     what = np.array([w.what for w in s.sought])
-    larger = LARGER if STD in what else (1.0,)
-    longer = LONGER if TIME in what else (1.0,)
+    larger = (1.0, POLICY.noise_larger) if STD in what else (1.0,)
+    times = POLICY.correlation_short, POLICY.correlation_middle, POLICY.correlation_long
+    longer = [time / POLICY.correlation_middle for time in times] if TIME in what else [1.0]
     shares = np.linspace(LEAST, MOST, COARSE) * log(10)
     for up, out, share in product(larger, longer, shares if s.moving else shares[:1]):
         at = first + log(up) * (what == STD) + log(out) * (what == TIME)

@@ -23,7 +23,7 @@ from scenarios.drawing.sheet import (
 )
 from scenarios.drawing.typography import label
 from scenarios.estimating.findings import Findings
-from scenarios.estimating.result import BAND
+from scenarios.estimating.setup import BAND
 
 ROW = 1.55  # inches, height of a panel
 SAID = "Estimate of {}, with the band that contains the true value with 95 % probability{}."

@@ -39,6 +39,36 @@ class EstimatePolicy(Limits):
         "start deviation of a state whose start value is declared, and that is not measured",
         "convention: what is declared is known to within a tenth",
     )
+    noise_larger: float = limit(
+        10.0,
+        "times the noise that the roughness of the record shows",
+        "second size, beside that noise itself, with which the search for the noise of a sensor begins",
+        "convention: noise that is correlated in time is not rough; roughness may show a small part of it",
+    )
+    correlation_short: float = limit(
+        3.0,
+        "samples",
+        "shortest time of correlation with which the search for it begins",
+        "derivation: over fewer samples the noise is hardly told from white noise",
+    )
+    correlation_middle: float = limit(
+        30.0,
+        "samples",
+        "the time of correlation between the shortest and the longest with which the search begins",
+        "convention: three times in ratios of ten, of which one is within a factor of four of the true one",
+    )
+    correlation_long: float = limit(
+        300.0,
+        "samples",
+        "longest time of correlation with which the search begins",
+        "derivation: the 800 samples with which it begins hold few longer ones",
+    )
+    correlated_share: float = limit(
+        0.5,
+        "share of the variance",
+        "correlated part of a sensor's noise with which the search for it begins",
+        "convention: the middle of what is possible",
+    )
     learnt: float = limit(
         30.0,
         "s",

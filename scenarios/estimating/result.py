@@ -27,13 +27,11 @@ from fmus.aside import blocks, let_go
 from scenarios.drawing.typography import quantity, with_error
 from scenarios.estimating.alarms import Raised
 from scenarios.estimating.policy import POLICY
-from scenarios.estimating.setup import Bands
+from scenarios.estimating.setup import BAND, Bands
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-BAND = 1.959964  # half width of the 95 % band in standard deviations
 
 
 @dataclass(frozen=True, repr=False)

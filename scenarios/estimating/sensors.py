@@ -14,13 +14,12 @@ from estimator.filters.sensor_noise import SensorNoise
 from estimator.noise import white_noise
 from estimator.record import Array, Record
 from fmus.errors import BadInput, did_you_mean
+from scenarios.estimating.policy import POLICY
 from scenarios.experiment.estimated import ESTIMATED, Options, OutputNoise
 from scenarios.experiment.experiment import Experiment
 
 STD, SHARE, TIME = "std", "share", "time"
 FLOOR = 1e-9  # of a channel's standard deviation: the noise of a record without rounding
-LONG = 10.0  # samples of correlation with which the search begins, if it begins in one place alone
-BETWEEN = 0.5  # share with which the search begins
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,8 @@ def noise_of(e: Experiment, record: Record, dt: float) -> tuple[SensorNoise, ...
             std = max(rough, FLOOR * float(np.std(seen)), 1e-300)
         noise = SensorNoise(name, std)
         if declared.time is not None:
-            time = declared.time if isinstance(declared.time, float) else LONG * dt
-            share = declared.share if isinstance(declared.share, float) else BETWEEN
+            time = declared.time if isinstance(declared.time, float) else POLICY.correlation_middle * dt
+            share = declared.share if isinstance(declared.share, float) else POLICY.correlated_share
             noise = replace(noise, time=time, share=share)
         found.append(noise)
     return tuple(found)

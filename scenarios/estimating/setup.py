@@ -36,6 +36,7 @@ from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
 MOST_PARTS = 16  # largest number of parts of a step
+BAND = 1.959964  # half width of the 95 % band in standard deviations
 Bands = Mapping[str, Mapping[str, tuple[float, float]]]
 
 

@@ -18,7 +18,8 @@ from scenarios.closing.closing import Posed, closed, with_test_part
 from scenarios.closing.page.glossary import Glossary, glossary
 from scenarios.closing.result import Result, effects_of
 from scenarios.estimating.estimating import estimate
-from scenarios.estimating.result import BAND, EstimateResult
+from scenarios.estimating.result import EstimateResult
+from scenarios.estimating.setup import BAND
 from scenarios.experiment.declaration import Declaration
 from scenarios.experiment.experiment import Experiment, placed
 from scenarios.experiment.validation import of_file, read_table
