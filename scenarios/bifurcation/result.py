@@ -169,13 +169,13 @@ class Bifurcation:
                 rates = self.of_parameter(limb.branch.crossing.parameter)
                 yield (
                     f"the smallest limit cycle is at {first}, but the rates of rest cross zero at {rates}: "
-                    "the equations have a kink at rest, so that these rates do not describe small motions; the "
-                    "linear critical value is that of the smallest limit cycle"
+                    "the equations have a kink at rest, so that these rates do not describe small motions; "
+                    "the linear critical value is that of the smallest limit cycle"
                 )
             if limb.error > ROUGH:
                 yield (
                     f"one multiplier has to be 1 by theory, and differs from 1 by up to {limb.error:.2g}: "
-                    "the other multipliers have errors of this size there, too, and a smaller --step may help"
+                    "the other multipliers have errors of this size there, too; a smaller --step may help"
                 )
 
     def of_parameter(self, value: float, error: float = float("nan")) -> str:
