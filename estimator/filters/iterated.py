@@ -30,7 +30,6 @@ class Iterated(Ukf):
     """Unscented filter with an iterated correction; `iterations` of 1 make it the filter of ukf.py."""
 
     name = "iterated"
-    marches = False
     iterations = 10
 
     def _expect(self, x: Array, P: Array, u: Array, t: float, carried: Array) -> tuple[Array, Array]:

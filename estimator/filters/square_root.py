@@ -18,7 +18,6 @@ class SquareRoot(Ukf):
     """Unscented filter of factors. The interface is that of Ukf; the weights must not be negative."""
 
     name = "square_root"
-    marches = False
 
     def __init__(
         self,

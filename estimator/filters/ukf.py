@@ -6,7 +6,7 @@ which may give an indefinite matrix; otherwise both filters agree.
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints
@@ -39,6 +39,7 @@ else:
     NUMBA = True
 
 FEW = 4  # samples that are not worth a call
+PARTS = ("step", "_measured", "_predict", "_expect", "_correct", "_process_noise")  # of a step
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,6 @@ class Ukf(Filter, Estimator):
     """Unscented filter for all unknowns in x jointly: states, parameters and unknown inputs."""
 
     name = "ukf"
-    marches: ClassVar[bool] = NUMBA  # whether compiled code makes the same steps
 
     def __init__(
         self,
@@ -84,6 +84,8 @@ class Ukf(Filter, Estimator):
         self._X, self._drawn = np.empty((2 * n + 1, n)), NONE
         self._Y, self._y = np.empty((2 * n + 1, m)), np.empty(m)
         self._marches: dict[float, March] = {}  # by the length of a part of a step, s
+        # a filter that does a part of it in another way makes its steps itself
+        self._plain = NUMBA and all(getattr(type(self), part) is getattr(Ukf, part) for part in PARTS)
 
     @classmethod
     def of(cls, joint: Joint, start: Estimate, asked: Request) -> Self:
@@ -119,7 +121,7 @@ class Ukf(Filter, Estimator):
         dt = float(steps[first - 1])
         others = np.flatnonzero(steps[first - 1 : first - 1 + len(rows)] != dt)
         count = int(others[0]) if len(others) else len(rows)
-        if count < FEW or not self.marches or self.adapt or not isinstance(self.system, Joint):
+        if count < FEW or not self._plain or self.adapt or not isinstance(self.system, Joint):
             return 0
         now, part = self.now, dt / s.held.shape[1]
         u = now.u if now.u is not None else s.u[first]
