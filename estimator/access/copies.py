@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from estimator.access.loop import Loop, PythonLoop, RowsLoop
+from estimator.access.loop import Call, Loop, PythonLoop, RowsLoop
 from estimator.access.pointers import (
     Functions,
     forget,
@@ -76,6 +76,11 @@ class Copies:
     def evaluate(self, values: Array, t: float) -> Array:
         """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step."""
         return self.advance(values, t, 0.0)
+
+    def call(self, values: Array, dt: float) -> Call | None:
+        """The call that makes a step of dt [s] from values (k, n_put), for compiled code, or None."""
+        loop = self._loop
+        return loop.call(np.ascontiguousarray(values), dt) if isinstance(loop, RowsLoop) else None
 
     @property
     def rounding(self) -> float:

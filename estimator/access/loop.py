@@ -1,8 +1,8 @@
 """The loop over copies of an FMU in Python, by direct calls of its functions on preallocated C arrays."""
 
 from collections.abc import Sequence
-from ctypes import c_double, c_void_p
-from typing import Protocol
+from ctypes import addressof, c_double, c_void_p, cast
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -59,7 +59,8 @@ class RowsLoop:
             if (r := v.reference) in constants
         }
         base = base_of(one.description, named)
-        self._rows = Rows(one.instance.library, base, recipe.set_refs, recipe.get_refs)
+        self._about = one.instance.library, base, recipe.set_refs, recipe.get_refs
+        self._rows = Rows(*self._about)
         self._other, self._times = other, STILL
 
     def run(self, values: Array, out: Array, t: float, dt: float) -> int:
@@ -70,6 +71,26 @@ class RowsLoop:
         if self._rows.run(values, times, out[:, None]) < 0:
             return -1
         return self._other.run(values, out, t, dt)
+
+    def call(self, values: Array, dt: float) -> "Call":
+        """The call over dt [s] for compiled code, for as many rows as values (k, n_set) has."""
+        return Call(*self._about, values, np.array([0.0, dt]) if dt > 0 else STILL)
+
+
+class Call(Rows):
+    """The call with arrays of its own, which compiled code makes by addresses.
+
+    function: address of the call; argument: that of the structure that it takes; values: (k, n_set), which it
+    reads; found: (k, n_get), which it fills.
+    """
+
+    def __init__(self, library: Any, base: Array, put: Any, get: Any, values: Array, t: Array) -> None:
+        super().__init__(library, base, put, get)
+        self.values = values.copy()
+        found = np.empty((len(values), 1, len(get)))
+        self.found: Array = found[:, 0]
+        self.run(self.values, t, found)  # from here on the structure holds all addresses
+        self.function, self.argument = int(cast(self._call, c_void_p).value or 0), addressof(self._asked)
 
 
 class _Copy:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, log10
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,17 @@ class Steps(Protocol):
 
     def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
         """See estimator.filters.estimator.Filter."""
+
+
+@runtime_checkable
+class Marches(Steps, Protocol):
+    """A filter that can filter many samples in one call."""
+
+    def many(self, s: "Samples", first: int, steps: Array, rows: Array) -> int:
+        """Filter samples from number `first` on; how many, none if the first one needs `step`.
+
+        steps: (N - 1,) lengths of all steps, s; rows: (k, width) for the results of k samples, see `_Rows`.
+        """
 
 
 @dataclass(frozen=True)
@@ -132,13 +143,22 @@ def filtered(
     these samples are a piece of, by default that of the samples.
     """
     rows, kept, last, broken = _Rows(len(s.t), len(filter.names), s.y.shape[1]), [], filter.now, ""
-    steps = evened(s.t, s.step if usual is None else usual).tolist()
-    for k in range(0 if filter.now.u is None else 1, len(s.t)):
+    steps = evened(s.t, s.step if usual is None else usual)
+    k: int = 0 if filter.now.u is None else 1
+    many = None
+    if isinstance(filter, Marches) and not keep:
+        many = filter.many
+    while k < len(s.t):
+        if many and k > 0 and (done := many(s, k, steps, rows.room(len(s.t) - k))):
+            rows.filled(done)
+            k, last = k + done, filter.now
+            tell(k / len(s.t))
+            continue
         try:
             if k == 0:
                 last = filter.step(s.u[0], s.y[0])
             else:
-                last = filter.step(s.u[k], s.y[k], steps[k - 1], s.held[k - 1])
+                last = filter.step(s.u[k], s.y[k], float(steps[k - 1]), s.held[k - 1])
         except Diverged as error:
             broken = str(error)
             break
@@ -147,6 +167,7 @@ def filtered(
             kept.append(last)
         if k % TOLD == 0:
             tell(k / len(s.t))
+        k += 1
     return rows.history(filter.names, last, broken, kept)
 
 
@@ -160,11 +181,19 @@ class _Rows:
         self._rows, self._ends, self._k = np.empty((self._at_once, width)), np.cumsum([4, n, n, m]), 0
         self._unknown = np.full((m, m), np.nan)
 
-    def add(self, e: Estimate) -> None:
+    def room(self, most: int) -> Array:
+        """The next rows (k, width), no more than `most` and than are told of at once."""
         if self._k == self._at_once:
             self._full.append(set_aside(self._rows.copy()))
             self._k = 0
-        row, S = self._rows[self._k], e.S if e.S.size else self._unknown
+        return self._rows[self._k : self._k + min(most, TOLD)]
+
+    def filled(self, n: int) -> None:
+        """The first n rows of `room` were written."""
+        self._k += n
+
+    def add(self, e: Estimate) -> None:
+        [row], S = self.room(1), e.S if e.S.size else self._unknown
         row[0], row[1], row[2] = e.t, e.nis, e.log_likelihood
         note(e.x, e.P, e.innovation, S, e.used, e.gated, row[3:])
         self._k += 1

@@ -154,15 +154,15 @@ class Joint:
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """See System; the FMU is evaluated only if an output is not a state."""
-        if self._direct is not None:
-            seen = X[:, self._direct]
+        if self.direct is not None:
+            seen = X[:, self.direct]
         else:
-            seen = self._asked(self.copies.evaluate, self.rows(X, u, carried), t)[:, self._seen]
-        return seen + X[:, -len(self._adds) :] @ self._adds if len(self._adds) else seen
+            seen = self._asked(self.copies.evaluate, self.rows(X, u, carried), t)[:, self.seen]
+        return seen + X[:, -len(self.adds) :] @ self.adds if len(self.adds) else seen
 
     def rows(self, X: Array, u: Array, carried: Array) -> Array:
         """Values to set in the FMU for each row (k, n) of X, with the present unknown inputs, (k, n_put)."""
-        return self.layout.rows(X, u, carried, self._still)[0]
+        return self.layout.rows(X, u, carried, self.still)[0]
 
     def transition(self, dt: float) -> Array:
         """Transition matrix of the states of unknown inputs and sensor noise over dt [s], (n_w, n_w)."""
@@ -170,9 +170,9 @@ class Joint:
 
     def settled(self, x: Array) -> Array:
         """See System; clips parameters whose bounds are kept by clipping."""
-        if self._clipped:
+        if self.clipped:
             x = x.copy()
-            for i, transform in self._clipped:
+            for i, transform in self.clipped:
                 x[i] = transform.settled(x[i])
         return x
 
@@ -194,7 +194,7 @@ class Joint:
         first = len(self.states) + len(self.others) + len(self.parameters)
         for k, (name, by) in enumerate(change.items(), 1):
             values[k, first + self.inputs.index(name)] += by
-        after = self._asked(self.copies.advance, values, t, dt)[:, self._seen]
+        after = self._asked(self.copies.advance, values, t, dt)[:, self.seen]
         found: Array = after[1:] - after[0]
         return found
 
@@ -241,14 +241,14 @@ class Joint:
         """Set up the positions of unknowns in x, in the rows set in the FMU and in the rows read from it."""
         n, transforms = len(self.states), [p.transform for p in self.parameters]
         self.layout = layout(n, len(self.others), transforms, len(self.inputs), self.unknown)
-        self._clipped = [(i, t) for i, t in enumerate(transforms, n) if t.kind == "clip"]
-        self._still = np.eye(len(self.names) - n - len(transforms))
-        self._seen = [get.index(name) for name in self.outputs]
-        self._adds = np.array([[float(n.output == o) for o in self.outputs] for n in self.sensor_noise])
-        self._direct: slice | list[int] | None = None
-        if all(i < n for i in self._seen):
-            row = self._seen == list(range(len(self._seen)))
-            self._direct = slice(0, len(self._seen)) if row else self._seen
+        self.clipped = [(i, t) for i, t in enumerate(transforms, n) if t.kind == "clip"]
+        self.still = np.eye(len(self.names) - n - len(transforms))
+        self.seen = [get.index(name) for name in self.outputs]
+        self.adds = np.array([[float(n.output == o) for o in self.outputs] for n in self.sensor_noise])
+        self.direct: slice | list[int] | None = None
+        if all(i < n for i in self.seen):
+            row = self.seen == list(range(len(self.seen)))
+            self.direct = slice(0, len(self.seen)) if row else self.seen
 
     def _open(
         self, put: list[str], get: list[str], dt: float, t0: float, way: Way | None, compiled: bool

@@ -5,7 +5,7 @@ but not in 1.4. filterpy's own filter calls the system for each point separately
 which may give an indefinite matrix; otherwise both filters agree.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -26,9 +26,20 @@ from estimator.filters.estimator import (
     Gate,
     System,
 )
+from estimator.filters.history import Samples
 from estimator.filters.named import Estimator, Request
 from estimator.filters.system import Joint
 from estimator.record import Array, BoolArray
+
+try:
+    from estimator.filters.marching import March, Rule, march_of
+except ImportError:
+    NUMBA = False
+else:
+    NUMBA = True
+
+FEW = 4  # samples that are not worth a call
+PARTS = ("step", "_measured", "_predict", "_expect", "_correct", "_process_noise")  # of a step
 
 
 @dataclass(frozen=True)
@@ -72,6 +83,9 @@ class Ukf(Filter, Estimator):
         self._Wm, self._Wc, self._scale = weights.Wm, weights.Wc, spread.scale(n)
         self._X, self._drawn = np.empty((2 * n + 1, n)), NONE
         self._Y, self._y = np.empty((2 * n + 1, m)), np.empty(m)
+        self._marches: dict[float, March] = {}  # by the length of a part of a step, s
+        # a filter that does a part of it in another way makes its steps itself
+        self._plain = NUMBA and all(getattr(type(self), part) is getattr(Ukf, part) for part in PARTS)
 
     @classmethod
     def of(cls, joint: Joint, start: Estimate, asked: Request) -> Self:
@@ -101,6 +115,34 @@ class Ukf(Filter, Estimator):
         )
         self._remember(valid, x1, P1)
         return x1, P1
+
+    def many(self, s: Samples, first: int, steps: Array, rows: Array) -> int:
+        """See history.Marches."""
+        dt = float(steps[first - 1])
+        others = np.flatnonzero(steps[first - 1 : first - 1 + len(rows)] != dt)
+        count = int(others[0]) if len(others) else len(rows)
+        if count < FEW or not self._plain or self.adapt or not isinstance(self.system, Joint):
+            return 0
+        now, part = self.now, dt / s.held.shape[1]
+        u = now.u if now.u is not None else s.u[first]
+        X = self._points(now.x, now.P, now.t)
+        march = self._marches.get(part) or march_of(self.system, X, u, now.carried, part)
+        if march is None:
+            return 0
+        self._marches[part] = march
+        rule = Rule(
+            self.system.transition(part), self._Wm, self._Wc, self._scale, self._process_noise(dt), self.R,
+            self._deviations, self._patience,
+        )  # fmt: skip
+        march.begin(now, X, self.factored(now.x, now.P, now.t), self._memory.rejected)
+        done, found = march.run(rule, s, slice(first, first + count), dt, rows)
+        if found is not None:
+            if self.gate:
+                self._memory = replace(self._memory, rejected=march.rejected)
+            self.now = found._replace(memory=self._memory)
+            self._X[:], self._L[:] = march.points
+            self._remember(True, self.now.x, self.now.P)
+        return done
 
     def _points(self, x: Array, P: Array, t: float) -> Array:
         """The sigma points of x, P, which are in place already if the last step ended with these."""

@@ -228,6 +228,7 @@ def test_what_acts_where_the_record_is_held_out_is_drawn_again(tmp_path):
     assert truth.items[0].parameters["t0"] == 30.0
 
 
+@pytest.mark.slow
 def test_a_fault_that_a_sensor_cannot_show_is_drawn_at_the_next_one(tmp_path):
     gains = iter([1e-9] * ATTEMPTS + [0.1])
     usual = plan("single", "constant_force", "wheel").entries[0][0]
@@ -503,6 +504,7 @@ def test_a_stopped_run_keeps_no_answer(tmp_path):
         closed([sys.executable, "-c", "import time; time.sleep(60)"], tmp_path / "a.json", 60.0, stop)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_where_it_stopped(tmp_path, monkeypatch):
     result = json.dumps(
         {"result": {"verdict": "no_discrepancy", "effects": [], "gap_closed": {}, "error": {}}}

@@ -256,6 +256,7 @@ def test_a_further_file_that_cannot_be_used_is_refused_in_one_line(mine, path, t
     assert str(mine.folder) in said
 
 
+@pytest.mark.slow
 def test_a_creep_law_is_one_file(mine):
     mine.write("fmus/contact/forces/laws/half.py", LAW.format(code=5))
     mine.railfmi("build", "wheelset", "--out", "out")
@@ -282,6 +283,7 @@ def test_a_creep_law_whose_code_leaves_a_gap_is_refused(mine):
     assert "has code 7, where the next free one is 5" in mine.refused("build", "wheelset")
 
 
+@pytest.mark.slow
 def test_an_integrator_is_one_file(mine):
     mine.write("fmus/integrators/heun.py", HEUN)
     mine.write(

@@ -174,6 +174,7 @@ def mine(tmp_path):
     return Further(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_track_source_and_a_track_defect_are_one_file_each(mine):
     mine.write("scenarios/track/sources/sine.py", SINE)
     mine.write("scenarios/track/defects/squat.py", SQUAT)
@@ -189,6 +190,7 @@ def test_a_track_defect_gets_the_contract_tests_for_free(mine):
     assert mine.passes("tests/scenarios/test_track.py", "-k", "squat or by_hand") == 10
 
 
+@pytest.mark.slow
 def test_a_trigger_of_a_stream_is_one_file(mine):
     mine.write("scenarios/watching/triggers/moving.py", MOVING)
     (mine.work / "watch.toml").write_text(WATCH)

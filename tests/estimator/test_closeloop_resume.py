@@ -119,6 +119,7 @@ def test_every_checkpoint_of_a_run_can_be_read_back(carriage: Path, tmp_path: Pa
         assert close(carriage, out, "--resume") == 0
 
 
+@pytest.mark.slow
 def test_planted_checkpoints_run_nothing(carriage: Path, in_one_go: str, tmp_path: Path) -> None:
     """Pickles in place of the checkpoints of an interrupted run: it is worked out again, as in one go."""
     out, mark = tmp_path / "out", tmp_path / "ran"

@@ -82,6 +82,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., tuple[Basel
     return asked
 
 
+@pytest.mark.slow
 def test_no_experiment_is_advised_for_what_acts_alike_under_any_inputs(asked) -> None:
     """The suspended mass does not yaw, so that a damper of its yaw spring is one of the wheelset's yaw."""
     baseline, members = asked(

@@ -59,6 +59,7 @@ def test_a_coupled_build_is_clean_but_for_a_saved_state(foreign, tmp_path):
     assert {c.title: c.passed for c in found.checks} == {**dict.fromkeys(TRIALS, True), "saved state": None}
 
 
+@pytest.mark.slow
 def test_every_outcome_is_one_sentence(built, foreign):
     for path in (built("testrig", "all"), foreign(), foreign(HIDDEN)):
         for c in grade(path).checks:
@@ -208,6 +209,7 @@ def test_a_run_without_end_is_ended(foreign, built):
     assert all(c.passed is not False for c in found.checks[:-1])
 
 
+@pytest.mark.slow
 def test_all_trials_have_one_time(foreign):
     """Each of them would hang; seven times the time was taken before."""
     begun = time.monotonic()

@@ -118,7 +118,10 @@ def test_effects_that_are_off_change_no_rate_and_no_output(name):
         assert_array_equal(values(built.h, more, u, more_p), values(bare.h, x, u, p))
 
 
-@pytest.mark.parametrize(("name", "kind"), sorted({(m, k) for m, k, _ in EVERY_PLACE}))
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [pytest.param(m, k, marks=marks_of(SIZES[m])) for m, k in sorted({(m, k) for m, k, _ in EVERY_PLACE})],
+)
 def test_an_effect_that_is_off_changes_no_step(name, kind):
     base, model = MODELS[name](), MODELS[name](all_of(name, kind)[:1])
     bare, built, rng = equations(base), equations(model), np.random.default_rng(1)

@@ -210,6 +210,7 @@ def test_several_effects_of_every_sort_at_once(drive, tmp_path):
     assert_allclose(run(theirs, start), expected, atol=3e-3 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_everything_on_offer_can_be_built_around_a_foreign_fmu(drive, tmp_path):
     builder = ForeignBuilder(drive, (PORT,), tmp_path)
     kinds = {kind for kind, _ in builder.offers}

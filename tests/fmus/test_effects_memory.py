@@ -66,6 +66,7 @@ def test_a_delay_holds_the_value_before_the_start_and_then_gives_the_input_itsel
     assert_allclose(found, [2.0, 2.0, 7.0], atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [k for k in sorted(WITH_MEMORY) if issubclass(EFFECTS[k], InputEffect)])
 def test_an_input_and_its_rate_stay_together(kind):
     """What arrives as rate is the derivative of what arrives as value."""

@@ -66,6 +66,7 @@ def test_the_same_sources_are_compiled_once_to_the_same_bytes(compiled, tmp_path
     assert len(list(folder().iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_other_sources_and_other_compilers_have_libraries_of_their_own(compiled, monkeypatch, tmp_path):
     build_working(MODELS["drive"](), tmp_path / "1.fmu")
     build_working(heavier(96.0), tmp_path / "2.fmu")
@@ -109,6 +110,7 @@ def test_a_library_that_others_could_have_made_is_compiled_again(harm, compiled,
     assert len(compiled) == before + 1
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_costs_time_only(compiled, monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(libraries, "folder", lambda: tmp_path / "file" / "libraries")
@@ -117,6 +119,7 @@ def test_a_cache_that_cannot_be_written_costs_time_only(compiled, monkeypatch, t
     assert len(compiled) == 2
 
 
+@pytest.mark.slow
 def test_the_oldest_library_goes_where_there_are_too_many(compiled, monkeypatch, tmp_path):
     monkeypatch.setattr(libraries, "KEPT", 1)
     build_working(MODELS["drive"](), tmp_path / "1.fmu")

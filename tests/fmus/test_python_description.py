@@ -206,6 +206,7 @@ def test_two_builds_have_the_same_bytes(built, name, tmp_path, monkeypatch):
     assert again.read_bytes() == built(name).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_native_build_before_changes_no_byte(tmp_path):
     model = MODELS["wheelset"]()
     before = sums(build_python(model, tmp_path / "a.fmu"))

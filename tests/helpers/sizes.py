@@ -9,7 +9,7 @@ from fmus.model import equations
 from fmus.models import MODELS
 from tests.helpers.everything import EVERY_MODEL
 
-LARGE = 1_000  # instructions; beyond it a compiler or the trials with every effect take 3 s to 40 s
+LARGE = 500  # instructions; beyond it a compiler or the trials with every effect take 2 s to 40 s
 ALL = ("all",)  # effects
 
 

@@ -113,6 +113,7 @@ def foreign(request, base, tmp_path_factory):
     return request.param, handed_over(builder, out, EFFECTS[request.param], FOUND[request.param])
 
 
+@pytest.mark.slow
 def test_a_package_of_base_and_effects_runs_as_the_container_does(foreign, base, tmp_path):
     name, (container, package) = foreign
     assert (container.name, package.name) == ("Sledge_augmented.fmu", "Sledge_augmented.ssp")

@@ -88,6 +88,7 @@ def norm(out, *arguments):
     return run_safely(["conicity-norm", *map(str, arguments), "--out", str(out)])
 
 
+@pytest.mark.slow
 def test_a_perfect_reader_passes_and_a_wrong_one_does_not(tmp_path, capsys):
     file = tmp_path / "reader.py"
     file.write_text(READERS)

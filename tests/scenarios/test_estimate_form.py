@@ -56,6 +56,7 @@ def test_friction_with_another_contact_is_near_the_truth_and_its_doubt_is_said(t
     assert any("'mu0' may wander by" in note for note in result.notes)
 
 
+@pytest.mark.slow
 def test_with_the_form_taken_for_right_the_filter_says_that_it_is_not(tmp_path):
     result = estimate(other_contact(tmp_path, 3, 20.0, FIXED))
     assert not result.consistent

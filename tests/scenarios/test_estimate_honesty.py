@@ -93,6 +93,7 @@ def test_correlated_innovations_are_said_to_be(vdp, tmp_path):
     assert "innovations of x0 correlated in time (p = " in result.doubt
 
 
+@pytest.mark.slow
 def test_a_value_that_the_record_pushed_to_its_bound_says_which(vdp, tmp_path, capsys):
     """True is 0.8, and the bounds leave it out."""
     file = write_vdp(tmp_path, vdp)
@@ -140,6 +141,7 @@ def slippery(folder):
     return file
 
 
+@pytest.mark.slow
 def test_alarm_levels_are_the_models_and_a_foreign_fmu_has_none(tmp_path, built):
     ours = slippery(tmp_path)
     assert [a.limit for a in estimate(ours).alarms] == ["below 0.15"]

@@ -74,6 +74,7 @@ def test_correlated_noise_is_a_state_of_the_filter(vdp, tmp_path):
     assert not {c.check: c.passed for c in white.checks}["whiteness of x0"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "near"), [("ekf", 1.0), ("square_root", 1.0), ("iterated", 1.0), ("imm", 3.0)]
 )
@@ -96,6 +97,7 @@ def test_the_smoother_knows_it(vdp, tmp_path):
     assert after.estimated["mu"] == before.estimated["mu"]  # the last sample knows the whole record
 
 
+@pytest.mark.slow
 def test_a_size_that_is_not_declared_is_the_likeliest(vdp, tmp_path):
     file = write_vdp(tmp_path, vdp, n=800)
     file.write_text(file.read_text().replace(DECLARED, ""))
@@ -108,6 +110,7 @@ def test_a_size_that_is_not_declared_is_the_likeliest(vdp, tmp_path):
     assert note.startswith("the noise of 'x0' was not declared; the likelihood of the record is largest with")
 
 
+@pytest.mark.slow
 def test_a_declared_size_is_taken_for_uncertain_where_that_is_said(vdp, tmp_path):
     """The sensor is declared 2.5 times better than it is."""
     text = '[estimate.noise.x0]\nstd = "estimated"\n'
@@ -120,6 +123,7 @@ def test_a_declared_size_is_taken_for_uncertain_where_that_is_said(vdp, tmp_path
     assert any(n.startswith("the noise of 'x0' was to be estimated;") for n in result.notes)
 
 
+@pytest.mark.slow
 def test_all_of_the_noise_can_be_found(vdp, tmp_path):
     noise = SensorNoise("x0", NOISE, 0.8, 0.5)
     file = oscillator(tmp_path, vdp, ALL, noise, n=1600)
@@ -135,6 +139,7 @@ def test_all_of_the_noise_can_be_found(vdp, tmp_path):
     assert mu["value"] == pytest.approx(0.8, abs=3 * mu["std_error"])
 
 
+@pytest.mark.slow
 def test_where_samples_are_left_out_or_noise_adapts_roughness_says_the_size(vdp, tmp_path):
     file = write_vdp(tmp_path, vdp)
     file.write_text(file.read_text().replace(DECLARED, ""))

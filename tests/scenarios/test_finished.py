@@ -98,6 +98,7 @@ def test_an_estimate_that_the_fmu_ends_has_not_finished(tmp_path, foreign):
     assert_said(done, "ended the process of the command before it had finished")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_loop_that_the_fmu_ends_has_not_finished(tmp_path, foreign, jobs):
     """With two jobs it ends the worker processes alone."""

@@ -84,6 +84,7 @@ def many(folder):
         (folder / "windows" / f"w{i}.csv").write_text("".join([names, *part]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case", [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
 )

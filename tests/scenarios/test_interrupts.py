@@ -188,6 +188,7 @@ def test_a_build_leaves_no_compiler(tmp_path, number):
     assert_tidied(tmp_path / "temporary")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda n: n.name)
 def test_a_fleet_ends_in_one_line_while_its_workers_start(tmp_path, number):
     """Half of a cluster, which its library cannot close, would end in tracebacks of that library."""

@@ -238,6 +238,7 @@ def test_with_its_form_open_friction_is_found_on_another_contact(condition):
     assert opened.nis == pytest.approx(4.0, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["wet", "static"])
 def test_another_contact_gives_another_record_of_the_same_track(name):
     row = "friction_ukf" if name == "wet" else "primary_stiffness"
@@ -257,6 +258,7 @@ def test_without_the_alignment_friction_is_biased():
     assert rmse(published.value["mu0"], true) > 5 * rmse(known.value["mu0"], true)
 
 
+@pytest.mark.slow
 def test_the_primary_spring_is_found_and_its_drop():
     case = case_of("primary_stiffness", "drop", duration=9.0, when=5.0)
     found = primary.task(fmu_of("primary_stiffness")).known(truth(case))

@@ -75,6 +75,7 @@ def test_the_loop_leads_from_different_assumptions_to_the_same_geometry(known):
     assert rmse(one, other) < 0.05 * shift.std()
 
 
+@pytest.mark.slow
 def test_least_squares_in_bins_of_the_true_shift_find_the_geometry_within_their_errors(known):
     record, shift, _ = known
     bins, true = loop.in_bins(record, shift), profile.geometry()

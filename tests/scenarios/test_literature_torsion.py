@@ -32,6 +32,7 @@ def test_friction_is_found_from_one_pull_to_the_limit(name):
     assert abs(torsion.START - true[0]) > torsion.FOUND or name.startswith("wet")
 
 
+@pytest.mark.slow
 def test_far_below_the_limit_the_filter_says_that_it_does_not_know():
     case = case_of("dry", duration=1.5)
     t, rng = case.times, np.random.default_rng(1)

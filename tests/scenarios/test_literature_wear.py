@@ -75,6 +75,7 @@ def test_the_faster_run_is_over_the_same_places():
     assert_allclose(slope, fast[: len(t) // 2, 1], atol=0.02 * np.abs(slope).max())
 
 
+@pytest.mark.slow
 def test_a_third_of_the_depth_is_not_a_third_of_the_way_to_the_worn_conicity():
     """What docs/rows.md says of the missed target, by the truth's own contacts."""
     amplitudes = np.array([1e-3, 1.5e-3, 2e-3])

@@ -84,6 +84,7 @@ def one_way(tmp_path_factory: pytest.TempPathFactory) -> tuple[PlanResult, Path,
     return PlanResult(**told), folder / "out", done.output
 
 
+@pytest.mark.slow
 def test_a_plan_shows_itself(one_way: tuple[PlanResult, Path, str]) -> None:
     result, _, said = one_way
     assert "\n".join(result.lines()) in said
@@ -198,6 +199,7 @@ def test_close_loops_own_fit_finds_the_stated_size_about_as_often_as_stated(tmp_
     assert 0.6 < share < 0.92
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("initial", ["exact", pytest.param("calculated", marks=pytest.mark.slow)])
 def test_a_foreign_fmu_is_planned_whether_it_shows_its_state_or_not(
     initial: str, foreign: Callable[..., Path], tmp_path: Path

@@ -157,6 +157,7 @@ def test_a_killed_worker_is_replaced_and_nothing_is_lost(whole, tmp_path):
     assert tables(tmp_path) == tables(whole)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_done_now_is_tried_by_the_next_run(whole, tmp_path):
     first = done(tmp_path, 12, "--passing", 3)
     assert first.returncode == 0, first.stderr
@@ -167,6 +168,7 @@ def test_what_cannot_be_done_now_is_tried_by_the_next_run(whole, tmp_path):
     assert tables(tmp_path) == tables(whole)
 
 
+@pytest.mark.slow
 def test_the_next_run_goes_on_after_a_killed_client(whole, tmp_path):
     """Only the task that was being done is done again; the workers of the killed client end with it."""
     client = subprocess.Popen(command(tmp_path, 12, "--seconds", 0.3), cwd=ROOT)
