@@ -51,7 +51,7 @@ LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --req
 COMPILE := uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --custom-compile-command 'make lock'
 lock: .venv/ready  ## versions and checksums of all that is installed, and the bill of materials; needs uv
 	$(COMPILE) --extra dev --extra docs --extra fleet --extra mqtt -o requirements.lock
-	$(COMPILE) --extra interop -c requirements.lock -o requirements-interop.lock
+	$(COMPILE) --extra interop --extra fuzz -c requirements.lock -o requirements-interop.lock
 	$(BIN)/python -m tests.sbom
 
 clean:

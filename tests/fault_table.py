@@ -85,6 +85,9 @@ def rows() -> Iterator[tuple[str, str, str, str]]:
     for name in targets():
         told = f"it is read, or one line and exit code 2, of {test_fuzzed_files.MANY} spoiled files"
         yield f"`{name}` spoiled at random", "all that read it", told, _file(test_fuzzed_files)
+        told = f"it is read, or one line and exit code 2, for {test_fuzzed_files.LONG} s of changes"
+        what = f"`{name}` changed by a fuzzer that sees what is run"
+        yield what, "all that read it", told, _file(test_fuzzed_files)
     for what in test_contained.MAT:
         formats = "HDF5 or MAT 7.3" if what in test_contained.H5 else "MAT 7.3"
         told = "one line, exit code 2; no other file is opened"

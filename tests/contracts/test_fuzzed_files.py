@@ -1,13 +1,19 @@
 """Whatever is spoiled in a file from outside: what reads it answers, or raises BadInput."""
 
+import os
 import random
+import subprocess
+import sys
 
 import pytest
 
 from scenarios.cli.app import run_safely
 from tests.helpers.fuzzing import spoiled, targets, wrong
+from tests.helpers.paths import ROOT
 
 QUICK, MANY = 40, 2000
+LONG = 20  # s, that a fuzzer may look for what fails
+PATIENCE = 240  # s, with its start
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -21,6 +27,18 @@ def test_a_spoiled_file_is_read_or_bad_input(name, count, tmp_path):
         data = spoiled(target.good, rng)
         told = wrong(target, data, tmp_path)
         assert not told, (data, told)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", targets())
+def test_a_fuzzer_that_sees_what_is_run_finds_nothing(name, tmp_path):
+    pytest.importorskip("atheris", reason="atheris is installed by make test-all, where it can be")
+    asked = [sys.executable, "-m", "tests.helpers.fuzzing_by_coverage", name, str(LONG)]
+    done = subprocess.run(
+        asked, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        timeout=PATIENCE,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-4000:]
 
 
 def test_a_message_is_one_line_whatever_it_quotes(tmp_path, capfd):

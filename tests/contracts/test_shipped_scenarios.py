@@ -5,10 +5,7 @@ import pytest
 from scenarios.simulating import run, run_all
 from tests.helpers.scenario_files import SHIPPED_FILES
 
-QUICK = {
-    "step_of_both_bogies", "contact_geometry", "contact_patch", "van_der_pol", "rig_speed_control",
-    "traction_braking",
-}  # fmt: skip
+QUICK = {"step_of_both_bogies", "contact_geometry", "contact_patch", "rig_speed_control"}
 SOME = [file for file in SHIPPED_FILES if file.stem in QUICK]
 
 

@@ -82,6 +82,7 @@ def in_one_go(tmp_path_factory: pytest.TempPathFactory) -> str:
     return found(folder / "out")
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_where_it_stopped(carriage: Path, in_one_go: str, tmp_path: Path, capsys) -> None:
     """What was found before the interruption is not sought again, and the result is that of one go."""
     out = tmp_path / "out"

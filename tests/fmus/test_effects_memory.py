@@ -50,6 +50,7 @@ def test_a_lag_follows_a_step_by_its_exponential(share, lag, u_0):
     assert_allclose(found, 1.5 - share * (1.5 - u_0) * np.exp(-t / lag), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("phase", "error"), [(1.0, 1e-5), (5.2, 1e-3), (6.5, 0.01), (8.3, 0.1)])
 def test_a_delay_delays_within_its_band(phase, error):
     delay = 0.1

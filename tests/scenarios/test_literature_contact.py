@@ -62,6 +62,7 @@ def test_creep_forces_stay_within_what_friction_allows_and_oppose_creep():
         assert np.all(true[f"xi_x_{side}"] * true[f"F_x_{side}"] <= 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", contact.WAYS)
 def test_motion_creep_and_force_are_found_from_two_sensors(way):
     one = judged(case_of("contact_force_ekf", "worst", duration=4.0), way)

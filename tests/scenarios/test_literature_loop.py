@@ -87,6 +87,7 @@ def test_least_squares_in_bins_of_the_true_shift_find_the_geometry_within_their_
         assert rmse(bins.value[:, i], wanted) < 1e-3 * np.ptp(wanted)
 
 
+@pytest.mark.slow
 def test_without_an_ideal_roll_the_loop_does_not_close(known):
     record, shift, found = known
     start = next(iter(loop.assumptions().values()))

@@ -119,6 +119,7 @@ def well_known(file):
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("lenient")
 @pytest.mark.parametrize("smooth", ["", "smooth = true\n"])
 def test_missing_measurements_are_a_lower_rate(vdp, tmp_path, smooth):
