@@ -201,27 +201,26 @@ class March:
         self._step, self._look = step, look
         n, m = len(joint.names), len(joint.outputs)
         self.estimates, self._room = Estimates.of(n, m, carried), Room.of(n, m)
-        direct = () if joint.direct is None else np.arange(n)[joint.direct]
-        self._direct, self._seen = np.array(direct, dtype=np.int64), np.array(joint.seen, dtype=np.int64)
-        self._layout, self._still = joint.layout, joint.still
+        places = () if joint.direct is None else np.arange(n)[joint.direct]
+        direct, seen = (np.array(some, dtype=np.int64) for some in (places, joint.seen))
+        layout = joint.layout
+        self._given = Given(layout.n, *layout.transforms, layout.fed, joint.still, direct, seen)
         self._t, self._last = 0.0, 0
 
     def begin(self, now: Estimate, X: Array, L: Array, rejected: Array) -> None:
         """Go on from an estimate with points X drawn by a factor L, and counts (m,) of the gate."""
         e, self._t, self._last = self.estimates, now.t, 0
-        e.x[0], e.P[0], e.carried[0], e.X[0], e.L[0], e.rejected[0] = (
-            now.x, now.P, now.carried, X, L, rejected
-        )  # fmt: skip
+        e.x[0], e.P[0], e.carried[0] = now.x, now.P, now.carried
+        e.X[0], e.L[0], e.rejected[0] = X, L, rejected
 
     def run(self, rule: Rule, s: Samples, some: slice, dt: float, rows: Array) -> tuple[int, Estimate | None]:
         """Filter some of the samples, rows: (k, width) for what is found; how many, and the last estimate."""
-        step, look, layout = self._step, self._look, self._layout
-        given = Given(layout.n, *layout.transforms, layout.fed, self._still, self._direct, self._seen)
+        step, look = self._step, self._look
         held = s.held[some.start - 1 : some.stop - 1]
         u, held, y = (np.ascontiguousarray(part) for part in (s.u[some], held, s.y[some]))
         done, self._last, self._t, measured = marched(
-            step.function, step.argument, look.argument, given, rule, step.values, step.found, look.values,
-            look.found, self.estimates, self._room, u, held, y, self._t, dt, rows,
+            step.function, step.argument, look.argument, self._given, rule, step.values, step.found,
+            look.values, look.found, self.estimates, self._room, u, held, y, self._t, dt, rows,
         )  # fmt: skip
         if not done:
             return 0, None

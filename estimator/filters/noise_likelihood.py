@@ -44,36 +44,24 @@ class Likeliest:
         return found
 
 
-class _Heard:
-    """A filter whose innovations are kept."""
-
-    def __init__(self, filter: Steps) -> None:
-        self._filter, self.names, self.now = filter, filter.names, filter.now
-        self.e: list[Array] = []
-        self.S: list[Array] = []
-
-    def step(self, u: Array, y: Array, dt: float | None = None, held: Array | None = None) -> Estimate:
-        """See Steps."""
-        now = self.now = self._filter.step(u, y, dt, held)
-        m, used = len(y), now.used
-        S = np.eye(m)
-        if now.S.size:
-            S[np.ix_(used, used)] = now.S[np.ix_(used, used)]
-        self.e.append(np.where(used, now.innovation, 0.0))
-        self.S.append(S)
-        return now
-
-
 def innovations(made: Callable[[], Steps], s: Samples) -> Innovations | None:
     """The innovations of a filter over samples; None if it diverges."""
     try:
-        heard = _Heard(made())
-        found = filtered(heard, s)
+        found = filtered(made(), s, keep=True)
     except Diverged:
         return None
     if found.broken or not np.isfinite(found.log_likelihood):
         return None
-    return Innovations(np.array(heard.e), np.array(heard.S), found.log_likelihood)
+    e, S = zip(*map(_of_used, found.estimates), strict=True)
+    return Innovations(np.array(e), np.array(S), found.log_likelihood)
+
+
+def _of_used(now: Estimate) -> tuple[Array, Array]:
+    """The innovation (m,) of the channels that were used, and its covariance (m, m); see Innovations."""
+    used, S = now.used, np.eye(len(now.used))
+    if now.S.size:
+        S[np.ix_(used, used)] = now.S[np.ix_(used, used)]
+    return np.where(used, now.innovation, 0.0), S
 
 
 Run = Callable[[Array], Innovations | None]
