@@ -85,6 +85,7 @@ def mine(tmp_path):
     return Further(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_sensor_fault_is_one_file(mine):
     mine.write(SQUARE_FILE, SQUARE)
     *candidates, best, size = mine.says(SCREENED).split()

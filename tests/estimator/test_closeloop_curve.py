@@ -156,6 +156,7 @@ def test_of_a_class_the_law_stays_that_no_curve_denies(builder):
     assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])
 
 
+@pytest.mark.slow
 def test_friction_rounded_all_over_the_motion_is_no_friction(builder):
     told = among(builder, viscous(200.0), "coulomb_friction", "viscous_damping")
     assert (told.verdict, [m.label for m in told.members]) == ("traced", ["viscous_damping@carriage"])

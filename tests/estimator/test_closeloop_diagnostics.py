@@ -458,6 +458,7 @@ def test_a_force_without_a_name_becomes_a_curve_and_a_better_fmu(
     assert np.all(curve.std[visited] < 1.0)  # N
 
 
+@pytest.mark.slow
 def test_the_page_and_the_result_hold_what_stands_beside_the_finding(
     nameless: tuple[Problem, Outcome, Hypothesis | None], tmp_path: Path
 ) -> None:

@@ -358,6 +358,7 @@ def drive_joint(path, **more):
     return Joint(path, ["q", "q_ddot"], states, unknown, force, inputs=["F"], dt=0.01, **more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [Way.RESUME, Way.EXCHANGE])
 def test_the_fmus_own_derivatives_and_differences_make_the_same_extended_filter(native, way):
     rng = np.random.default_rng(6)

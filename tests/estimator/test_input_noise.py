@@ -67,6 +67,7 @@ def test_a_straight_line_is_not_changed_inside_the_record(level, slope, std):
     assert_allclose(smoothed(line, std, LIMITS.levels)[4000:-4000], line[4000:-4000], atol=1e-9)
 
 
+@pytest.mark.slow
 @given(SEEDS, st.floats(0.01, 100.0))
 def test_smoothing_knows_no_units(seed, factor):
     rng = np.random.default_rng(seed)

@@ -59,6 +59,7 @@ def joint_noise(rng, outputs, order):
     return np.array([sum(r @ s.T for r, s in zip(response[k:], response, strict=False)) for k in range(400)])
 
 
+@pytest.mark.slow
 @given(st.integers(2, 3), st.integers(1, 3), st.integers(1, 30), SEEDS)
 @settings(max_examples=25, deadline=None)
 def test_joint_weights_are_those_of_the_inverse_covariance(outputs, order, n, seed):

@@ -80,6 +80,7 @@ def words(page: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<style.*?</style>|<[^>]+>", " ", page, flags=re.S))
 
 
+@pytest.mark.slow
 def test_a_second_run_splits_what_the_first_left_open(closed: tuple[Results, Path]) -> None:
     found, _ = closed
     assert [(r.experiment, r.verdict) for r in found.results] == [("slow", "ambiguous"), ("fast", "traced")]
@@ -97,6 +98,7 @@ def test_a_second_run_splits_what_the_first_left_open(closed: tuple[Results, Pat
     assert both.units["coulomb_friction_carriage_F_c"] == "N"
 
 
+@pytest.mark.slow
 def test_each_experiment_has_its_own_folder_with_its_own_numbers(closed: tuple[Results, Path]) -> None:
     found, out = closed
     for result in found.results:
@@ -110,6 +112,7 @@ def test_each_experiment_has_its_own_folder_with_its_own_numbers(closed: tuple[R
     assert every["joint"][0]["parameters"] == found.joint[0].parameters
 
 
+@pytest.mark.slow
 def test_the_table_holds_the_output_that_is_farthest_from_its_noise(closed: tuple[Results, Path]) -> None:
     found, out = closed
     table = rows(out)
@@ -127,6 +130,7 @@ def test_the_table_holds_the_output_that_is_farthest_from_its_noise(closed: tupl
         assert (out / row["report"]).is_file()
 
 
+@pytest.mark.slow
 def test_the_page_leads_to_the_reports_and_says_what_the_results_say(closed: tuple[Results, Path]) -> None:
     found, out = closed
     page = (out / "index.html").read_text(encoding="utf-8")
@@ -145,6 +149,7 @@ def test_the_page_leads_to_the_reports_and_says_what_the_results_say(closed: tup
     assert (out / "common_coulomb_friction_carriage.png").is_file()
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_table(
     two: list[Path], closed: tuple[Results, Path], tmp_path: Path, capsys, monkeypatch
 ) -> None:

@@ -76,6 +76,7 @@ def test_unlike_sides(tmp_path, way):
     assert B in page
 
 
+@pytest.mark.slow
 def test_point_files_rails_with_cant_and_roll(tmp_path):
     file = write_points(tmp_path / "worn, left.txt", points_of("S1002", 700, np.random.default_rng(7), 5e-6))
     given = ("--wheel", file, "--rail", "60E1", "--cant", "1/40", "--amplitude", "0.003,0.004")

@@ -103,6 +103,7 @@ def test_the_page_holds_what_was_found_and_asks_for_nothing(oscillator):
     assert "nan" not in re.sub(r"<[^>]+>|base64,[^\"]+", " ", page).lower().split()
 
 
+@pytest.mark.slow
 def test_the_oscillator_made_with_pythonfmu(foreign, tmp_path):
     file = write_vdp(tmp_path, foreign(PYTHON_VDP, SHOW_SPEED), ("x", "k"), IN_M)
     k = estimate(file).estimated["k"]

@@ -55,6 +55,7 @@ def oscillator(folder, vdp, text="", noise=None, n=400, seed=8) -> Path:
     return noisy(file, {"x": noise or SensorNoise("x0", NOISE, 1.0, TIME)}, seed)
 
 
+@pytest.mark.slow
 def test_correlated_noise_is_a_state_of_the_filter(vdp, tmp_path):
     file = oscillator(tmp_path, vdp, CORRELATED)
     result = estimate(file, tmp_path / "out")
@@ -88,6 +89,7 @@ def test_every_filter_of_whole_states_knows_it(name, near, vdp, tmp_path):
     assert mu["std_error"] == pytest.approx(expected["std_error"], rel=0.5)
 
 
+@pytest.mark.slow
 def test_the_smoother_knows_it(vdp, tmp_path):
     file = oscillator(tmp_path, vdp, CORRELATED)
     before, after = (

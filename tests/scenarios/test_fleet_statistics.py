@@ -161,6 +161,7 @@ def test_who_deviates_from_the_class_is_found():
     assert sum(map(len, named)) <= 1.2 * len(named)
 
 
+@pytest.mark.slow
 def test_nobody_deviates_in_a_class_without_odd_vehicles():
     rng, classes, level = np.random.default_rng(13), 60, 0.05
     false = np.mean([bool(named_in(rng, odd=0.0)) for _ in range(classes)])

@@ -309,6 +309,7 @@ def test_a_wrong_roller_makes_the_wheel_wrong_in_proportion_and_drag_and_roundin
     assert rmse(found.value["r_w"][found.t > 1.0], wrong) < 1e-4
 
 
+@pytest.mark.slow
 def test_the_primary_springs_filter_finds_the_patch_as_its_source_does():
     """By virtual penetration, as the record has it; with Hertz's patch the record is far less likely."""
     case = case_of("primary_stiffness", "static", duration=4.0)

@@ -95,6 +95,7 @@ def test_without_an_ideal_roll_the_loop_does_not_close(known):
     assert off(blurred[-1], shift) > 2 * off(next(iter(found.values()))[-1], shift)
 
 
+@pytest.mark.slow
 def test_every_assumption_is_judged_and_drawn(known):
     record, _, _ = known
     short = Record({n: x[:4000] for n, x in record.columns.items()})

@@ -143,6 +143,7 @@ def test_finished_tasks_are_not_done_again(whole, tmp_path):
     assert set(before) == {"kind=even/part-0.parquet", "kind=odd/part-0.parquet"}
 
 
+@pytest.mark.slow
 def test_two_workers_write_the_same_bytes(whole, tmp_path):
     assert done(tmp_path, 12, "--workers", 2).returncode == 0
     assert sorted(noted(tmp_path, FINISHED)) == [*range(12)]
