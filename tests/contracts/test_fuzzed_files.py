@@ -34,10 +34,9 @@ def test_a_spoiled_file_is_read_or_bad_input(name, count, tmp_path):
 def test_a_fuzzer_that_sees_what_is_run_finds_nothing(name, tmp_path):
     pytest.importorskip("atheris", reason="atheris is installed by make test-all, where it can be")
     asked = [sys.executable, "-m", "tests.helpers.fuzzing_by_coverage", name, str(LONG)]
-    done = subprocess.run(
-        asked, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-        timeout=PATIENCE,
-    )  # fmt: skip
+    # libFuzzer ends the process, so that nothing there could remove its files
+    env = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)}
+    done = subprocess.run(asked, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr[-4000:]
 
 
