@@ -114,7 +114,7 @@ class ForceLaw(Effect):
     @classmethod
     def offered(cls, site: Site, location: str) -> bool:
         """See Effect.offered: a law over the displacement needs one."""
-        return site.ports()[location].has_displacement or not cls.needs_displacement()
+        return not cls.needs_displacement() or site.ports()[location].has_displacement
 
     @classmethod
     def needs_displacement(cls) -> bool:

@@ -33,7 +33,7 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.screening.free_form import dependences, left_out
 from estimator.closeloop.screening.missing_force import missing_forces
-from estimator.closeloop.screening.regressors import Calibration, alike, lengths
+from estimator.closeloop.screening.regressors import Calibration, alike
 from estimator.closeloop.screening.screen import Screening
 from estimator.closeloop.search.free_form import curve_of, free_form, resolved
 from estimator.record import Array, Record, Run
@@ -81,7 +81,7 @@ def smooth(rng: np.random.Generator, columns: int, samples: int = M, pole: float
 def stated(base: Fit, change: Sequence[tuple[Candidate, Array]], seed: int) -> tuple[list[Visible], float]:
     """The power statement, and the limit that it was made with: the same draws give the same."""
     rng = np.random.default_rng(seed)
-    limit = threshold(alike(Calibration.of(base), change, M, rng), LEVEL, rng)
+    limit = threshold(alike(Calibration.of(base), change, M, rng)[1], LEVEL, rng)
     return power(base, change, LEVEL, np.random.default_rng(seed)), limit
 
 
@@ -167,9 +167,9 @@ def test_long_regressors_are_as_alike_as_their_sums_say(seed: int) -> None:
     exact = Calibration.of(fitted(np.zeros(20_000), g[:, :1]))
     left = exact.without(g[:, 1:])
     left /= np.linalg.norm(left, axis=0)
-    found = alike(exact, change, 2000, rng)
+    length, found = alike(exact, change, 2000, rng)
     assert np.all(found[0] == 0)
-    assert lengths(exact, change)[0] == 0
+    assert length[0] == 0
     assert_allclose(found[1:, 1:], left.T @ left, atol=6 / np.sqrt(2000))
 
 

@@ -21,7 +21,6 @@ from estimator.closeloop.screening.regressors import (
     alike,
     columns_of,
     is_wave,
-    lengths,
 )
 from estimator.record import Array
 from estimator.sensor_faults import FAULTS
@@ -65,13 +64,12 @@ def power(
     parameter within its limits, by name.
     """
     calibration = Calibration.of(base)
-    left = lengths(calibration, change)
-    cosines = alike(calibration, change, ROWS, rng)
+    left, cosines = alike(calibration, change, ROWS, rng)
     from scipy.stats import norm  # takes a third of a second to load, and comes after the verdict
 
     needed = threshold(cosines, level, rng) + float(norm.ppf(chance))
     found: dict[tuple[str, str, str], Visible] = {}
-    for (c, _), at in zip(change, columns_of(change), strict=True):
+    for (c, _), at in zip(change, columns_of(g for _, g in change), strict=True):
         for name, size in _sizes(c, left[at], cosines[at, at], needed, room):
             one = Visible(c.kind, c.location, name, size, size, _shape(c))
             key = (c.kind, c.location, name)
