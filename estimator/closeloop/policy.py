@@ -271,7 +271,8 @@ class SearchPolicy:
     moved_by_steps: float = limit(
         0.5,
         "standard errors",
-        "movement of an unknown of an answer by halved steps of the simulation, above which they are halved",
+        "movement of an unknown by halved steps of the simulation, above which those of an answer are "
+        "halved, and those of a search do not go over several samples",
         "derivation: a bias of half of an error adds 12 % to it, as `noise_share`",
     )
     parts_of_a_step: int = limit(

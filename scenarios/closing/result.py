@@ -173,11 +173,12 @@ def result_of(
 
 def _steps(problem: Problem) -> list[str]:
     """A note if the steps of the simulation had to be divided."""
-    if problem.finer == 1:
+    if problem.steps == problem.searched:
         return []
     return [
-        f"the usual steps of the simulation were divided by {problem.finer} for the answer, because their "
-        "integration error would have changed the fitted values; the error after holds for the divided steps"
+        f"the usual steps of the simulation were divided by {problem.steps.parts} for the answer, because "
+        "their integration error would have changed the fitted values; the error after holds for the divided "
+        "steps"
     ]
 
 
