@@ -410,7 +410,8 @@ class DecisionPolicy:
         "share of the variance",
         "share that an answer must explain of the residual's variance if noise is not declared, and that one "
         "effect must explain of the variance beyond noise if the model form is open; a residual of which no "
-        "effect could explain as much is left to the form",
+        "effect could explain as much is left to the form; what inputs that were held over a sample must "
+        "explain of the variance beyond noise",
         "derivation: what explains less than it leaves is not what the residual is mainly made of",
     )
     open_alike: float = limit(

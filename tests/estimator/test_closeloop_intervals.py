@@ -20,7 +20,7 @@ from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.pipeline import _in_fine_steps
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
@@ -267,23 +267,40 @@ def test_steps_go_over_several_samples_if_their_error_moves_no_unknown_by_half_i
 class Interpolating(Joining):
     """What acts within samples makes a wave of a size in noises altogether, where steps know of it.
 
-    recorded: whether the record was made so, or with inputs that were held.
+    recorded: whether the record was made so, or with inputs that were held. lacking: times the same wave that
+    the model lacks, unless its effect is built in.
     """
 
     size: float = 0.0
     recorded: bool = True
+    lacking: float = 0.0
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         [run] = self.record.runs
         wave = np.sin(7.0 * run.t)
         wave *= self.size * SIZE / np.linalg.norm(wave)
-        return run.y - (theta["slope"] * run.t + (self.steps.joined - self.recorded) * wave)[:, None]
+        waves = self.steps.joined - self.recorded + (0.0 if self.effects else self.lacking)
+        return run.y - (theta["slope"] * run.t + waves * wave)[:, None]
 
 
 @pytest.mark.parametrize("size", [0.0, 2.0, 30.0])
 def test_steps_go_over_several_samples_unless_the_record_was_clearly_made_with_held_inputs(size):
     assert hold(Interpolating(0.0, size=size, recorded=True))
     assert hold(Interpolating(0.0, size=size, recorded=False)) == (size < 10.0)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_what_a_model_lacks_does_not_decide_about_the_steps_but_its_answer_does(recorded):
+    """What is lacking looks as if inputs were held, and is much larger than what these make."""
+    problem = in_joined_steps(Interpolating(0.0, size=30.0, recorded=recorded, lacking=10.0))
+    fitter, weighting = Refitter(baseline(problem, noise=SIZE)), Weighting.white(SIZE)
+    c = Candidate("viscous_damping", "here", (Unknown("slope", 1.0, -10.0, 10.0, 1.0),))
+    without, found = (
+        Hypothesis(some, fit(built(problem, some), c.unknowns, weighting), ()) for some in ((), (c,))
+    )
+    assert joined_steps_hold(problem, without, weighting)
+    assert in_fine_steps(fitter, [without]).steps == JOINED
+    assert in_fine_steps(fitter, [found]).steps == (JOINED if recorded else USUAL)
 
 
 # ---- slopes of unknowns that make up for each other

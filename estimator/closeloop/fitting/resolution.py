@@ -33,20 +33,34 @@ def in_joined_steps(problem: Problem) -> Problem:
 
 
 def joined_steps_hold(joined: Problem, base: Hypothesis, weighting: Weighting) -> bool:
-    """Whether steps over several samples are exact on a record, and the record does not reject them.
+    """Whether steps over several samples are exact on a record, and what is left does not come from them.
 
     base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
-    it is long, whatever the slopes of the unknown are. How long it is, steps of half the length show. A
-    record whose inputs were really held over a sample fits better in steps of one sample; how well it would
-    after another fit follows from the slopes of this one.
+    it is long, whatever the slopes of the unknown are. How long it is, steps of half the length show.
     """
-    halved, held = (replace(joined, steps=steps) for steps in (JOINED.halved, USUAL))
-    here, in_half, as_held = (weighted(p, base.theta, weighting) for p in (joined, halved, held))
-    if not float(np.linalg.norm(here - in_half)) <= joined.policy.search.moved_by_steps:
+    here, halved = (
+        weighted(p, base.theta, weighting) for p in (joined, replace(joined, steps=JOINED.halved))
+    )
+    if not float(np.linalg.norm(here - halved)) <= joined.policy.search.moved_by_steps:
         return False
-    here, as_held = (relaxed(base.fit, residual) for residual in (here, as_held))
-    apart = float(np.linalg.norm(as_held - here))
-    return float(here @ here - as_held @ as_held) / 2 <= joined.policy.decision.telling * apart
+    return not inputs_held(joined, base, weighting)
+
+
+def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
+    """Whether a record says that its inputs were held over a sample, where steps take them as continuous.
+
+    It then fits better in steps of one sample, by more than chance; how well it would after another fit
+    follows from the slopes of this one. As what a hypothesis lacks may look like held inputs, these must also
+    be most of what it leaves beyond noise. Else a hypothesis that leaves less can tell. joined: the problem
+    with the effects of h, which was fitted in its steps.
+    """
+    theta, policy = h.theta, joined.policy
+    here, held = (
+        relaxed(h.fit, weighted(p, theta, weighting)) for p in (joined, replace(joined, steps=USUAL))
+    )
+    apart, gained = float(np.linalg.norm(held - here)), float(here @ here - held @ held)
+    beyond = float(here @ here) - len(here) - policy.detection.chance * np.sqrt(2 * len(here))
+    return gained / 2 > policy.decision.telling * apart and gained > policy.decision.most * beyond
 
 
 def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting) -> Problem:
@@ -63,15 +77,22 @@ def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
     """The problem of the fitter in steps that are fine enough for hypotheses, if the record does not reject
     these.
 
-    Finer steps also change what the FMU receives between two samples: inputs are interpolated there, and a
-    record may show that they were not. If the coarse steps are right, the best hypothesis fits worse in fine
-    ones; if the fine ones are right, the difference of its residuals only adds the noise along it.
+    In steps over several samples, inputs are continuous, unless what the best hypothesis leaves says that
+    they were held over a sample. Dividing steps of one sample also changes what the FMU receives between two
+    samples: inputs are interpolated there, and a record may show that they were not. If the coarse steps are
+    right, the best hypothesis fits worse in fine ones; if the fine ones are right, the difference of its
+    residuals only adds the noise along it.
     """
     before, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
+    best = min(some, key=cost)
+    if before.steps.joined:
+        if not inputs_held(built(before, best.candidates), best, weighting):
+            return resolved(before, some, weighting)
+        fitter = fitter.asked(replace(before, steps=USUAL))
+        before, best = fitter.baseline.problem, in_divided_steps(fitter, best)
     finer = resolved(before, some, weighting)
     if finer.steps == before.steps:
         return before
-    best = min(some, key=cost)
     again = in_divided_steps(fitter.asked(finer), best)
     return before if rejected(fitter.baseline, best, again) else finer
 
