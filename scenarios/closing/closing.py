@@ -23,7 +23,7 @@ from estimator.plant import PLANTS
 from estimator.record import Record
 from estimator.workers import workers_end_too
 from fmus.errors import BadInput
-from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
+from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder, co_simulated
 from fmus.export.provenance import Origin, checksum, isolation_of
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
@@ -183,7 +183,8 @@ def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATE
         PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity), p.integrate)
         for p in e.ports
     )
-    return ForeignBuilder(e.fmu_path, ports, work, isolation_of(e.fmu_path, isolation))
+    fmu = co_simulated(e.fmu_path, work)
+    return ForeignBuilder(fmu, ports, work, isolation_of(e.fmu_path, isolation))
 
 
 def pose(e: Experiment, builder: Builder) -> Problem:

@@ -108,7 +108,10 @@ class ModelBuilder:
 
 @dataclass(frozen=True)
 class ForeignBuilder:
-    """A foreign FMU with effects around it; kept in a folder. isolation: how its builds run, see Archive."""
+    """A foreign FMU for co-simulation with effects around it; kept in a folder.
+
+    isolation: how its builds run, see Archive.
+    """
 
     fmu: Path
     ports: tuple[PortNames, ...]
@@ -118,13 +121,6 @@ class ForeignBuilder:
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
     form_error: ClassVar[float] = 0.0
-
-    def __post_init__(self) -> None:
-        if _described(self.fmu).exchange is not None:
-            raise BadInput(
-                f"{self.fmu}: is for model exchange alone; it can be run and compared, but effects are put "
-                "around FMUs for co-simulation; export it for co-simulation too"
-            )
 
     @property
     def offers(self) -> Effects:
@@ -166,6 +162,22 @@ class ForeignBuilder:
         BadInput where an effect changes a parameter while running.
         """
         return EffectsAlone(describe(self.fmu), self.ports, effects, starts, step)
+
+
+def co_simulated(fmu: Path, folder: Path) -> Path:
+    """The FMU or, if it is for model exchange alone, one for co-simulation that carries and integrates it.
+
+    That one is kept in the folder. BadInput where no compiler is at hand, or the FMU has no library for this
+    platform.
+    """
+    if _described(fmu).exchange is None:
+        return fmu
+    target = folder / "co_simulation" / fmu.name
+    if not target.exists():
+        part = target.with_name(f"{os.getpid()}.fmu")
+        build_carrier(fmu, (), (), part)
+        part.replace(target)  # workers may build the same at once
+    return target
 
 
 @cache
