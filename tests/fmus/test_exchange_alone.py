@@ -1,6 +1,5 @@
 """FMUs for model exchange alone are run with their events: against closed forms and co-simulation."""
 
-import re
 import subprocess
 import zipfile
 
@@ -24,7 +23,7 @@ from fmus.host.grading.check import grade
 from fmus.host.loop import LONG
 from fmus.host.master.master import Master
 from tests.helpers.native import compiler
-from tests.helpers.packed import repacked
+from tests.helpers.packed import alone
 
 G, E = 9.81, 0.7
 
@@ -46,19 +45,6 @@ def bounced(t, h=1.0, v=0.0, kicks=None):
         rows.append((h, v, bounces))
         v += (kicks or {}).get(k, 0.0)
     return np.array(rows)
-
-
-def alone(fmu, target):
-    """A copy of an FMU that is for model exchange alone."""
-
-    def change(name, data):
-        if name != "modelDescription.xml":
-            return name, data
-        text, count = re.subn(rb"<CoSimulation[^>]*/>|<CoSimulation.*?</CoSimulation>", b"", data, flags=re.S)
-        assert count == 1
-        return name, text
-
-    return repacked(fmu, target, change)
 
 
 def test_the_ball_is_valid_and_is_described(ball):
