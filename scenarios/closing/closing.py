@@ -184,7 +184,8 @@ def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATE
         for p in e.ports
     )
     fmu = co_simulated(e.fmu_path, work)
-    return ForeignBuilder(fmu, ports, work, isolation_of(e.fmu_path, isolation))
+    inside = None if fmu == e.fmu_path else e.fmu_path
+    return ForeignBuilder(fmu, ports, work, isolation_of(e.fmu_path, isolation), inside)
 
 
 def pose(e: Experiment, builder: Builder) -> Problem:

@@ -215,7 +215,7 @@ def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
         else:
             table[name] = {"how": "not seen", "value": known[name].start}
     if isinstance(problem.builder, ForeignBuilder):  # outputs of our models follow from states
-        own = describe(problem.builder.fmu).variables
+        own = describe(problem.builder.source).variables
         at_ports = [name for port in problem.ports for name in port.motion]
         for name in dict.fromkeys([*problem.record.outputs, *at_ports]):
             if name not in (*problem.free_states, *problem.declared):

@@ -12,7 +12,9 @@ from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import build_coupled
-from fmus.host.fmu import Fmu
+from fmus.host.fmu import Fmu, FmuError
+from fmus.model import Model
+from fmus.variables import Input, State
 
 DELAY = [("input_delay", "F")]  # off while its share is zero
 HOLDING = {
@@ -110,6 +112,36 @@ def test_what_is_no_rate_of_an_input_is_refused(native, value, order, name, said
         with pytest.raises(FMICallException, match="fmi2SetRealInputDerivatives"):
             set_rate(fmu, value, order, name)
         assert said in fmu.instance.messages[-1]
+
+
+class Filled(Model):
+    """x' = u, with an input between 0 and 1."""
+
+    name = "Filled"
+    step_size = 0.01
+    x = State("1", doc="sum", nominal=1.0)
+    u = Input("1/s", min=0.0, max=1.0, doc="flow")
+
+    def derivatives(self):
+        return {"x": self.u}
+
+
+def test_a_rate_that_leads_beyond_a_limit_leaves_the_step_unmade(tmp_path):
+    with Fmu(build_native(Filled(), tmp_path)) as fmu:
+        fmu.restart(u=0.9)
+        set_rate(fmu, 1.0, name="u")
+        with pytest.raises(FmuError, match="discard"):
+            fmu.step(0.2)
+        assert (fmu["u"], fmu["x"]) == (0.9, 0.0)
+
+
+def test_a_reset_forgets_rates(native):
+    with Fmu(native) as fmu:
+        fmu.restart(F=FORCE, F_v=FRICTION, M=MASS)
+        set_rate(fmu, 1e3)
+        fmu.restart(F=FORCE, F_v=FRICTION, M=MASS)
+        fmu.step(T)
+        assert fmu["F"] == FORCE
 
 
 def test_rates_make_the_error_of_long_steps_one_of_second_order(native):

@@ -5,10 +5,6 @@ is a parametric bootstrap to first order: white noise is drawn for all parts of 
 the calibration to the noise in the part to identify is computed from the sensitivities of the FMU, and the
 same statistics are evaluated. The FMU is not simulated again, so the reference assumes that the FMU is linear
 in its unknowns within their standard errors.
-
-The statistics depend on the noise only through its means over blocks, its share along the sensitivities, and
-the length of what is left, which are independent of one another. So these few numbers are drawn, and not the
-noise of every sample.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,13 +18,11 @@ from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, stacked
 from estimator.closeloop.hypotheses.hypothesis import Part
 from estimator.closeloop.screening.regressors import directions
+from estimator.noise_figures import figures_of, figures_of_noise
 from estimator.record import Array
 from fmus.aside import set_aside
 
-SIZE = "size of the residual that no fit has seen"
-SLOW = "slow part of the residual that no fit has seen"
 LIKENESS = "likeness to an effect"
-UNSEEN = 1e-12  # square of a change by one standard deviation, in units of the noise, below which it is none
 
 
 @dataclass(frozen=True)
@@ -72,12 +66,12 @@ def detect(
     """
     limits = baseline.policy.detection
     left = baseline.in_noise(baseline.hypothesis.residuals, "unseen")
-    observed = _figures(left, limits.slow_blocks)
+    observed = figures_of(left, limits.slow_blocks)
     slopes = _sensitivities(baseline)
     early, late = (_columns(baseline, slopes, part) for part in ("fit", "unseen"))
     # noise in the part to identify changes the calibrated values by root @ white noise
     root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if slopes else np.zeros((0, 0))
-    references = noise_figures(left.shape, late, root, limits.slow_blocks, limits.replicates, rng)
+    references = figures_of_noise(left.shape, late, root, limits.slow_blocks, limits.replicates, rng)
     if regressors:
         along, cosines = directions(screened, regressors)
         observed[LIKENESS] = float(np.max(along**2))
@@ -115,49 +109,3 @@ def _likeness_of_noise(cosines: Array, replicates: int, rng: np.random.Generator
     root = vectors * np.sqrt(np.maximum(values, 0))
     drawn = rng.standard_normal((replicates, len(cosines))) @ root.T
     return np.asarray(np.max(drawn**2, axis=1))
-
-
-def noise_figures(
-    shape: tuple[int, int], late: Array, root: Array, pieces: int, replicates: int, rng: np.random.Generator
-) -> dict[str, Array]:
-    """As `_figures` of each of several draws of white noise after the calibration, (replicates,) each.
-
-    shape: (N, n_y) of the noise; late: (N n_y, n), by which n unknowns change its samples; root: (n, k), by
-    which k independent standard normal numbers change the unknowns.
-    """
-    (n, n_y), k, ends = shape, root.shape[1], _ends(shape[0], pieces)
-    sizes = np.diff([*ends, n])
-    means, products = np.empty((len(ends), n_y, k)), np.zeros((n_y, k, k))
-    for i, (first, size) in enumerate(zip(ends, sizes, strict=True)):
-        part = (late[first * n_y : (first + size) * n_y] @ root).reshape(size, n_y, k).swapaxes(0, 1)
-        means[i] = part.sum(axis=1) / np.sqrt(size)
-        products += part.swapaxes(1, 2) @ part
-    by_calibration = rng.standard_normal((replicates, k))
-    squares, slow = np.empty((n_y, replicates)), np.empty((n_y, replicates))
-    for j in range(n_y):
-        values, vectors = np.linalg.eigh(products[j] - means[:, j].T @ means[:, j])
-        shown = values > UNSEEN
-        along = (vectors[:, shown] * np.sqrt(values[shown])).T  # beside the means
-        in_means, beside = (
-            np.sum((rng.standard_normal((replicates, len(a))) - by_calibration @ a.T) ** 2, axis=1)
-            for a in (means[:, j], along)
-        )
-        free = n - len(ends) - len(along)
-        rest = rng.chisquare(free, replicates) if free > 0 else 0.0
-        squares[j], slow[j] = (in_means + beside + rest) / n, in_means / len(ends)
-    return {SIZE: np.max(squares, axis=0), SLOW: np.max(slow, axis=0)}
-
-
-def _figures(left: Array, pieces: int) -> dict[str, float]:
-    """Largest mean square of an output of a residual (N, n_y), and that of its means over blocks, in units of
-    what white noise leaves.
-    """
-    ends = _ends(len(left), pieces)
-    means = np.add.reduceat(left, ends, axis=0) / np.sqrt(np.diff([*ends, len(left)]))[:, None]
-    squares = np.einsum("ij,ij->j", left, left) / len(left)
-    return {SIZE: float(np.max(squares)), SLOW: float(np.max(np.mean(means**2, axis=0)))}
-
-
-def _ends(samples: int, pieces: int) -> list[int]:
-    """First sample of each of the blocks."""
-    return [int(b[0]) for b in np.array_split(np.arange(samples), min(pieces, samples))]

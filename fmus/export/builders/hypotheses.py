@@ -110,17 +110,24 @@ class ModelBuilder:
 class ForeignBuilder:
     """A foreign FMU for co-simulation with effects around it; kept in a folder.
 
-    isolation: how its builds run, see Archive.
+    isolation: how its builds run, see Archive; carried: the FMU for model exchange alone that is inside of
+    `fmu`, if there is one, see `co_simulated`.
     """
 
     fmu: Path
     ports: tuple[PortNames, ...]
     folder: Path
     isolation: Isolation | None = None
+    carried: Path | None = None
     quick: ClassVar[bool] = False
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
     form_error: ClassVar[float] = 0.0
+
+    @property
+    def source(self) -> Path:
+        """The FMU as its owner gave it."""
+        return self.carried or self.fmu
 
     @property
     def offers(self) -> Effects:
@@ -154,7 +161,9 @@ class ForeignBuilder:
     ) -> Path:
         """Write the FMU with effects around it and start values that were found, for use elsewhere."""
         target = out / f"{self.fmu.stem}_augmented.fmu"
-        return build_coupled(self.fmu, self.ports, effects, target, starts=starts, origin=origin)
+        return build_coupled(
+            self.fmu, self.ports, effects, target, starts=starts, origin=origin, source=self.carried
+        )
 
     def alone(self, effects: Effects, starts: Mapping[str, float], step: float) -> EffectsAlone:
         """The effects as a model of their own, to be connected to the FMU every `step`, s.

@@ -94,6 +94,7 @@ typedef struct {
     double jacobian[AT_LEAST_1(N_X * N_X)], factors[AT_LEAST_1(N_X * N_X)];
     int pivot[AT_LEAST_1(N_X)];
     bool known; /* the Jacobian of now */
+    bool over;  /* whether it has asked for the end */
     double due; /* s, the next event of time */
     char why[160];
 #endif
@@ -253,6 +254,7 @@ static void begin(Instance *m) {
     m->failed = m->running = m->stepped = m->seen = false;
 #if BASE_EXCHANGE
     *m->why = '\0';
+    m->over = false;
 #endif
 }
 
@@ -268,7 +270,7 @@ static bool found(Instance *m) {
 }
 
 static bool carried(Instance *m, const char *uri) {
-    char path[PATH], resources[PATH];
+    char path[PATH], resources[PATH + sizeof "/base/resources/"];
     if (!folder_of(uri, path)) return refuse(m, fmi2Error, "the path of its resources is too long"), false;
     size_t n = strlen(path);
 #if BASE_FMI == 2
@@ -281,7 +283,8 @@ static bool carried(Instance *m, const char *uri) {
         return refuse(m, fmi2Error, "the carried FMU cannot be loaded: %s", path), false;
     if (!found(m)) return false;
 #if BASE_FMI == 2
-    m->base = m->instantiate(m->name, BASE_EXCHANGE ? fmi2ModelExchange : fmi2CoSimulation, BASE_TOKEN, resources, m->host, fmi2False, fmi2True);
+    fmi2Type kind = BASE_EXCHANGE ? fmi2ModelExchange : fmi2CoSimulation;
+    m->base = m->instantiate(m->name, kind, BASE_TOKEN, resources, m->host, fmi2False, fmi2True);
 #else
 #if BASE_EXCHANGE
     m->base = m->instantiate(m->name, BASE_TOKEN, resources, fmi3False, fmi3True, m, heard);
@@ -327,6 +330,9 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
 static fmi2Status answer(Instance *m, int status, const char *call) {
     if (status <= WARNING) return fmi2OK;
     m->failed = true;
+#if BASE_EXCHANGE
+    if (*m->why) return refuse(m, fmi2Error, "%s: the carried FMU fails: %s", call, m->why);
+#endif
     return refuse(m, fmi2Error, "%s: the carried FMU answers with status %d", call, status);
 }
 

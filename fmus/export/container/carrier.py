@@ -61,7 +61,7 @@ def build_carrier(
             for path in inside.rglob("*")
             if path.is_file()
         }
-    files[f"binaries/{where.folder(2)}/{NAME}{where.suffix}"] = built
+    files[f"binaries/{where.folder(2)}/{_named(description)[1]}{where.suffix}"] = built
     write_at_once(out, packed(files, zipfile.ZIP_STORED))
     return out
 
@@ -133,14 +133,20 @@ def _limit(row: dict[str, Any], key: str, without: float) -> str:
     return repr(without if given is None else min(max(float(given), -LARGEST), LARGEST))
 
 
+def _named(description: FmuDescription) -> tuple[str, str]:
+    """Name of the model, and of the library: those of an FMU that stands in the place of what it carries."""
+    return (description.name, description.identifier) if description.exchange else (NAME, NAME)
+
+
 def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
     """modelDescription.xml."""
+    name, identifier = _named(description)
     root = Element(
-        "fmiModelDescription", fmiVersion="2.0", modelName=NAME, guid=NO_TOKEN,
+        "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=NO_TOKEN,
         description=card["description"], variableNamingConvention="structured",
     )  # fmt: skip
     once = {"canBeInstantiatedOnlyOncePerProcess": flag(description.once_per_process)}
-    SubElement(root, "CoSimulation", {"modelIdentifier": NAME, **once, **ABILITIES})
+    SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **once, **ABILITIES})
     if card["units"]:
         units = SubElement(root, "UnitDefinitions")
         for name, exponents in card["units"].items():
@@ -159,4 +165,9 @@ def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
     node = SubElement(structure, "Outputs")
     for i in outputs:
         SubElement(node, "Unknown", index=str(i + 1))
+    computed = [i for i in outputs if card["variables"][i]["initial"] == "calculated"]
+    if computed:
+        node = SubElement(structure, "InitialUnknowns")
+        for i in computed:
+            SubElement(node, "Unknown", index=str(i + 1))
     return text(root)

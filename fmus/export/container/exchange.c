@@ -11,6 +11,7 @@
 #define NUDGE 1.5e-8   /* of the same, of a finite difference */
 #define LEAST_PART 1e-9 /* of a step: events that are nearer are at the same time; shorter parts have failed */
 enum { MOST_PARTS = 100000, MOST_EVENTS = 10000 };
+enum { LEAST_ROWS = 3 }; /* of a table: with less, parts would stay as short as a low order needs */
 
 /* An error, and why, which the refusal of the step tells. */
 static int because(Instance *m, const char *format, ...) {
@@ -36,7 +37,7 @@ static int slopes(Instance *m, double t, const double *x, double *dx) {
     return status;
 }
 
-/* In event mode, come to new discrete states; no such status where the FMU asks for the end. */
+/* In event mode, come to new discrete states, or to the end for which the FMU asks (`over`). */
 static int settle(Instance *m) {
     for (int k = 0; k < MOST_EVENTS; k++) {
 #if BASE_FMI == 2
@@ -51,8 +52,8 @@ static int settle(Instance *m) {
         m->due = timed ? then : HUGE_VAL;
 #endif
         if (status > WARNING) return status;
-        if (ends) return because(m, "it asks to end the simulation");
-        if (!again) return 0;
+        m->over = ends;
+        if (ends || !again) return 0;
     }
     return because(m, "discrete states do not settle within %d updates", MOST_EVENTS);
 }
@@ -116,6 +117,11 @@ static int linearise(Instance *m, double t) {
         double kept = m->x[j], by = NUDGE * scale_of(m, j);
         m->x[j] = kept + by;
         status = slopes(m, t, m->x, moved);
+        if (status == (int)fmi2Discard) { /* there may be no values on this side */
+            m->x[j] = kept - by;
+            by = -by;
+            status = slopes(m, t, m->x, moved);
+        }
         m->x[j] = kept;
         for (int i = 0; i < N_X && status <= WARNING; i++) m->jacobian[i * N_X + j] = (moved[i] - dx[i]) / by;
     }
@@ -146,7 +152,7 @@ static int extrapolated(Instance *m, double t, double h, double *x1, double *err
     int status = m->known ? 0 : linearise(m, t);
     *error = N_X ? HUGE_VAL : 0.0;
     *order = 1;
-    for (int row = 0; row < COLUMNS && *error > 1 && status <= WARNING; row++) {
+    for (int row = 0; row < COLUMNS && (*error > 1 || (N_X && row < LEAST_ROWS)) && status <= WARNING; row++) {
         status = by_euler(m, t, h, row + 1, x1);
         if (status > WARNING || !row) {
             memcpy(table[0], x1, N_X * sizeof(double));
@@ -202,18 +208,19 @@ static int up_to_event(Instance *m, double t, double *h, double *x1, double leas
 
 /* One part of at most h s, which may become shorter; event: whether it ends at one of state. */
 static int part_of(Instance *m, double t, double *h, double *longer, double least, bool *event) {
-    double x1[AT_LEAST_1(N_X)], error = 0;
-    int order = 1;
+    double x1[AT_LEAST_1(N_X)], error = 0, known = *longer;
+    int order = 1, status;
     for (;;) {
-        int status = extrapolated(m, t, *h, x1, &error, &order);
+        status = extrapolated(m, t, *h, x1, &error, &order);
+        if (status <= WARNING && error <= 1) status = crossed(m, t + *h, x1, event);
         if (status > WARNING && status != (int)fmi2Discard) return status;
         if (status <= WARNING && error <= 1) break;
+        known = 0; /* what was hoped for is too long */
         *h *= status > WARNING ? 0.25 : fmax(0.1, 0.9 * pow(error, -1.0 / (order + 1)));
         if (*h < least) return because(m, "no part of it is short enough at t = %g s", t);
     }
-    *longer = *h * fmin(4.0, 0.9 * pow(fmax(error, 1e-9), -1.0 / (order + 1)));
-    int status = crossed(m, t + *h, x1, event);
-    if (status <= WARNING && *event) status = up_to_event(m, t, h, x1, least);
+    *longer = fmax(known, *h * fmin(4.0, 0.9 * pow(fmax(error, 1e-9), -1.0 / (order + 1))));
+    if (*event) status = up_to_event(m, t, h, x1, least);
     if (status > WARNING) return status;
     memcpy(m->x, x1, N_X * sizeof(double));
     m->known = false;
@@ -233,6 +240,7 @@ static int completed(Instance *m, bool *event) {
     return ends ? because(m, "it asks to end the simulation") : status;
 }
 
+/* Go on in event mode; whether it asks for the end there, `over` says. */
 static int to_events(Instance *m) {
     int status = (int)m->event(m->base);
     return status > WARNING ? status : settle(m);
@@ -240,7 +248,8 @@ static int to_events(Instance *m) {
 
 static int step_base(Instance *m, double t, double dt) {
     double now = t, h = dt, longer = dt, least_part = LEAST_PART * dt;
-    int status = settle(m);
+    int status = m->over ? 0 : settle(m);
+    if (m->over) return because(m, "it asks to end the simulation at t = %g s", t);
     if (status <= WARNING) status = go_on_from(m, t);
     for (int k = 0; status <= WARNING && t + dt - now > least_part; k++) {
         double upto = fmin(t + dt, m->due);
@@ -260,6 +269,8 @@ static int step_base(Instance *m, double t, double dt) {
         if (status > WARNING) break;
         if (event || now >= m->due - least_part) {
             status = to_events(m);
+            if (m->over && t + dt - now <= least_part) return status; /* the step is made; no other one will be */
+            if (m->over) return because(m, "it asks to end the simulation at t = %g s", now);
             if (status <= WARNING) status = go_on_from(m, now);
         } else {
             memcpy(m->z, m->next, sizeof m->z);
@@ -270,5 +281,6 @@ static int step_base(Instance *m, double t, double dt) {
 
 static int leave_base(Instance *m) {
     int status = (int)m->leave(m->base);
-    return status > WARNING ? status : settle(m);
+    if (status <= WARNING) status = settle(m);
+    return m->over ? because(m, "it asks to end the simulation before it began") : status;
 }

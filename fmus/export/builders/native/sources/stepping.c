@@ -88,7 +88,7 @@ static Status do_step(Instance *m, const char *call, double time, double duratio
         return refuse(m, ERROR, "%s: begins at %.9g s, but the instance is at %.9g s", call, time, m->now.time);
     for (int i = 0; i < N_INPUTS; i++) {
         double end = m->now.values[FIRST_INPUT + i] + m->now.rates[i] * duration;
-        if (m->now.rates[i] != 0 && acceptable(m, call, (unsigned)(FIRST_INPUT + i), end) != OK) return ERROR;
+        if (m->now.rates[i] != 0 && acceptable(m, call, (unsigned)(FIRST_INPUT + i), end) != OK) return DISCARD;
     }
     if (!advance(m, duration))
         return refuse(m, DISCARD, "%s: no step is short enough after t = %g s", call, time);

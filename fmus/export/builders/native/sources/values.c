@@ -101,7 +101,8 @@ static Status set_rates(Instance *m, const char *call, const unsigned *reference
         if (i < FIRST_INPUT || i >= FIRST_PARAMETER)
             return refuse(m, ERROR, "%s: reference %u is not that of an input", call, references[k]);
         if (orders[k] != 1)
-            return refuse(m, ERROR, "%s: %s: order %d; inputs are linear within a step", call, VARIABLES[i].name, orders[k]);
+            return refuse(m, ERROR, "%s: %s: order %d; inputs are linear within a step", call, VARIABLES[i].name,
+                          orders[k]);
         if (!isfinite(rates[k]))
             return refuse(m, ERROR, "%s: %s: a rate of %g is not a finite number", call, VARIABLES[i].name, rates[k]);
     }

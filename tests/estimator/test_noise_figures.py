@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ks_2samp
 
-from estimator.closeloop.detection.detect import SIZE, SLOW, _figures, noise_figures
+from estimator.noise_figures import SIZE, SLOW, figures_of, figures_of_noise
 
 DRAWS = 2000
 
@@ -19,7 +19,7 @@ def sample_by_sample(
     for _ in range(DRAWS):
         e = rng.standard_normal((n, n_y))
         e -= (late @ (root @ rng.standard_normal(root.shape[1]))).reshape(e.shape)
-        for name, value in _figures(e, pieces).items():
+        for name, value in figures_of(e, pieces).items():
             found[name].append(value)
     return found
 
@@ -43,7 +43,7 @@ def test_the_figures_are_distributed_as_those_of_noise(seed, n, n_y, unknowns, s
     if unknowns > 1:
         late[:, 1] = late[:, 0]
     root = size * rng.standard_normal((unknowns, unknowns)) / np.sqrt(n)
-    few = noise_figures((n, n_y), late, root, 40, DRAWS, rng)
+    few = figures_of_noise((n, n_y), late, root, 40, DRAWS, rng)
     every = sample_by_sample(n, n_y, late, root, 40, rng)
     for name in (SIZE, SLOW):
         assert len(few[name]) == DRAWS
@@ -51,7 +51,9 @@ def test_the_figures_are_distributed_as_those_of_noise(seed, n, n_y, unknowns, s
 
 
 def test_without_unknowns_the_size_is_a_chi_square():
-    found = noise_figures((1000, 1), np.empty((0, 0)), np.zeros((0, 0)), 40, DRAWS, np.random.default_rng(0))
+    found = figures_of_noise(
+        (1000, 1), np.empty((0, 0)), np.zeros((0, 0)), 40, DRAWS, np.random.default_rng(0)
+    )
     assert np.mean(found[SIZE]) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 1000 / DRAWS))
     assert np.var(found[SIZE]) == pytest.approx(2 / 1000, rel=0.15)
     assert np.mean(found[SLOW]) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 40 / DRAWS))
