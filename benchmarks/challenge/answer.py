@@ -1,7 +1,7 @@
 """Close the loop on one record: `python -m benchmarks.challenge.answer RECORD ANSWER CORES`.
 
-With the further argument `ablate`, its fits are judged again by every policy of the ablation; the times are those
-of the answer alone.
+With the further argument `ablate`, its fits are judged again by every policy of the ablation; the times are
+those of the answer alone.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks.challenge.ablation import ablated
 from estimator.closeloop.checkpoints import Stages
 from estimator.plant import PLANTS
 from scenarios.closing.closing import Posed, closed, experiment_of
@@ -30,6 +29,8 @@ def main() -> None:
         found, result = closed(posed, None, lambda _: None, cores or None, 0, begun, Stages())
         told = {"result": asdict(result), "cpu_seconds": _used()}
         if "ablate" in sys.argv[4:]:
+            from benchmarks.challenge.ablation import ablated  # loads truth models, which an answer must not
+
             told |= {"seconds": round(time.monotonic() - begun, 1), "ablation": ablated(found)}
             PLANTS.close()
     answer.write_text(json.dumps(told), encoding="utf-8")

@@ -140,8 +140,8 @@ class Chain:
         return self.stages.done(
             "detection",
             lambda: detect(
-                shown.baseline, replace(seen, residual=in_noise), regressors, shown.likeness, shown.began,
-                np.random.default_rng(self.seed),
+                shown.baseline, replace(seen, residual=in_noise), regressors, shown.alike(seen),
+                shown.likeness, shown.began, np.random.default_rng(self.seed),
             ),
         )  # fmt: skip
 
@@ -149,7 +149,8 @@ class Chain:
         self.tell("diagnostics", "fitting a black-box model and computing the smallest detectable effects")
         level, rng = detection.level / len(detection.figures), np.random.default_rng(self.seed)
         return self.stages.done(
-            "diagnostics", lambda: diagnose(shown.baseline, shown.fit, shown.change, level, rng)
+            "diagnostics",
+            lambda: diagnose(shown.baseline, shown.fit, shown.change, shown.alike(shown.fit), level, rng),
         )
 
     def _answer(

@@ -38,6 +38,13 @@ class Linearised:
         """The same linearisation with some of the outputs."""
         return replace(self, C=self.C[:, outputs], D=self.D[:, outputs])
 
+    def over(self, steps: int) -> "Linearised":
+        """The same for as many steps at once, with levers held over them."""
+        A, B = np.broadcast_to(np.eye(self.A.shape[1]), self.A.shape), np.zeros_like(self.B)
+        for _ in range(steps):
+            A, B = self.A @ A, self.A @ B + self.B
+        return replace(self, A=A, B=B)
+
     def near(self, samples: int) -> NDArray[np.intp]:
         """For each sample the index of the last linearisation before it, (samples,)."""
         near: NDArray[np.intp] = np.maximum(np.searchsorted(self.index, np.arange(samples), "right") - 1, 0)

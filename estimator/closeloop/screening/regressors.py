@@ -15,7 +15,7 @@ Changes = Sequence[tuple[Candidate, Array]]  # candidates with their changes (m,
 NOTHING = 1e-6  # share of a regressor's length after projection, below which only rounding is left
 RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
 COLUMNS_AT_ONCE = 64  # largest number of columns per batch
-ROWS_AT_ONCE = 2000  # rows of all regressors that are brought together in one array
+SKETCHED = 2000  # length of the random sketch of a long regressor
 BATCH = 1 << 26  # bytes of a batch; copies of hundreds of long columns would not fit into memory
 
 
@@ -67,18 +67,19 @@ def is_wave(c: Candidate) -> bool:
 
 
 def alike(
-    calibration: Calibration, change: Changes, rows: int, rng: np.random.Generator
+    calibration: Calibration, columns: Iterable[Array], rng: np.random.Generator, rows: int = SKETCHED
 ) -> tuple[Array, Array]:
     """Lengths of all projected columns (K,), zero if only rounding is left, and their cosines (K, K).
 
-    For long columns these are estimated from random sums of rows (a count sketch: Charikar, Chen,
-    Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), with an error of about 1 / sqrt(rows).
+    columns: (m, k), one set after the other. For long columns cosines are estimated from random sums of rows
+    (a count sketch: Charikar, Chen, Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), with an
+    error of about 1 / sqrt(rows).
     """
     m = len(calibration.basis)
     rows = min(rows, m)
     signs = rng.choice([-1.0, 1.0], m) if m > rows else np.ones(m)
     sums, lengths = [], []
-    for _, g in batches(g for _, g in change):
+    for _, g in batches(columns):
         left = calibration.without(g)
         length = np.linalg.norm(left, axis=0)
         nothing = length <= NOTHING * np.linalg.norm(g, axis=0)
@@ -92,18 +93,3 @@ def alike(
     s = np.hstack(sums)
     s /= np.linalg.norm(s, axis=0) + 1e-300
     return np.concatenate(lengths), s.T @ s
-
-
-def directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
-    """Products (k,) of the residual with the regressors, projected and of length 1, and of these (k, k)."""
-    q = Calibration.of(screened).basis
-    within = np.vstack([g.T @ q for _, g in batches(regressors)])
-    along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
-    for first in range(0, len(q), ROWS_AT_ONCE):
-        rows = slice(first, first + ROWS_AT_ONCE)
-        left = np.vstack([g[rows].T for g in regressors]) - within @ q[rows].T
-        along += left @ screened.residual[rows]
-        gram += left @ left.T
-        let_go()
-    size = np.sqrt(np.diag(gram)) + 1e-300
-    return along / size, gram / size[:, None] / size
