@@ -4,6 +4,7 @@ from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from multiprocessing.util import Finalize
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -16,6 +17,26 @@ from fmus.host.fmu import Fmu
 
 PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
 TOGETHER = 1 << 28  # bytes of results that are simulated at once: those of eight rows of an hour do not fit
+EVEN = 1e-6  # of a sample, by which the times of a run may be unevenly spaced if a step joins several of them
+
+
+class Steps(NamedTuple):
+    """The steps of a simulation: parts into which each usual step is divided, and what acts over them.
+
+    joined: whether a step goes over four parts and knows its inputs within them, for which the FMU must be
+    one of ours, see `Fmu.simulate_rows`. If not, the mean of its inputs acts over each part.
+    """
+
+    parts: int = 1
+    joined: bool = False
+
+    @property
+    def halved(self) -> "Steps":
+        """Steps of half the length."""
+        return self._replace(parts=2 * self.parts)
+
+
+USUAL, JOINED = Steps(), Steps(joined=True)
 
 
 class Plant:
@@ -39,40 +60,44 @@ class Plant:
         start: Mapping[str, float],
         more: Sequence[str] = (),
         push: Mapping[str, Array] | None = None,
-        finer: int = 1,
+        steps: Steps = USUAL,
     ) -> Array:
         """Simulate a run from its first sample: the outputs, then the variables `more`, (N, n_y + n_more).
 
         start: states and parameters by name; push: samples (N,) that are added to inputs. Inputs are samples
-        of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic. finer:
-        parts into which each step is divided further.
+        of continuous signals, see Fmu.simulate; an input with its rate is interpolated by a cubic.
         """
         names = (*self.outputs, *more)
-        key = None if push else self._key(run, start, names, finer)
+        key = None if push else self._key(run, start, names, steps)
         if key is not None and (found := self._kept.get(key, names)) is not None:
             return found
-        t, inputs, pieces = self._given(run, finer)
+        t, inputs, pieces = self._given(run, steps)
         if push:
             inputs = dict(inputs)
             for name, samples in push.items():
                 inputs[name] = inputs.get(name, 0.0) + np.interp(t, run.t, samples)
-        alone = self.fmu.simulate_rows(t, inputs, names, [start])  # half the time of a loop over steps
+        # half the time of a loop over steps
+        alone = self.fmu.simulate_rows(t, inputs, names, [start], steps.joined)
         y = (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
         if key is not None:
             self._kept.put(key, names, y)
         return y
 
     def simulate_rows(
-        self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = (), finer: int = 1
+        self,
+        run: Run,
+        starts: Sequence[Mapping[str, float]],
+        more: Sequence[str] = (),
+        steps: Steps = USUAL,
     ) -> list[Array] | None:
         """As `simulate` for each of several starts; None if the FMU does not offer it."""
         names = (*self.outputs, *more)
-        keys = [self._key(run, start, names, finer) for start in starts]
+        keys = [self._key(run, start, names, steps) for start in starts]
         kept = [None if key is None else self._kept.get(key, names) for key in keys]
         if not (new := [start for start, y in zip(starts, kept, strict=True) if y is None]):
             return [y for y in kept if y is not None]
-        t, inputs, pieces = self._given(run, finer)
-        if (rows := self.fmu.simulate_rows(t, inputs, names, self._alike(new))) is None:
+        t, inputs, pieces = self._given(run, steps)
+        if (rows := self.fmu.simulate_rows(t, inputs, names, self._alike(new), steps.joined)) is None:
             return None
         made = iter(rows)
         found = [next(made)[::pieces] if y is None else y for y in kept]
@@ -82,17 +107,23 @@ class Plant:
         return found
 
     def simulate_in_turn(
-        self, run: Run, starts: Sequence[Mapping[str, float]], more: Sequence[str] = ()
+        self,
+        run: Run,
+        starts: Sequence[Mapping[str, float]],
+        more: Sequence[str] = (),
+        steps: Steps = USUAL,
     ) -> Iterator[Array]:
         """As `simulate` for each of several starts, as many at once as `at_once` says."""
         at_once = self.at_once(run, len(more))
         for first in range(0, len(starts), at_once):
             some = starts[first : first + at_once]
-            rows = self.simulate_rows(run, some, more)
-            yield from (self.simulate(run, start, more) for start in some) if rows is None else rows
+            rows = self.simulate_rows(run, some, more, steps)
+            yield from (
+                (self.simulate(run, start, more, steps=steps) for start in some) if rows is None else rows
+            )
 
     def simulate_ahead(
-        self, runs: Sequence[Run], asked: Sequence[Sequence[Mapping[str, float]]], finer: int
+        self, runs: Sequence[Run], asked: Sequence[Sequence[Mapping[str, float]]], steps: Steps
     ) -> None:
         """Simulate what will be asked for one by one, all starts of a run at once, if all that can be kept.
 
@@ -105,7 +136,7 @@ class Plant:
         ]
         if self.fmu.at_once > 1 and self._kept.room_for_all(sizes):
             for run, starts in zip(runs, asked, strict=True):
-                self.simulate_rows(run, starts, finer=finer)
+                self.simulate_rows(run, starts, steps=steps)
 
     def _alike(self, starts: Sequence[Mapping[str, float]]) -> Sequence[Mapping[str, float]]:
         """The starts with the same names: what one does not name has its start value, as in an instance."""
@@ -124,18 +155,23 @@ class Plant:
         return max(1, min(self.fmu.at_once, TOGETHER // size))
 
     def _key(
-        self, run: Run, start: Mapping[str, float], names: tuple[str, ...], finer: int
+        self, run: Run, start: Mapping[str, float], names: tuple[str, ...], steps: Steps
     ) -> Hashable | None:
         """All that variables of a simulation depend on; None if these, by name, are too long to be kept."""
         if not self._kept.room_for(8 * len(run.t) * len(names)):
             return None
         if self._seen is None or self._seen[0] is not run:
             self._seen = run, digest(run)
-        return self, self._seen[1], finer, bits(start)
+        return self, self._seen[1], steps, bits(start)
 
-    def _given(self, run: Run, finer: int) -> tuple[Array, dict[str, Array], int]:
+    def joins(self, runs: Sequence[Run]) -> bool:
+        """Whether a step may go over several samples of these runs."""
+        steps = (np.diff(run.t) for run in runs)
+        return self.fmu.joins and all(len(s) > 0 and np.ptp(s) < EVEN * s[0] for s in steps)
+
+    def _given(self, run: Run, steps: Steps) -> tuple[Array, dict[str, Array], int]:
         """Times and inputs of a run as set in the FMU, and the pieces of a step; cached for the run."""
-        pieces = self._pieces(run.t) * finer
+        pieces = self._pieces(run.t) * steps.parts
         if self._fine is None or self._fine[0] is not run or self._fine[3] != pieces:
             inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
             fine = (run.t, inputs) if pieces == 1 else between(run.t, inputs, pieces)
@@ -148,15 +184,22 @@ class Plant:
             return 1
         return min(MOST, max(1, round(float(np.median(np.diff(t))) / PIECE)))
 
-    def response(self, x: Array, given: Mapping[str, float], dt: float) -> tuple[Array, Array]:
-        """The state (n,) after a step from state x, and the outputs (n_y,) before the step.
+    def responses(self, starts: Sequence[Mapping[str, float]], dt: float) -> tuple[Array, Array]:
+        """The states (k, n) after a step from each of k starts, and the outputs (k, n_y) before the step.
 
-        given: inputs and parameters by name.
+        starts: states, inputs and parameters by name, the same names in each.
         """
-        self.fmu.restart(0.0, **{**given, **dict(zip(self.states, x.tolist(), strict=True))})
-        y = np.array(self.fmu.read(self.outputs))
+        rows = self.fmu.simulate_rows(np.array([0.0, dt]), {}, (*self.outputs, *self.states), starts)
+        if rows is not None:
+            return rows[:, 1, len(self.outputs) :], rows[:, 0, : len(self.outputs)]
+        x, y = zip(*(self._response(start, dt) for start in starts), strict=True)
+        return np.array(x), np.array(y)
+
+    def _response(self, start: Mapping[str, float], dt: float) -> tuple[list[float], list[float]]:
+        self.fmu.restart(0.0, **start)
+        y = self.fmu.read(self.outputs)
         self.fmu.step(dt)
-        return np.array(self.fmu.read(self.states)), y
+        return self.fmu.read(self.states), y
 
 
 def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, dict[str, Array]]:

@@ -1,5 +1,6 @@
 """Files and folders that are written as a whole or not at all, also where the process is killed."""
 
+import errno
 import fcntl
 import os
 import shutil
@@ -7,6 +8,8 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)  # errors of a disk, not of a path
 
 
 def write_at_once(target: Path, data: bytes) -> None:

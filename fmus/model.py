@@ -18,6 +18,8 @@ import casadi as cs
 from fmus.effects.effect import Effect
 from fmus.effects.site import Site
 from fmus.integrators import integrator
+from fmus.integrators.integrator import Integrator
+from fmus.integrators.joined import joined_step
 from fmus.option import BuildOption, Choice, chosen
 from fmus.port import UNITS
 from fmus.variables import (
@@ -148,9 +150,20 @@ def equations(model: Model) -> Equations:
     f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])
     h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
     f, h = _own([f, h])
-    tolerated = [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
-    method = integrator(type(model).method, f"model '{model.name}'")
-    return Equations(f, h, method.step(f, tolerated))
+    return Equations(f, h, _method(model).step(f, _tolerated(model)))
+
+
+def joined(model: Model, made: Equations) -> cs.Function | None:
+    """The step of a model over several samples of its inputs; None where its method has no such step."""
+    return joined_step(made.f, _tolerated(model)) if _method(model).joins else None
+
+
+def _method(model: Model) -> Integrator:
+    return integrator(type(model).method, f"model '{model.name}'")
+
+
+def _tolerated(model: Model) -> list[float]:
+    return [model.tolerance * (v.nominal or 1.0) for v in model.of(State)]
 
 
 def _own(functions: list[cs.Function]) -> list[cs.Function]:

@@ -1,6 +1,5 @@
 """Runs of `railfmi fleet` that are killed on the way: a worker, the command, or the scheduler."""
 
-import ctypes
 import json
 import os
 import signal
@@ -13,9 +12,9 @@ from pathlib import Path
 
 import psutil
 
+from fmus.processes import end_with_parent
+
 LOOK = 0.5  # s, between looks at the number of finished tasks
-DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
-_LIBRARY = ctypes.CDLL(None) if sys.platform == "linux" else None  # loaded before any process is forked
 STARTED = 120  # s, until a scheduler has written its address, and until a worker has reached it
 WORKER = "multiprocessing"  # in the command line of the workers that a command starts
 
@@ -48,8 +47,7 @@ def started(arguments: Sequence[str], log: Path) -> Iterator["subprocess.Popen[b
 
 def _with_its_parent() -> None:
     """In the new process: it is told to end when the one that started it has ended."""
-    if _LIBRARY is not None:
-        _LIBRARY.prctl(DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
+    end_with_parent(signal.SIGTERM)
 
 
 class Early(Exception):

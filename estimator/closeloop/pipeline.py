@@ -19,7 +19,7 @@ from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_inp
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
-from estimator.closeloop.fitting.resolution import in_fine_steps
+from estimator.closeloop.fitting.resolution import in_fine_steps, in_joined_steps, joined_steps_hold
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -110,18 +110,27 @@ class Chain:
         return replace(found, baseline=replace(found.baseline, hypothesis=base))
 
     def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
-        """The problem and what `calibrate` finds, with smoothed inputs if the FMU is nearer with these.
+        """The problem and what `calibrate` finds, in steps that join several samples if these hold."""
+        joined = in_joined_steps(self.problem)
+        found = self._in_steps(joined, self.stages)
+        problem, _, base, noise = found
+        if joined is self.problem or joined_steps_hold(problem, base, noise.weighting):
+            return found
+        self.tell("steps", "calibrating in steps of one sample")
+        return self._in_steps(self.problem, self.stages.under("held"))
+
+    def _in_steps(self, problem: Problem, stages: Stages) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
+        """The same in the steps of a problem, with smoothed inputs if the FMU is nearer with these.
 
         What looks like noise of an input may be the excitation itself, with which the FMU is nearer.
         """
-        done = self.stages.done
-        found = done("calibrated", lambda: calibrate(self.problem))
-        other = without_input_noise(self.problem, found[1].theta)
+        found = stages.done("calibrated", lambda: calibrate(problem))
+        other = without_input_noise(problem, found[1].theta)
         if other is None:
-            return self.problem, *found
+            return problem, *found
         self.tell("inputs", "calibrating with smoothed inputs")
-        again = done("smoothed", lambda: calibrate(other))
-        return (other, *again) if nearer(other, again[1], found[1]) else (self.problem, *found)
+        again = stages.done("smoothed", lambda: calibrate(other))
+        return (other, *again) if nearer(other, again[1], found[1]) else (problem, *found)
 
     def _detected(self, shown: Screened) -> Detection:
         self.tell("detect", "testing whether the residual is more than noise")
@@ -131,8 +140,8 @@ class Chain:
         return self.stages.done(
             "detection",
             lambda: detect(
-                shown.baseline, replace(seen, residual=in_noise), regressors, shown.likeness, shown.began,
-                np.random.default_rng(self.seed),
+                shown.baseline, replace(seen, residual=in_noise), regressors, shown.alike(seen),
+                shown.likeness, shown.began, np.random.default_rng(self.seed),
             ),
         )  # fmt: skip
 
@@ -140,7 +149,8 @@ class Chain:
         self.tell("diagnostics", "fitting a black-box model and computing the smallest detectable effects")
         level, rng = detection.level / len(detection.figures), np.random.default_rng(self.seed)
         return self.stages.done(
-            "diagnostics", lambda: diagnose(shown.baseline, shown.fit, shown.change, level, rng)
+            "diagnostics",
+            lambda: diagnose(shown.baseline, shown.fit, shown.change, shown.alike(shown.fit), level, rng),
         )
 
     def _answer(
@@ -251,7 +261,7 @@ def _in_fine_steps(
     """
     before = shown.baseline
     finer = in_fine_steps(fitter, new)
-    if finer.finer == before.problem.finer:
+    if finer.steps == before.problem.steps:
         return shown, list(new)
     return replace(shown, baseline=before.asked(finer)), list(members)
 

@@ -271,7 +271,8 @@ class SearchPolicy:
     moved_by_steps: float = limit(
         0.5,
         "standard errors",
-        "movement of an unknown of an answer by halved steps of the simulation, above which they are halved",
+        "movement of an unknown by halved steps of the simulation, above which those of an answer are "
+        "halved, and those of a search do not go over several samples",
         "derivation: a bias of half of an error adds 12 % to it, as `noise_share`",
     )
     parts_of_a_step: int = limit(
@@ -409,7 +410,8 @@ class DecisionPolicy:
         "share of the variance",
         "share that an answer must explain of the residual's variance if noise is not declared, and that one "
         "effect must explain of the variance beyond noise if the model form is open; a residual of which no "
-        "effect could explain as much is left to the form",
+        "effect could explain as much is left to the form; what inputs that were held over a sample must "
+        "explain of the variance beyond noise",
         "derivation: what explains less than it leaves is not what the residual is mainly made of",
     )
     open_alike: float = limit(

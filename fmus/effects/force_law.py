@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import cache
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as cs
@@ -17,13 +17,13 @@ from fmus.errors import BadInput
 from fmus.integrators.rk4 import runge_kutta
 from fmus.port import UNITS, Port
 from fmus.sampled import Sampled
+from fmus.stepped import Stepped
 from fmus.variables import Expr
 
 if TYPE_CHECKING:
     from fmus.effects.site import Site
 
 Array = NDArray[np.float64]
-KEPT = 4  # lengths of records for which a law is kept compiled
 RANKED = 1000  # samples that rank shapes
 HANDFUL = 3  # shapes that are worth a simulation each
 
@@ -91,8 +91,7 @@ class ForceLaw(Effect):
         if law.states:
             given = np.vstack([t, q, v, np.tile(np.array(values_here)[:, None], len(t))])
             x0 = np.array([s.start for s in cls.states("translation")])
-            x1 = law.steps(len(t) - 1)(x0, given[:, :-1], given[:, 1:]).full()
-            x = [*np.column_stack([x0, x1])]
+            x = [*law.steps(x0, given, np.diff(t))]
         force: Array = law.force([t, q, v, *values_here, *x], len(t))[0]
         return force
 
@@ -114,7 +113,7 @@ class ForceLaw(Effect):
     @classmethod
     def offered(cls, site: Site, location: str) -> bool:
         """See Effect.offered: a law over the displacement needs one."""
-        return site.ports()[location].has_displacement or not cls.needs_displacement()
+        return not cls.needs_displacement() or site.ports()[location].has_displacement
 
     @classmethod
     def needs_displacement(cls) -> bool:
@@ -154,10 +153,7 @@ class ForceLaw(Effect):
 
 
 class _Compiled:
-    """A law as functions: force(w, x), step(x, w at both ends) -> x; w is (t, q, v, parameters).
-
-    steps(n): the steps between n samples, kept since they take longer to make than to call.
-    """
+    """A law as functions: force(w, x) and its steps through samples; w is (t, q, v, parameters)."""
 
     def __init__(self, law: type[ForceLaw]) -> None:
         self.states = [s.name for s in law.states("translation")]
@@ -173,10 +169,9 @@ class _Compiled:
         slopes = cs.vertcat(*(rates[name] for name in self.states))
         self.of_displacement = bool(cs.depends_on(cs.vertcat(force, slopes), w[1]))
         f = cs.Function("f", [w, x], [slopes])
-        a, b = cs.SX.sym("a", n), cs.SX.sym("b", n)
-        after = runge_kutta(f, x, b[0] - a[0], (a, (a + b) / 2, b))
-        step = cs.Function("step", [x, a, b], [after])
-        self.steps = lru_cache(KEPT)(step.mapaccum)
+        a, b, dt = cs.SX.sym("a", n), cs.SX.sym("b", n), cs.SX.sym("dt")
+        after = runge_kutta(f, x, dt, (a, (a + b) / 2, b))
+        self.steps = Stepped(cs.Function("step", [x, a, b, dt], [after]))
 
 
 @cache

@@ -15,6 +15,14 @@ from fmus.variables import (
 
 STOP = 10.0  # s, of the default experiment
 KINDS = (State, Input, Parameter, Output)
+SHOWN = {  # unit: how a person reads it, and from what size on
+    "rad": ("deg", 0.0),
+    "rad/s": ("rpm", 1.0),
+    "m/s": ("km/h", 5.0),
+    "N": ("kN", 1e3),
+    "Pa": ("GPa", 1e9),
+    "N/m": ("kN/m", 1e3),
+}
 
 
 def variable_table(model: Model) -> list[dict[str, Any]]:
@@ -61,3 +69,16 @@ def row(v: Variable) -> dict[str, Any]:
         "description": v.doc,
         "source": v.source,
     }
+
+
+def display_unit(r: dict[str, Any]) -> str | None:
+    """The unit in which a person reads a variable, by its row; None where it is that of the variable."""
+    unit, largest = SHOWN.get(r["unit"], (None, 0.0))
+    return unit if max(abs(r["start"]), r["nominal"] or 0.0) >= largest else None
+
+
+def shown_as(unit: str, display: str) -> dict[str, str]:
+    """FMI's <DisplayUnit>: value in it = factor * value in the unit."""
+    of, base = unit_table([display])[display], unit_table([unit])[unit]
+    factor = float(base.get("factor", "1")) / float(of.get("factor", "1"))
+    return {"name": display, "factor": repr(factor)}

@@ -15,7 +15,7 @@ from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
 from fmus.host.instance import Instance
 from fmus.host.loop import Array
-from fmus.host.rows import Inputs, Rows, base_of, offers_rows, rows_at_once
+from fmus.host.rows import Inputs, Rows, base_of, joins, offers_rows, rows_at_once
 from fmus.host.status import AskedToEnd, CallFailed
 
 if TYPE_CHECKING:
@@ -166,28 +166,38 @@ class Fmu:
         """How many rows `simulate_rows` advances in the time of little more than one."""
         return rows_at_once(self._instance)
 
+    @property
+    def joins(self) -> bool:
+        """Whether a step of `simulate_rows` may go over several samples."""
+        return joins(self._instance)
+
     def simulate_rows(
         self,
         t: Array,
         inputs: Mapping[str, Array],
         outputs: Sequence[str],
         starts: Sequence[Mapping[str, float]],
+        joined: bool = False,
     ) -> Array | None:
         """As `simulate` for each of k starts with the same names: outputs (k, N, n_y).
 
+        joined: whether a step goes over four samples, see fmus/integrators/joined.py. The times must be
+        evenly spaced then, and the inputs samples (N,) of continuous signals.
         None if the FMU does not offer it, or refuses a start; simulations one by one say which and why.
         """
-        if not offers_rows(self._instance):
+        if not offers_rows(self._instance) or (joined and not self.joins):
             return None
         first, u = _driving(t, inputs)
         acting, ends = (_means(u), u[1:]) if len(u) == len(t) else (u, None)
+        if joined:
+            acting, ends = u, None
         names = [name for name in starts[0] if name not in first]
         put, get, driven = (np.array(self.references(n), dtype=np.uint32) for n in (names, outputs, inputs))
         rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
         found = np.empty((len(starts), len(t), len(outputs)))
         call = Rows(self._instance.library, base_of(self.description, first), put, get)
         last = None if ends is None else np.ascontiguousarray(ends)
-        held = Inputs(driven, np.ascontiguousarray(acting), last)
+        held = Inputs(driven, np.ascontiguousarray(acting), last, joined)
         refused = call.run(rows, np.ascontiguousarray(t, dtype=float), found, held) >= 0
         return None if refused else found
 

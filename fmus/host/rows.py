@@ -17,6 +17,7 @@ from fmus.host.instance import Instance
 from fmus.host.loop import Array
 
 NAME = "railfmi_rows"
+JOINS = "railfmi_joins"
 FOUR = 4  # rows at once of an FMU that does not say how many
 ALIKE = 1e-12  # of a value, by which a row may differ from an instance alone: vectors round otherwise
 References = NDArray[np.uint32]
@@ -30,16 +31,21 @@ class _Asked(Structure):
         ("put", c_void_p), ("rows", c_void_p), ("n_samples", c_size_t), ("t", c_void_p),
         ("n_inputs", c_size_t), ("inputs", c_void_p), ("during", c_void_p), ("after", c_void_p),
         ("n_get", c_size_t), ("get", c_void_p), ("first", c_int), ("found", c_void_p), ("processor", c_int),
+        ("joined", c_int),
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs that all rows share: references (n_u,), values (N-1, n_u) over each step, and after it."""
+    """Inputs that all rows share: references (n_u,), values (N-1, n_u) over each step, and after it.
+
+    joined: whether a step goes over several samples; the values are those of all samples then, (N, n_u).
+    """
 
     references: References
     during: Array
     after: Array | None
+    joined: bool = False
 
 
 class Rows:
@@ -76,11 +82,12 @@ class Rows:
 
     def _set_inputs(self, inputs: Inputs | None) -> None:
         asked = self._asked
-        asked.n_inputs, asked.inputs, asked.during, asked.after = 0, None, None, None
+        asked.n_inputs, asked.inputs, asked.during, asked.after, asked.joined = 0, None, None, None, 0
         if inputs is not None:
             asked.n_inputs, asked.inputs = len(inputs.references), _at(inputs.references)
             asked.during = _at(inputs.during)
             asked.after = None if inputs.after is None else _at(inputs.after)
+            asked.joined = int(inputs.joined)
 
 
 def offers_rows(instance: Instance) -> bool:
@@ -94,6 +101,11 @@ def rows_at_once(instance: Instance) -> int:
         return 1
     asked = getattr(instance.library, f"{NAME}_at_once", None)
     return int(asked()) if asked else FOUR
+
+
+def joins(instance: Instance) -> bool:
+    """Whether the steps of rows may go over several samples."""
+    return offers_rows(instance) and hasattr(instance.library, JOINS)
 
 
 def base_of(description: FmuDescription, start: Mapping[str, float]) -> Array:

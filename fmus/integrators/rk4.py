@@ -40,6 +40,7 @@ class Rk4(Integrator):
 
     name = "rk4"
     order = 4
+    joins = True
 
     def advance(
         self, f: Callable[[Expr], Expr], x: Expr, dt: Expr, tolerated: Sequence[float]

@@ -22,6 +22,7 @@ class Rk4WithinStability(Integrator):
 
     name = "rk4_within_stability"
     order = 4
+    joins = True
 
     def advance(
         self, f: Callable[[Expr], Expr], x: Expr, dt: Expr, tolerated: Sequence[float]

@@ -13,6 +13,7 @@ from pkgutil import iter_modules
 import typer
 
 from fmus.errors import BadInput
+from fmus.files import DISK
 from scenarios.cli.console import NOTICES, app, say_notices
 from scenarios.cli.supervision import INTERRUPTED, STOPPED, hint, supervised
 from scenarios.cli.voice import VOICE, said, visible
@@ -25,9 +26,7 @@ COMMANDS = {  # module by the name of its command
     if module.name not in NO_COMMANDS
 }
 
-UNWRITABLE = (  # errors of a disk or a folder
-    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.EACCES, errno.EPERM,
-)  # fmt: skip
+UNWRITABLE = (*DISK, errno.EACCES, errno.EPERM)  # errors of a disk or a folder
 
 PIPE_CLOSED = 1  # exit code of a command whose output nobody reads, as that of the library click
 

@@ -19,7 +19,7 @@ from scenarios.cli.console import (
     show,
     will_write,
 )
-from scenarios.cli.supervision import INTERRUPTED, workers_end_too
+from scenarios.cli.supervision import INTERRUPTED
 from scenarios.cli.voice import echo, found, progress
 
 if TYPE_CHECKING:
@@ -63,11 +63,10 @@ def close_loop(
         _try(experiments, out, data, jobs, isolation)
         return
     will_write(out)
-    with workers_end_too():
-        if len(experiments) == 1:
-            _one(experiments[0], out, data, jobs, seed, resume, isolation)
-        else:
-            _several(experiments, out, data, jobs, seed, resume, isolation)
+    if len(experiments) == 1:
+        _one(experiments[0], out, data, jobs, seed, resume, isolation)
+    else:
+        _several(experiments, out, data, jobs, seed, resume, isolation)
 
 
 def _one(

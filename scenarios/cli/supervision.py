@@ -6,32 +6,28 @@ together with its process, whatever its exit code, does not pass for one that ha
 """
 
 import contextlib
-import ctypes
 import mmap
 import os
 import signal
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from threading import Thread, Timer, main_thread
+from threading import Timer, main_thread
 from types import FrameType
 from typing import NoReturn
 
 from fmus.files import passing_folder, remove_left
 from fmus.host import shared
 from fmus.limits import INTERRUPT
+from fmus.processes import adopt_orphans, end_with_parent
 
 Command = Callable[[Sequence[str]], int]
 
 FAILED = 2  # exit code of a command that has not finished
 STOPPED = 130  # exit code of a command that says itself that it was interrupted
-DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
-REAPER = 36  # of the call prctl: orphans among the descendants become children
 PAGE = 1 << 13  # bytes
 AGAIN = 0.05  # s, until an interrupt that was dropped comes again
-LOOK = 1.0  # s, between looks of a worker at whether its command still runs
 FOLDER = "railfmi_command_"  # begin of the name of the folder for temporary files
 ROOMY = "/var/tmp"  # on a disk, as long arrays need (fmus/aside.py); the usual folder may lie in memory
 MEMORY_HINT = "; where memory runs out, the system does this"
@@ -107,7 +103,7 @@ def _watched(command: Command, arguments: Sequence[str], folder: Path) -> int:
     """The exit code of the command, whose temporary files lie in the folder."""
     page = mmap.mmap(-1, PAGE)
     told, tells = os.pipe()
-    _control(REAPER, 1)  # what leaves the command's group of processes is found nevertheless
+    adopt_orphans()  # what leaves the command's group of processes is found nevertheless
     with _signals_wait():
         child = os.fork()
         if not child:
@@ -123,7 +119,7 @@ def _watched(command: Command, arguments: Sequence[str], folder: Path) -> int:
 def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
     """Run the command in this process and leave it."""
     os.setsid()
-    _control(DEATH_SIGNAL, signal.SIGTERM)
+    end_with_parent(signal.SIGTERM)
     signal.signal(signal.SIGINT, INTERRUPTED)
     sys.unraisablehook = INTERRUPTED.comes_again
     code = 1
@@ -140,30 +136,6 @@ def _work(command: Command, arguments: Sequence[str], tells: int) -> NoReturn:
 
 
 @contextlib.contextmanager
-def workers_end_too() -> Iterator[None]:
-    """Workers that joblib starts for this command end with it, also where it is killed."""
-    from joblib import parallel_config  # takes a tenth of a second, which most commands do not need
-
-    with parallel_config("loky", initializer=_end_with, initargs=(os.getpid(),)):
-        yield
-
-
-def _end_with(command: int) -> None:
-    """Let this process end when its parent, by its number, has ended.
-
-    A worker waits for work at pipes whose other ends it holds itself, and so never finds them closed. The
-    system's signal at the death of a parent would come as soon as the thread ends that started the worker.
-    """
-
-    def watch() -> None:
-        while os.getppid() == command:
-            time.sleep(LOOK)
-        os._exit(FAILED)
-
-    Thread(target=watch, name="railfmi-command", daemon=True).start()
-
-
-@contextlib.contextmanager
 def _signals_wait() -> Iterator[None]:
     """Signals that come before there is something to do with them come afterwards."""
     signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
@@ -171,11 +143,6 @@ def _signals_wait() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)
-
-
-def _control(what: int, value: int) -> None:
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(what, value, 0, 0, 0)
 
 
 class Watch:

@@ -21,8 +21,9 @@ from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
 from estimator.record import Record
+from estimator.workers import workers_end_too
 from fmus.errors import BadInput
-from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
+from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder, co_simulated
 from fmus.export.provenance import Origin, checksum, isolation_of
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
@@ -35,6 +36,7 @@ from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.given import Given, given
 from scenarios.experiment.record import load_record
 from scenarios.output import writable, written_at_once
+from scenarios.tasks.hashes import hash_of_data
 
 Tell = Callable[[str], None]
 
@@ -45,6 +47,7 @@ Builder = ModelBuilder | ForeignBuilder
 STAGES = ".stages"  # folder of the checkpoints, kept when a run is interrupted
 
 
+@workers_end_too()
 def close_loop(
     experiment: Given,
     out: str | Path | None = None,
@@ -119,9 +122,10 @@ def stages_of(e: Experiment, folder: Path | None, seed: int, resume: bool) -> St
     """
     if folder is None:
         return Stages()
-    files = [*([e.file] if e.file.is_file() else []), *e.every_file, *([e.fmu_path] if e.fmu_path else [])]
+    files = [*([e.file] if e.file.is_file() else []), *([e.fmu_path] if e.fmu_path else [])]
     said = [] if e.file.is_file() else [sha256(repr(dict(e)).encode()).hexdigest()]
-    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files), *said]
+    data = map(hash_of_data, e.every_file)
+    key = [version("railfmi"), DEFAULT.version, str(seed), *map(checksum, files), *data, *said]
     stages = Stages(folder / STAGES, " ".join(key))
     if not resume:
         stages.forget()
@@ -179,7 +183,9 @@ def builder_for(e: Experiment, work: Path, isolation: Isolation | None = ISOLATE
         PortNames(p.name, p.force, p.velocity, p.displacement, units.get(p.velocity), p.integrate)
         for p in e.ports
     )
-    return ForeignBuilder(e.fmu_path, ports, work, isolation_of(e.fmu_path, isolation))
+    fmu = co_simulated(e.fmu_path, work)
+    inside = None if fmu == e.fmu_path else e.fmu_path
+    return ForeignBuilder(fmu, ports, work, isolation_of(e.fmu_path, isolation), inside)
 
 
 def pose(e: Experiment, builder: Builder) -> Problem:

@@ -173,11 +173,12 @@ def result_of(
 
 def _steps(problem: Problem) -> list[str]:
     """A note if the steps of the simulation had to be divided."""
-    if problem.finer == 1:
+    if problem.steps == problem.searched:
         return []
     return [
-        f"the usual steps of the simulation were divided by {problem.finer} for the answer, because their "
-        "integration error would have changed the fitted values; the error after holds for the divided steps"
+        f"the usual steps of the simulation were divided by {problem.steps.parts} for the answer, because "
+        "their integration error would have changed the fitted values; the error after holds for the divided "
+        "steps"
     ]
 
 
@@ -214,7 +215,7 @@ def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
         else:
             table[name] = {"how": "not seen", "value": known[name].start}
     if isinstance(problem.builder, ForeignBuilder):  # outputs of our models follow from states
-        own = describe(problem.builder.fmu).variables
+        own = describe(problem.builder.source).variables
         at_ports = [name for port in problem.ports for name in port.motion]
         for name in dict.fromkeys([*problem.record.outputs, *at_ports]):
             if name not in (*problem.free_states, *problem.declared):

@@ -13,6 +13,7 @@ from estimator.closeloop.several.common import commons
 from estimator.closeloop.several.standing import standing
 from estimator.closeloop.several.transfer import Traced, transfers
 from estimator.plant import PLANTS
+from estimator.workers import workers_end_too
 from fmus.errors import BadInput
 from fmus.export.provenance import checksum
 from fmus.host.apart.isolation import ISOLATED, Isolation
@@ -42,6 +43,7 @@ Done = Callable[[Result], None]
 OURS = ("index.html", "table.csv", "results.json")  # written beside the folders of the experiments
 
 
+@workers_end_too()
 def close_loops(
     experiments: Sequence[str | Path],
     out: str | Path | None = None,

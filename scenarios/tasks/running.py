@@ -4,7 +4,6 @@ The workers are processes of one thread each. A worker that is killed is replace
 another one. What was finished lies in the store, so that nothing else has to survive.
 """
 
-import errno
 import logging
 import os
 import tempfile
@@ -22,7 +21,7 @@ from typing import Any
 from joblib import cpu_count
 
 from fmus.errors import BadInput
-from fmus.files import write_at_once
+from fmus.files import DISK, write_at_once
 from scenarios.tasks.hashes import hash_of, hash_of_program
 from scenarios.tasks.store import BUILDS, Answer, Store
 from scenarios.tasks.undisturbed import undisturbed
@@ -87,7 +86,7 @@ def may_pass(error: Exception) -> bool:
     """Whether a task failed for a reason that may pass, such as a full disk, also where others tell of it."""
     if isinstance(error, (OSError, MemoryError, Passing)):
         return True
-    return any(os.strerror(number) in str(error) for number in (errno.ENOSPC, errno.EDQUOT))
+    return any(os.strerror(number) in str(error) for number in DISK)
 
 
 Work = Callable[[Mapping[str, Any], Place], Answer]  # a function of a module, so that workers find it

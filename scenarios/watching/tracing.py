@@ -1,7 +1,6 @@
 """close-loop on the records of alarms: one after the other, each in a process beside the stream."""
 
 import contextlib
-import ctypes
 import json
 import os
 import signal
@@ -13,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fmus.processes import end_with_parent
 from scenarios.watching.capturing import EVENTS
 
 ANSWER = "close-loop"  # folder in that of an event
 LOG = "close-loop.log"
 STOPPING = 2.0  # s, that a close-loop may take to end when the stream ends
 NICE = 10  # of its process: the stream goes first
-DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
 
 
 @dataclass(frozen=True)
@@ -104,14 +103,10 @@ class Tracing:
             )  # fmt: skip
 
 
-_LIBRARY = ctypes.CDLL(None) if sys.platform == "linux" else None  # loaded before any process is forked
-
-
 def _behind() -> None:
     """In the new process: it goes behind the stream and ends with it, however that ends."""
     os.nice(NICE)
-    if _LIBRARY is not None:
-        _LIBRARY.prctl(DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
+    end_with_parent(signal.SIGTERM)
 
 
 def answer_of(event: Path) -> Answer:

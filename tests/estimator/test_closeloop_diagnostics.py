@@ -33,7 +33,7 @@ from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.screening.free_form import dependences, left_out
 from estimator.closeloop.screening.missing_force import missing_forces
-from estimator.closeloop.screening.regressors import Calibration, alike, lengths
+from estimator.closeloop.screening.regressors import Calibration, alike
 from estimator.closeloop.screening.screen import Screening
 from estimator.closeloop.search.free_form import curve_of, free_form, resolved
 from estimator.record import Array, Record, Run
@@ -78,11 +78,16 @@ def smooth(rng: np.random.Generator, columns: int, samples: int = M, pole: float
 # power
 
 
+def found_in(base: Fit, change: Sequence[tuple[Candidate, Array]]) -> tuple[Array, Array]:
+    """Lengths and cosines of changes about a fit."""
+    return alike(Calibration.of(base), [g for _, g in change], np.random.default_rng(0))
+
+
 def stated(base: Fit, change: Sequence[tuple[Candidate, Array]], seed: int) -> tuple[list[Visible], float]:
     """The power statement, and the limit that it was made with: the same draws give the same."""
     rng = np.random.default_rng(seed)
-    limit = threshold(alike(Calibration.of(base), change, M, rng), LEVEL, rng)
-    return power(base, change, LEVEL, np.random.default_rng(seed)), limit
+    limit = threshold(alike(Calibration.of(base), [g for _, g in change], rng, M)[1], LEVEL, rng)
+    return power(change, found_in(base, change), LEVEL, np.random.default_rng(seed)), limit
 
 
 @given(seed=SEEDS)
@@ -131,19 +136,20 @@ def test_what_calibration_takes_over_and_what_bounds_forbid_cannot_be_shown() ->
     offset = Candidate("parameter_offset", "mu0", (Unknown("parameter_offset_mu0_delta", 0, -99, 99, 1.0),))
     change = [(hidden, g[:, :1]), (bound, g[:, 1:]), (offset, g[:, 1:])]
     base = fitted(np.zeros(M), g[:, :1])
-    assert {v.location: np.isinf(v.smallest) for v in power(base, change, LEVEL, rng)} == {
+    seen = found_in(base, change)
+    assert {v.location: np.isinf(v.smallest) for v in power(change, seen, LEVEL, rng)} == {
         "hidden": True,
         "bound": True,
         "mu0": False,
     }
     [free, tight] = (
-        next(v for v in power(base, change, LEVEL, rng, room={"mu0": r}) if v.location == "mu0")
+        next(v for v in power(change, seen, LEVEL, rng, room={"mu0": r}) if v.location == "mu0")
         for r in (9.0, 1e-3)
     )
     assert 1e-3 < free.smallest < 9.0
     assert np.isinf(tight.smallest)
     weak = [(offset, 1e-3 * g[:, 1:])]  # 0.05 of the parameter shows so little that all of it would be needed
-    assert np.isinf(power(base, weak, LEVEL, rng)[0].smallest)
+    assert np.isinf(power(weak, found_in(base, weak), LEVEL, rng)[0].smallest)
 
 
 def test_the_statement_halves_with_twice_the_response_and_names_the_shape_that_shows_most() -> None:
@@ -153,7 +159,7 @@ def test_the_statement_halves_with_twice_the_response_and_names_the_shape_that_s
         for t in (1.0, 2.0)
     ]
     change = [(shapes[0], g), (shapes[1], 2 * g)]
-    [v] = power(fitted(np.zeros(M)), change, LEVEL, np.random.default_rng(3))
+    [v] = power(change, found_in(fitted(np.zeros(M)), change), LEVEL, np.random.default_rng(3))
     assert v.shape == {"t0": 2.0}
     assert v.largest == pytest.approx(2 * v.smallest, rel=1e-6)
 
@@ -167,9 +173,9 @@ def test_long_regressors_are_as_alike_as_their_sums_say(seed: int) -> None:
     exact = Calibration.of(fitted(np.zeros(20_000), g[:, :1]))
     left = exact.without(g[:, 1:])
     left /= np.linalg.norm(left, axis=0)
-    found = alike(exact, change, 2000, rng)
+    length, found = alike(exact, [g for _, g in change], rng, 2000)
     assert np.all(found[0] == 0)
-    assert lengths(exact, change)[0] == 0
+    assert length[0] == 0
     assert_allclose(found[1:, 1:], left.T @ left, atol=6 / np.sqrt(2000))
 
 
@@ -472,7 +478,8 @@ def test_the_page_and_the_result_hold_what_stands_beside_the_finding(
     screening = Screening(asked, outcome.base.fit, Weighting.white(NOISE), outcome.forces)
     change = list(zip(chosen, screening.changes(chosen), strict=True))
     rng = np.random.default_rng(1)
-    beside = diagnose(outcome.baseline, screening.fit, change, LEVEL, rng)
+    seen = found_in(screening.fit, change)
+    beside = diagnose(outcome.baseline, screening.fit, change, seen, LEVEL, rng)
     told = replace(outcome, diagnostics=beside, free_form=curve)
     result = result_of("<nameless>", asked, told, 1.0, ())
     write_report(tmp_path, asked, told, result)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -13,17 +14,18 @@ from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
-from estimator.closeloop.fitting.resolution import in_fine_steps, resolved
+from estimator.closeloop.fitting.resolution import in_fine_steps, in_joined_steps, joined_steps_hold, resolved
 from estimator.closeloop.fitting.slopes import FINE_STEP, STEP
 from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.pipeline import _in_fine_steps
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.search.screened import Screened
+from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array, Run
 from estimator.weighting import Weighting
 from fmus.effects.timing import RISE
@@ -147,7 +149,7 @@ class Stiff(OneByOne):
     """A line over time, with an integration error of second order that looks like a slope."""
 
     error: float  # slope of the error at the first step
-    finer: int = 1
+    steps: Steps = USUAL
     policy = DEFAULT
     declared: Mapping[str, float] = field(default_factory=dict)
     effects: tuple[tuple[str, str], ...] = ()
@@ -167,7 +169,7 @@ class Stiff(OneByOne):
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         [run] = self.record.runs
-        return run.y - (theta["slope"] + self.error / self.finer**2) * run.t[:, None]
+        return run.y - (theta["slope"] + self.error / self.steps.parts**2) * run.t[:, None]
 
 
 @settings(deadline=None, max_examples=30)
@@ -178,7 +180,7 @@ def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
     problem = Stiff(size * exact.std["slope"])
     h = Hypothesis((), fit(problem, [slope], weighting), ())
     limits = problem.policy.search
-    finer = resolved(problem, [h], weighting).finer
+    finer = resolved(problem, [h], weighting).steps.parts
     moves = [0.75 * size / n**2 for n in (1, 2)]  # by halving the steps, in standard errors
     if min(abs(m - 0.5) for m in moves) > 0.01:
         assert finer == (1 if moves[0] < 0.5 else 2 if moves[1] < 0.5 else limits.parts_of_a_step)
@@ -204,8 +206,9 @@ class Held(Stiff):
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         [run] = self.record.runs
-        error = self.error / self.finer**2 - self.error / self.true_finer**2
-        return run.y - self.wave(run.t, self.finer) - (theta["slope"] + error) * run.t[:, None]
+        finer = self.steps.parts
+        error = self.error / finer**2 - self.error / self.true_finer**2
+        return run.y - self.wave(run.t, finer) - (theta["slope"] + error) * run.t[:, None]
 
 
 @pytest.mark.parametrize("true", [1, 4])
@@ -217,8 +220,87 @@ def test_finer_steps_are_not_taken_if_the_record_was_made_with_the_coarse_ones(t
     c = Candidate("viscous_damping", "here", (slope,))
     fitter = Refitter(baseline(problem, noise=SIZE))
     [h] = fitter.finished([Promise((c,), 0.0, {})])
-    assert resolved(problem, [h], Weighting.white(SIZE)).finer > 1  # by the movement of the slope alone
-    assert in_fine_steps(fitter, [h]).finer == (1 if true == 1 else 4)
+    assert resolved(problem, [h], Weighting.white(SIZE)).steps.parts > 1  # by the movement of the slope alone
+    assert in_fine_steps(fitter, [h]).steps.parts == (1 if true == 1 else 4)
+
+
+@dataclass(frozen=True)
+class Joining(Stiff):
+    """A line over time whose integration error is of fourth order in steps over several samples."""
+
+    fmu_joins: bool = True
+    searched: Steps = USUAL
+
+    @property
+    def plant(self):
+        return SimpleNamespace(joins=lambda runs: self.fmu_joins)
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        error = self.error / self.steps.parts**4 if self.steps.joined else 0.0
+        return run.y - (theta["slope"] + error) * run.t[:, None]
+
+
+def hold(problem: Joining) -> bool:
+    """Whether steps over several samples hold on the record of a problem, once it is fitted in them."""
+    weighting, joined = Weighting.white(SIZE), in_joined_steps(problem)
+    assert (joined.steps, joined.searched) == (JOINED, JOINED)
+    found = fit(joined, [Unknown("slope", 1.0, -10.0, 10.0, 1.0)], weighting)
+    return joined_steps_hold(joined, Hypothesis((), found, ()), weighting)
+
+
+def test_an_fmu_that_cannot_join_samples_keeps_its_steps():
+    problem = Joining(0.0, fmu_joins=False)
+    assert in_joined_steps(problem) is problem
+
+
+@settings(deadline=None, max_examples=30)
+@given(size=st.floats(0.0, 2.0))
+def test_steps_go_over_several_samples_if_their_error_moves_no_unknown_by_half_its_error(size):
+    exact = fit(Stiff(0.0), [Unknown("slope", 1.0, -10.0, 10.0, 1.0)], Weighting.white(SIZE))
+    seen = 15 / 16 * size  # by halving them: the slope alone makes up the residual here
+    if abs(seen - 0.5) > 0.01:
+        assert hold(Joining(size * exact.std["slope"])) == (seen < 0.5)
+
+
+@dataclass(frozen=True)
+class Interpolating(Joining):
+    """What acts within samples makes a wave of a size in noises altogether, where steps know of it.
+
+    recorded: whether the record was made so, or with inputs that were held. lacking: times the same wave that
+    the model lacks, unless its effect is built in.
+    """
+
+    size: float = 0.0
+    recorded: bool = True
+    lacking: float = 0.0
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        wave = np.sin(7.0 * run.t)
+        wave *= self.size * SIZE / np.linalg.norm(wave)
+        waves = self.steps.joined - self.recorded + (0.0 if self.effects else self.lacking)
+        return run.y - (theta["slope"] * run.t + waves * wave)[:, None]
+
+
+@pytest.mark.parametrize("size", [0.0, 2.0, 30.0])
+def test_steps_go_over_several_samples_unless_the_record_was_clearly_made_with_held_inputs(size):
+    assert hold(Interpolating(0.0, size=size, recorded=True))
+    assert hold(Interpolating(0.0, size=size, recorded=False)) == (size < 10.0)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_what_a_model_lacks_does_not_decide_about_the_steps_but_its_answer_does(recorded):
+    """What is lacking looks as if inputs were held, and is much larger than what these make."""
+    problem = in_joined_steps(Interpolating(0.0, size=30.0, recorded=recorded, lacking=10.0))
+    fitter, weighting = Refitter(baseline(problem, noise=SIZE)), Weighting.white(SIZE)
+    c = Candidate("viscous_damping", "here", (Unknown("slope", 1.0, -10.0, 10.0, 1.0),))
+    without, found = (
+        Hypothesis(some, fit(built(problem, some), c.unknowns, weighting), ()) for some in ((), (c,))
+    )
+    assert joined_steps_hold(problem, without, weighting)
+    assert in_fine_steps(fitter, [without]).steps == JOINED
+    assert in_fine_steps(fitter, [found]).steps == (JOINED if recorded else USUAL)
 
 
 # ---- slopes of unknowns that make up for each other
@@ -296,5 +378,5 @@ def test_a_screening_is_done_again_only_if_the_steps_become_finer(true):
     after, again = _in_fine_steps(fitter, shown, [h], [h, h])
     assert (after is shown) == (true == 1)
     assert after.came is shown.came
-    assert after.problem.finer == true
+    assert after.problem.steps.parts == true
     assert len(again) == (1 if true == 1 else 2)

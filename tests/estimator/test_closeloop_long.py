@@ -16,6 +16,8 @@ from estimator.closeloop.screening import levers, regressors
 from estimator.closeloop.screening import screen as screening_of
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.screening.missing_force import missing_forces
+from estimator.closeloop.screening.regressors import Calibration
+from estimator.closeloop.screening.regressors import alike as alike_of
 from estimator.closeloop.screening.screen import Screening, screen
 from fmus import aside
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -58,8 +60,10 @@ def found(asked: Problem) -> dict[str, Any]:
     screening = Screening(asked, base.fit, noise.weighting, forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     promises = screen(screening.fit, [((c,), g) for c, g in change])
-    seen = detect(baseline, screening.fit, [g for _, g in change], 1.0, False, np.random.default_rng(0))
-    beside = diagnose(baseline, screening.fit, change, LEVEL, np.random.default_rng(0))
+    rng, columns = np.random.default_rng(0), [g for _, g in change]
+    cosines = alike_of(Calibration.of(screening.fit), columns, rng)
+    seen = detect(baseline, screening.fit, columns, cosines, 1.0, False, rng)
+    beside = diagnose(baseline, screening.fit, change, cosines, LEVEL, rng)
     fits = Fitter(baseline).hypotheses(promises[:3], 2)
     return {
         "declared": declared.fit.covariance,

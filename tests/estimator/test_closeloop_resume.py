@@ -114,7 +114,7 @@ def test_every_checkpoint_of_a_run_can_be_read_back(carriage: Path, tmp_path: Pa
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("scenarios.closing.report.write_report", interrupted)
         assert close(carriage, out) == 130
-    assert all(file.suffix == SUFFIX for file in (out / STAGES).iterdir())
+    assert all(file.suffix == SUFFIX for file in (out / STAGES).rglob("*") if file.is_file())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Stages, "_keep", refused)
         assert close(carriage, out, "--resume") == 0
@@ -127,7 +127,7 @@ def test_planted_checkpoints_run_nothing(carriage: Path, in_one_go: str, tmp_pat
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "dated", interrupted)
         assert close(carriage, out) == 130
-    kept = sorted((out / STAGES).iterdir())
+    kept = sorted(file for file in (out / STAGES).rglob("*") if file.is_file())
     assert len(kept) > 4
     for file in kept:
         for name in (file, file.with_suffix(".pickle"), file.with_suffix(".part")):
@@ -215,16 +215,20 @@ def test_the_payload_of_another_key_is_not_decoded(tmp_path: Path, monkeypatch) 
         assert json.loads(archive.read(codec.HEADER))["key"] == "b"
 
 
-@pytest.mark.parametrize("change", ["seed", "data", "afresh"])
+@pytest.mark.parametrize("change", ["seed", "data", "units", "afresh"])
 def test_what_belongs_to_something_else_is_worked_out_again(
     carriage: Path, tmp_path: Path, change: str, monkeypatch
 ) -> None:
     monkeypatch.setattr(chain, "missing_forces", interrupted)
     assert close(carriage, tmp_path / "out") == 130
-    more = {"seed": ["--resume", "--seed", "5"], "data": ["--resume"], "afresh": []}[change]
+    more = {"seed": ["--resume", "--seed", "5"], "data": ["--resume"], "units": ["--resume"], "afresh": []}[
+        change
+    ]
     if change == "data":
         data = carriage / "data.csv"
         data.write_text(data.read_text() + "\n")
+    elif change == "units":
+        (carriage / "data.csv.units.json").write_text('{"q": "m"}')
     monkeypatch.setattr(chain, "calibrate", refused)
     with pytest.raises(RuntimeError, match="worked out again"):
         close(carriage, tmp_path / "out", *more)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.fitter import Fitter
@@ -13,7 +13,7 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.kept import KEPT, KEY, OF_ALL, Kept
-from estimator.plant import PLANTS, Plant, Plants
+from estimator.plant import PLANTS, USUAL, Plant, Plants, Steps
 from estimator.record import Run
 from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.host.fmu import Fmu
@@ -32,10 +32,10 @@ class Counted(Fmu):
 
     made = 0
 
-    def simulate_rows(self, t, inputs, outputs, starts):
+    def simulate_rows(self, t, inputs, outputs, starts, joined=False):
         """See Fmu."""
         self.made += len(starts)
-        return super().simulate_rows(t, inputs, outputs, starts)
+        return super().simulate_rows(t, inputs, outputs, starts, joined)
 
 
 class OneByOne(Counted):
@@ -43,7 +43,7 @@ class OneByOne(Counted):
 
     at_once = 1
 
-    def simulate_rows(self, t, inputs, outputs, starts):
+    def simulate_rows(self, t, inputs, outputs, starts, joined=False):
         """See Fmu."""
         return
 
@@ -82,9 +82,9 @@ def plant(fmu):
 START = {"omega_w": 12.0, "omega_r": 9.2, "mu0": 0.3}
 
 
-def alone(fmu, run, start, more=(), finer=1):
+def alone(fmu, run, start, more=(), steps=USUAL):
     """The outputs by a plant that keeps nothing."""
-    return plant_of(fmu).simulate(run, start, more, finer=finer)
+    return plant_of(fmu).simulate(run, start, more, steps=steps)
 
 
 def test_the_same_simulation_is_made_once(plant, fmu):
@@ -125,7 +125,7 @@ CHANGED = {
     "a time": lambda run: (moved(run, "t"), START, {}),
     "fewer samples": lambda run: (run.part(0, N - 1), START, {}),
     "later samples": lambda run: (run.part(1, N), START, {}),
-    "finer steps": lambda run: (run, START, {"finer": 2}),
+    "finer steps": lambda run: (run, START, {"steps": Steps(2)}),
     "another variable": lambda run: (run, START, {"more": ("T_A",)}),
 }
 
@@ -207,13 +207,29 @@ def test_starts_in_turn_give_what_each_gives_alone(name):
             assert_array_equal(y, plant.simulate(run, start, states))
 
 
+@by_size
+def test_responses_over_a_step_are_those_of_restarts(name):
+    """From any state and with any inputs, all at once or one by one."""
+    dt = MODELS[name]().step_size
+    run = driven(name, dt=dt)
+    with Fmu(native(name)) as many, OneByOne(native(name)) as one:
+        plants = [plant_of(fmu, name) for fmu in (many, one)]
+        way = plants[1].simulate(run, {}, plants[1].states)[::9, len(plants[1].outputs) :]
+        starts = [
+            dict(zip((*plants[0].states, *plants[0].inputs), (*x, *u), strict=True))
+            for x, u in zip(way.tolist(), run.u[::9].tolist(), strict=True)
+        ]
+        for found, expected in zip(*(plant.responses(starts, dt) for plant in plants), strict=True):
+            assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+
+
 def test_what_is_simulated_ahead_is_not_simulated_when_it_is_asked_for():
     """Starts may name different variables, in which another instance has its start values."""
     runs = [driven("testrig", seed) for seed in range(2)]
     starts = [START, {"omega_w": 11.0, "k_A": 0.9}, {}]
     with Counted(native("testrig")) as fmu:
         plant = plant_of(fmu, kept=Kept())
-        plant.simulate_ahead(runs, [starts] * 2, 1)
+        plant.simulate_ahead(runs, [starts] * 2, USUAL)
         before = fmu.made
         assert before == 6
         found = [plant.simulate(run, start) for run in runs for start in starts]
@@ -231,7 +247,7 @@ def test_nothing_is_simulated_ahead_that_would_be_simulated_again(kind):
         for most, starts in ((OF_ALL * size - 1, 3), (OF_ALL * size, OF_ALL + 1), (OF_ALL * size, OF_ALL)):
             kept = Kept(most)
             asked = [START | {"mu0": 0.2 + 0.01 * i} for i in range(starts)]
-            plant_of(fmu, kept=kept).simulate_ahead([run], [asked], 1)
+            plant_of(fmu, kept=kept).simulate_ahead([run], [asked], USUAL)
             made = OF_ALL if starts == OF_ALL and fmu.at_once > 1 else 0
             assert (fmu.made, kept.size) == (made, made * size)
 

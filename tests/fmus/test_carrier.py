@@ -23,7 +23,7 @@ from fmus.export.container.coupled import build_coupled
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu, FmuError
 from tests.helpers.native import DEFINED, STRICT, compiler, native
-from tests.helpers.packed import repacked
+from tests.helpers.packed import alone, repacked
 from tests.helpers.paths import ROOT
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
@@ -193,8 +193,8 @@ print("lived")
 """
 
 
-@pytest.fixture
-def sources(tmp_path, monkeypatch) -> Path:
+@pytest.fixture(params=["co-simulation", "model exchange, FMI 2", "model exchange, FMI 3"])
+def sources(request, tmp_path, monkeypatch) -> Path:
     """The C files of a carrier with effects of every kind, in a folder, and its FMU without a library."""
     made = tmp_path / "sources"
     made.mkdir()
@@ -206,7 +206,10 @@ def sources(tmp_path, monkeypatch) -> Path:
 
     monkeypatch.setattr(carrier, "library", kept)
     effects = [effect for some, _ in EFFECTS.values() for effect in some]
-    build_carrier(native("drive"), (PORT,), effects, tmp_path / "bare.fmu")
+    base = native("drive", fmi=3 if "FMI 3" in request.param else 2)
+    if request.param != "co-simulation":
+        base = alone(base, tmp_path / "alone.fmu")
+    build_carrier(base, (PORT,), effects, tmp_path / "bare.fmu")
     return made
 
 

@@ -269,6 +269,6 @@ def test_a_plant(vdp):
         found = plant.simulate(run, {"mu": 0.8}, ["x1"])
         held = (u[1:, 0] + u[:-1, 0]) / 2
         assert_allclose(found, solved(t, held, 0.8, seen=u[:, 0])[:, [0, 2, 1]], atol=ERROR)
-        x, y = plant.response(np.array([1.0, -0.5]), {"u": 0.3, "mu": 0.8}, 0.01)
+        [x], [y] = plant.responses([{"x0": 1.0, "x1": -0.5, "u": 0.3, "mu": 0.8}], 0.01)
         before, after = solved(np.array([0, 0.01]), [0.3], 0.8, (1.0, -0.5))
         assert_allclose([*x, *y], [*after[:2], *before[[0, 2]]], atol=ERROR)

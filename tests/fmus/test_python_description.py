@@ -140,6 +140,19 @@ def test_dependencies_are_those_of_the_native_build(built, name):
     assert structure.findall("Outputs/Unknown")
 
 
+@every_model
+def test_variables_are_shown_in_the_units_of_the_native_build(built, name):
+    root = xml_of(built(name))
+    shown = {v.get("name"): v.find("Real").get("displayUnit") for v in root.iter("ScalarVariable")}
+    native = table(MODELS[name](), equations(MODELS[name]()))
+    assert shown == {e.name: e.display_unit for e in native.entries if e.name in shown}
+    defined = {
+        u.get("name"): {d.get("name"): d.attrib for d in u.iter("DisplayUnit")} for u in root.iter("Unit")
+    }
+    for unit, (display, about) in native.display.items():
+        assert defined[unit] == {display: about}
+
+
 def test_rigs_in_a_ring_are_no_algebraic_loop(built):
     """A rig's asynchronous motor follows the supply, not the torque that the other rig sets."""
     links = [Connection("a.T_A", "b.T_P"), Connection("b.T_A", "a.T_P")]

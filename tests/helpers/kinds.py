@@ -91,13 +91,16 @@ EVENTS = """<?xml version="1.0" encoding="UTF-8"?>
     <Int32 name="quarters" valueReference="10" causality="output"/>
     <Int32 name="last" valueReference="11" causality="parameter" variability="fixed" start="1000000"/>
     <Float64 name="z" valueReference="12" causality="local"/>
+    <Float64 name="ticks" valueReference="13" causality="output" variability="discrete"/>
+    <Float64 name="stop" valueReference="14" causality="parameter" variability="fixed" start="1e9"/>
   </ModelVariables>
   <ModelStructure>
     <Output valueReference="1"/><Output valueReference="2"/><Output valueReference="9"/>
-    <Output valueReference="10"/>
+    <Output valueReference="10"/><Output valueReference="13"/>
     <ContinuousStateDerivative valueReference="3"/><ContinuousStateDerivative valueReference="4"/>
     <InitialUnknown valueReference="3"/><InitialUnknown valueReference="4"/>
     <InitialUnknown valueReference="9"/><InitialUnknown valueReference="10"/>
+    <InitialUnknown valueReference="13"/>
     <EventIndicator valueReference="12"/>
   </ModelStructure>
 </fmiModelDescription>

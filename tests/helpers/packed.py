@@ -23,3 +23,16 @@ def with_description(source, target, pattern, replacement, flags=0):
         ) if name == "modelDescription.xml" else data
 
     return repacked(source, target, change)
+
+
+def alone(fmu, target):
+    """A copy of an FMU that is for model exchange alone."""
+
+    def change(name, data):
+        if name != "modelDescription.xml":
+            return name, data
+        text, count = re.subn(rb"<CoSimulation[^>]*/>|<CoSimulation.*?</CoSimulation>", b"", data, flags=re.S)
+        assert count == 1
+        return name, text
+
+    return repacked(fmu, target, change)

@@ -5,6 +5,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from estimator.plant import USUAL
+
 
 def record_with(**given: Any) -> Any:
     """A record with these attributes; its stretches are not asked for as long as noise is white."""
@@ -19,7 +21,7 @@ class OneByOne:
     """What the fits ask of a problem whose simulations are made one after the other."""
 
     at_once = 1
-    finer = 1
+    steps = searched = USUAL
     other_forms = ()
 
     def identify_residuals(self, thetas):

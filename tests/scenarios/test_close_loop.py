@@ -17,6 +17,8 @@ from fmus.host.fmu import Fmu
 from scenarios import close_loop
 from scenarios.closing.result import Result
 from tests.golden.kept import alike, figures, read
+from tests.helpers.carriage import T, coulomb, motion, record, to_and_fro, write
+from tests.helpers.packed import alone
 from tests.helpers.paths import ROOT
 from tests.truth.rig import single, write_record
 
@@ -146,6 +148,22 @@ def test_a_foreign_fmu_is_traced_whether_it_shows_its_state_or_not(
         inputs = {"u": (u[1:] + u[:-1]) / 2}
         y = augmented.simulate(t, inputs, ["x"], {"x": 1.0} if initial == "exact" else {})
     assert np.sqrt(np.mean((y[:, 0] - x) ** 2)) < 0.002
+
+
+@pytest.mark.slow
+def test_an_fmu_for_model_exchange_alone_is_traced(tmp_path: Path) -> None:
+    here = write(tmp_path, "carriage", record(to_and_fro(), coulomb(30.0), 3))
+    alone(build_native(Drive(), tmp_path), here / "drive.fmu")
+    text = (here / "experiment.toml").read_text().replace('model = "drive"', 'fmu = "drive.fmu"')
+    port = 'name = "carriage"\nforce = "F_ext"\nvelocity = "q_dot"\ndisplacement = "q"\n'
+    (here / "experiment.toml").write_text(f"{text}[[ports]]\n{port}")
+    result = close_loop(here, tmp_path / "out", jobs=1)
+    assert (result.verdict, named(result)) == ("traced", {("coulomb_friction", "carriage")})
+    size, error = result.effects[0].parameters["F_c"]
+    assert abs(size - 30.0) < 4 * error
+    with Fmu(tmp_path / "out" / result.augmented_fmu) as augmented:
+        y = augmented.simulate(T, {"F": to_and_fro()}, ["q"], {"q": 0.0, "q_dot": 0.0})
+    assert np.sqrt(np.mean((y[:, 0] - motion(to_and_fro(), coulomb(30.0), 0.0)[:, 0]) ** 2)) < 0.002
 
 
 @pytest.mark.slow

@@ -16,7 +16,8 @@ import time
 
 from joblib import Parallel, delayed
 
-from scenarios.cli.supervision import supervised, workers_end_too
+from estimator.workers import workers_end_too
+from scenarios.cli.supervision import supervised
 
 
 def busy():

@@ -17,7 +17,8 @@ from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, stacked
 from estimator.closeloop.hypotheses.hypothesis import Part
-from estimator.closeloop.screening.regressors import directions
+from estimator.closeloop.screening.regressors import Calibration, batches
+from estimator.noise_figures import figures_of, figures_of_noise
 from estimator.record import Array
 from fmus.aside import set_aside
 
@@ -52,35 +53,30 @@ class Detection:
 
 
 def detect(
-    baseline: Baseline, screened: Fit, regressors: Sequence[Array], likeness: float, sets_in: bool,
-    rng: np.random.Generator,
+    baseline: Baseline, screened: Fit, regressors: Sequence[Array], found: tuple[Array, Array],
+    likeness: float, sets_in: bool, rng: np.random.Generator,
 ) -> Detection:  # fmt: skip
     """Test the residual of the calibrated FMU.
 
     screened: its fit as used in the screening, residual in units of the noise; regressors: changes (m, k) of
-    that residual, one array per candidate; likeness: share of the sum of squares beyond noise that one
-    effect could explain by linear regression; sets_in: whether the residual sets in during the record.
-    Whether the residual matters is decided by its size beyond noise, with an allowance for chance, compared
-    with the signal and with the noise.
+    that residual, one array per candidate; found: their lengths and cosines, see `alike`; likeness: share of
+    the sum of squares beyond noise that one effect could explain by linear regression; sets_in: whether the
+    residual sets in during the record. Whether the residual matters is decided by its size beyond noise, with
+    an allowance for chance, compared with the signal and with the noise.
     """
     limits = baseline.policy.detection
     left = baseline.in_noise(baseline.hypothesis.residuals, "unseen")
-    observed = _figures(left, limits.slow_blocks)
+    observed = figures_of(left, limits.slow_blocks)
     slopes = _sensitivities(baseline)
-    n = len(slopes)
     early, late = (_columns(baseline, slopes, part) for part in ("fit", "unseen"))
     # noise in the part to identify changes the calibrated values by root @ white noise
-    root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if n else np.zeros((0, 0))
-    copies = []
-    for _ in range(limits.replicates):
-        e = rng.standard_normal(left.shape)
-        if n:
-            e -= (late @ (root @ rng.standard_normal(root.shape[1]))).reshape(e.shape)
-        copies.append(_figures(e, limits.slow_blocks))
-    references = {name: np.array([c[name] for c in copies]) for name in observed}
+    root = np.linalg.pinv(np.linalg.qr(early, mode="r")) if slopes else np.zeros((0, 0))
+    references = figures_of_noise(left.shape, late, root, limits.slow_blocks, limits.replicates, rng)
     if regressors:
-        along, cosines = directions(screened, regressors)
-        observed[LIKENESS] = float(np.max(along**2))
+        lengths, cosines = found
+        rest = Calibration.of(screened).without(screened.residual)
+        along = np.concatenate([g.T @ rest for _, g in batches(regressors)])
+        observed[LIKENESS] = float(np.max((along / np.where(lengths > 0, lengths, np.inf)) ** 2))
         references[LIKENESS] = _likeness_of_noise(cosines, limits.replicates, rng)
     p_values, figures = [], {}
     for name, value in observed.items():
@@ -115,13 +111,3 @@ def _likeness_of_noise(cosines: Array, replicates: int, rng: np.random.Generator
     root = vectors * np.sqrt(np.maximum(values, 0))
     drawn = rng.standard_normal((replicates, len(cosines))) @ root.T
     return np.asarray(np.max(drawn**2, axis=1))
-
-
-def _figures(left: Array, pieces: int) -> dict[str, float]:
-    ends = [b[0] for b in np.array_split(np.arange(len(left)), min(pieces, len(left)))]
-    means = np.add.reduceat(left, ends, axis=0) / np.sqrt(np.diff([*ends, len(left)]))[:, None]
-    squares = np.einsum("ij,ij->j", left, left) / len(left)
-    return {
-        "size of the residual that no fit has seen": float(np.max(squares)),
-        "slow part of the residual that no fit has seen": float(np.max(np.mean(means**2, axis=0))),
-    }

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.screening.regressors import RIDGE, Calibration, Changes, is_wave
+from estimator.closeloop.screening.regressors import RIDGE, Calibration, Changes, batches, is_wave
 from estimator.record import Array
-from fmus.aside import let_go, set_aside
+from fmus.aside import set_aside
 
 FAMILIES = 12  # leading effects from which decoys are made
 BROAD = 8.0  # effective spectral lines, above which random phases give a different regressor
@@ -49,13 +49,14 @@ def leading(base: Fit, change: Changes, outputs: int) -> list[Array]:
     calibration = Calibration.of(base)
     residual = calibration.without(base.residual)
     best: dict[str, tuple[float, Array]] = {}
-    for c, g in change:
-        if is_wave(c):
-            continue
-        reached = gain(residual, calibration.without(g))
-        if c.label not in best or reached > best[c.label][0]:
-            best[c.label] = reached, g
-        let_go()
+    some = iter([(c, g) for c, g in change if not is_wave(c)])
+    for places, batch in batches(g for c, g in change if not is_wave(c)):
+        left = calibration.without(batch)
+        gram, along = left.T @ left, left.T @ residual
+        for at, (c, g) in zip(places, some, strict=False):
+            reached = _gain(gram[at, at], along[at])
+            if c.label not in best or reached > best[c.label][0]:
+                best[c.label] = reached, g
     order = sorted(best.values(), key=lambda found: -found[0])
     projected = (set_aside(calibration.without(g)) for _, g in order)
     return list(islice((g for g in projected if lines(g, outputs) >= BROAD), FAMILIES))
@@ -79,7 +80,11 @@ def lines(g: Array, outputs: int) -> float:
 
 def gain(residual: Array, g: Array) -> float:
     """Reduction of the sum of squares of the residual (m,) by regression on columns (m, k)."""
-    gram, along = g.T @ g, g.T @ residual
+    return _gain(g.T @ g, g.T @ residual)
+
+
+def _gain(gram: Array, along: Array) -> float:
+    """The same by the products (k, k) of the columns with each other, and (k,) with the residual."""
     size = np.sqrt(np.diag(gram) + 1e-300)
     scaled = gram / size[:, None] / size + RIDGE * np.eye(len(size))
     return float(along / size @ np.linalg.solve(scaled, along / size))

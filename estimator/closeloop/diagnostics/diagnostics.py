@@ -13,6 +13,7 @@ from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.regressors import Changes
+from estimator.record import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +35,19 @@ def diagnose(
     baseline: Baseline,
     screened: Fit,
     change: Changes,
+    found: tuple[Array, Array],
     level: float,
     rng: np.random.Generator,
 ) -> Diagnostics:
     """All diagnostics from the calibrated FMU, its fit in the screening, and the changes by all candidates.
 
-    level: significance level of the test for likeness to any effect.
+    found: lengths and cosines of these, see `alike`; level: significance level of the test for likeness to
+    any effect.
     """
     problem, base, size = baseline.problem, baseline.hypothesis, baseline.noise.scale
     return Diagnostics(
         black_box(problem.record, base.residuals, size),
-        tuple(power(screened, change, level, rng, room=room(problem, base.theta))),
+        tuple(power(change, found, level, rng, room=room(problem, base.theta))),
         decoy_gain(screened, change, len(size), rng),
         stability(screened, change, rng),
     )

@@ -13,15 +13,11 @@ from types import MappingProxyType
 import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.regressors import (
-    Calibration,
     Changes,
-    alike,
     columns_of,
     is_wave,
-    lengths,
 )
 from estimator.record import Array
 from estimator.sensor_faults import FAULTS
@@ -29,7 +25,6 @@ from fmus.effects.parameter_effect import SMALL
 
 POWER = 0.8
 DRAWS = 4000  # draws of noise for the threshold of the largest projection
-ROWS = 2000  # length of the random sketch of a long regressor
 WITHIN_LIMITS = ("parameter_offset", "parameter_step")  # a drift may have any rate, as it ends at the limits
 PHASES = 90  # phases of a sine wave that are evaluated; the least visible one counts
 
@@ -51,8 +46,8 @@ class Visible:
 
 
 def power(
-    base: Fit,
     change: Changes,
+    found: tuple[Array, Array],
     level: float,
     rng: np.random.Generator,
     chance: float = POWER,
@@ -60,23 +55,21 @@ def power(
 ) -> list[Visible]:
     """The smallest detectable amplitudes of all candidates, sorted by kind and location.
 
-    base: fit of the calibrated FMU, residuals weighted to unit noise; level: probability that noise alone is
-    detected as any effect; chance: probability that the effect is detected; room: the largest change of each
-    parameter within its limits, by name.
+    change: of residuals weighted to unit noise; found: its lengths and cosines, see `alike`; level:
+    probability that noise alone is detected as any effect; chance: probability that the effect is detected;
+    room: the largest change of each parameter within its limits, by name.
     """
-    calibration = Calibration.of(base)
-    left = lengths(calibration, change)
-    cosines = alike(calibration, change, ROWS, rng)
+    left, cosines = found
     from scipy.stats import norm  # takes a third of a second to load, and comes after the verdict
 
     needed = threshold(cosines, level, rng) + float(norm.ppf(chance))
-    found: dict[tuple[str, str, str], Visible] = {}
-    for (c, _), at in zip(change, columns_of(change), strict=True):
+    every: dict[tuple[str, str, str], Visible] = {}
+    for (c, _), at in zip(change, columns_of(g for _, g in change), strict=True):
         for name, size in _sizes(c, left[at], cosines[at, at], needed, room):
             one = Visible(c.kind, c.location, name, size, size, _shape(c))
             key = (c.kind, c.location, name)
-            found[key] = _both(found[key], one) if key in found else one
-    return [found[key] for key in sorted(found)]
+            every[key] = _both(every[key], one) if key in every else one
+    return [every[key] for key in sorted(every)]
 
 
 def threshold(cosines: Array, level: float, rng: np.random.Generator) -> float:

@@ -11,9 +11,8 @@ import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
-from estimator.closeloop.screening.regressors import NOTHING, RIDGE, Changes
+from estimator.closeloop.screening.regressors import NOTHING, RIDGE, Changes, batches
 from estimator.record import Array
-from fmus.aside import let_go
 
 PAIRS = 25  # pairs of complementary halves
 LEADING = 10  # number of effects that count as leading, each with its best shape
@@ -41,12 +40,14 @@ def stability(
     own = _pieces(jacobian, base.residual, edges)
     inverse = np.linalg.pinv(np.einsum("hb,bnm->hnm", halves, own.gram), hermitian=True)
     gains: dict[str, Array] = {}
-    for c, g in change:
-        mine = _pieces(g, base.residual, edges)
+    candidates = iter([c for c, _ in change])
+    for places, g in batches(g for _, g in change):
+        every = _pieces(g, base.residual, edges)
         across = np.einsum("hb,bnk->hnk", halves, np.array([jacobian[e].T @ g[e] for e in edges]))
-        found = _gains(c, mine, own, across, inverse, halves)
-        gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
-        let_go()
+        for at, c in zip(places, candidates, strict=False):
+            mine = _Pieces(every.gram[:, at, at], every.along[:, at])
+            found = _gains(c, mine, own, across[:, :, at], inverse, halves)
+            gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
     if not gains:
         return {}
     table = np.array(list(gains.values()))

@@ -1,4 +1,8 @@
-"""Steps so short that the error of the integration does not move what is fitted.
+"""Steps as long as the error of the integration allows, so that it does not move what is fitted.
+
+Hypotheses are searched in the longest steps that move no unknown of any hypothesis. For an FMU of ours, these
+join several samples and know the inputs within a step, which is more accurate than steps of one sample over
+which inputs are held, and takes less time.
 
 An effect can make the equations stiffer than those of the FMU without it. Friction that is rounded over a
 millimetre per second does so. With the usual step, the integration then adds an error of its own, and the fit
@@ -13,10 +17,50 @@ import numpy as np
 from estimator.closeloop.fitting.fit import weighted
 from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.fitting.slopes_within_error import within_error
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.fitted import relaxed
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
+from estimator.plant import JOINED, USUAL
 from estimator.weighting import Weighting
+
+
+def in_joined_steps(problem: Problem) -> Problem:
+    """The problem in steps over several samples; the problem itself if its FMU has no such steps."""
+    joins = problem.plant.joins(problem.record.runs)
+    return replace(problem, steps=JOINED, searched=JOINED) if joins else problem
+
+
+def joined_steps_hold(joined: Problem, base: Hypothesis, weighting: Weighting) -> bool:
+    """Whether steps over several samples are exact on a record, and what is left does not come from them.
+
+    base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
+    it is long, whatever the slopes of the unknown are. How long it is, steps of half the length show.
+    """
+    here, halved = (
+        weighted(p, base.theta, weighting) for p in (joined, replace(joined, steps=JOINED.halved))
+    )
+    if not float(np.linalg.norm(here - halved)) <= joined.policy.search.moved_by_steps:
+        return False
+    return not inputs_held(joined, base, weighting)
+
+
+def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
+    """Whether a record says that its inputs were held over a sample, where steps take them as continuous.
+
+    It then fits better in steps of one sample, by more than chance; how well it would after another fit
+    follows from the slopes of this one. As what a hypothesis lacks may look like held inputs, these must also
+    be most of what it leaves beyond noise. Else a hypothesis that leaves less can tell. joined: the problem
+    with the effects of h, which was fitted in its steps.
+    """
+    theta, policy = h.theta, joined.policy
+    here, held = (
+        relaxed(h.fit, weighted(p, theta, weighting)) for p in (joined, replace(joined, steps=USUAL))
+    )
+    apart, gained = float(np.linalg.norm(held - here)), float(here @ here - held @ held)
+    beyond = float(here @ here) - len(here) - policy.detection.chance * np.sqrt(2 * len(here))
+    return gained / 2 > policy.decision.telling * apart and gained > policy.decision.most * beyond
 
 
 def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting) -> Problem:
@@ -33,24 +77,35 @@ def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
     """The problem of the fitter in steps that are fine enough for hypotheses, if the record does not reject
     these.
 
-    Finer steps also change what the FMU receives between two samples: inputs are interpolated there, and a
-    record may show that they were not. If the coarse steps are right, the best hypothesis fits worse in fine
-    ones; if the fine ones are right, the difference of its residuals only adds the noise along it.
+    In steps over several samples, inputs are continuous, unless what the best hypothesis leaves says that
+    they were held over a sample. Dividing steps of one sample also changes what the FMU receives between two
+    samples: inputs are interpolated there, and a record may show that they were not. If the coarse steps are
+    right, the best hypothesis fits worse in fine ones; if the fine ones are right, the difference of its
+    residuals only adds the noise along it.
     """
     before, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
-    finer = resolved(before, some, weighting)
-    if finer.finer == before.finer:
-        return before
     best = min(some, key=cost)
+    if before.steps.joined:
+        if not inputs_held(built(before, best.candidates), best, weighting):
+            return resolved(before, some, weighting)
+        fitter = fitter.asked(replace(before, steps=USUAL))
+        before, best = fitter.baseline.problem, in_divided_steps(fitter, best)
+    finer = resolved(before, some, weighting)
+    if finer.steps == before.steps:
+        return before
     again = in_divided_steps(fitter.asked(finer), best)
-    apart = float(np.linalg.norm(again.fit.residual - best.fit.residual))
-    worse = (cost(again) - cost(best)) / 2
-    return before if worse > fitter.baseline.policy.decision.telling * apart else finer
+    return before if rejected(fitter.baseline, best, again) else finer
+
+
+def rejected(baseline: Baseline, h: Hypothesis, again: Hypothesis) -> bool:
+    """Whether the record rejects other steps: h fitted again in these fits worse than it could by chance."""
+    apart = float(np.linalg.norm(again.fit.residual - h.fit.residual))
+    return (cost(again) - cost(h)) / 2 > baseline.policy.decision.telling * apart
 
 
 def in_divided_steps(fitter: Fitter, h: Hypothesis) -> Hypothesis:
-    """The hypothesis, fitted again if the steps of the problem are divided."""
-    if fitter.baseline.problem.finer == 1:
+    """The hypothesis, fitted again if the steps of the problem are no longer those of the search."""
+    if fitter.baseline.problem.steps == fitter.baseline.problem.searched:
         return h
     again = fitter.alone.finished(from_there([h]), h.others, guess=h.fit.columns)
     return replace(again[0], worth=h.worth) if again else h
@@ -62,8 +117,8 @@ def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
     h = within_error(here, h, weighting)
     residual = weighted(here, h.theta, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
-    while problem.finer < limits.parts_of_a_step:
-        halved = replace(problem, finer=2 * problem.finer)
+    while problem.steps.parts < limits.parts_of_a_step:
+        halved = replace(problem, steps=problem.steps.halved)
         now = weighted(built(halved, h.candidates), h.theta, weighting)
         moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
         if np.all(np.abs(moved) <= limits.moved_by_steps * error):

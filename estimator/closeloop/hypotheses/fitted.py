@@ -114,6 +114,18 @@ def loose(fit: Fit) -> Fit:
     )
 
 
+def relaxed(fit: Fit, residual: Array) -> Array:
+    """A residual (m,) at the values of a fit, after the step to the least squares that its slopes promise."""
+    columns = [column for column in loose(fit).slopes if column.any()]
+    size = np.array([float(np.linalg.norm(column)) for column in columns])
+    alike = np.array([[float(a @ b) for b in columns] for a in columns]) / np.outer(size, size)
+    along = np.array([float(column @ residual) for column in columns]) / size
+    step = pinvh(alike) @ along / size if columns else size
+    for column, far in zip(columns, step.tolist(), strict=True):
+        residual = residual - far * column
+    return residual
+
+
 def stacked(columns: Sequence[Array]) -> Array:
     """Columns (m,) side by side, (m, n)."""
     shape = len(columns[0]), len(columns)

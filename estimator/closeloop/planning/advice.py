@@ -19,6 +19,7 @@ from estimator.closeloop.planning.plan import Question, advised, compared
 from estimator.closeloop.planning.responses import responses, unknowns_of
 from estimator.closeloop.planning.sought import Sought
 from estimator.closeloop.question.problem import Unknown
+from estimator.plant import Steps
 from estimator.record import Array
 from fmus.host.fmu import FmuError
 
@@ -38,7 +39,7 @@ def next_experiment(baseline: Baseline, members: Sequence[Hypothesis], twins: Tw
     """
     try:
         question = _question(baseline)
-        sets = _same(question, baseline.problem.finer, members, twins)
+        sets = _same(question, baseline.problem.steps, members, twins)
     except FmuError:
         return splitting(members)
     alike = [_inseparable(some) for some in sets if len(some) > 1]
@@ -71,14 +72,14 @@ def _experiment(question: Question, baseline: Baseline, members: Sequence[Hypoth
 
 
 def _same(
-    question: Question, finer: int, members: Sequence[Hypothesis], twins: Twins
+    question: Question, steps: Steps, members: Sequence[Hypothesis], twins: Twins
 ) -> list[list[Hypothesis]]:
     """The members in sets that act alike under any inputs: twins in this record, and in another one too.
 
     The other record has inputs that all move on their own, so that nothing acts alike by its symmetry. All
-    outputs that the FMU has are compared. finer: parts of a step with which the members were fitted.
+    outputs that the FMU has are compared. steps: those with which the members were fitted.
     """
-    shaken_ = replace(with_run(question.problem, shaken(question.problem)), finer=finer)
+    shaken_ = replace(with_run(question.problem, shaken(question.problem)), steps=steps)
 
     def shown(h: Hypothesis) -> Array | None:
         try:
@@ -143,8 +144,8 @@ def _class_with_advice(question: Question, baseline: Baseline, members: Sequence
 def _question(baseline: Baseline) -> Question:
     """The question of a record that exists: its measured outputs, and all that could be measured too.
 
-    The steps are the usual ones, also where an effect was fitted in finer ones: the plan looks at the FMU
-    without effects, and at what these change to first order.
+    The steps are those of the search, also where an effect was fitted in finer ones: the plan looks at the
+    FMU without effects, and at what these change to first order.
     """
     problem, record = baseline.problem, baseline.problem.record
     run, outside = record.runs[0], problem.builder.outside()
@@ -156,7 +157,7 @@ def _question(baseline: Baseline) -> Question:
         record, outputs=names, noise_std=np.concatenate([record.noise_std, none]),
         runs=(replace(run, fit=every, choose=~every, test=~every),),
     )  # fmt: skip
-    whole = replace(problem, record=asked, finer=1)
+    whole = replace(problem, record=asked, steps=problem.searched)
     [y] = whole.simulate(baseline.hypothesis.fit.theta)
     noise = baseline.noise.std * np.sqrt(baseline.noise.redundancy)
     std = np.concatenate([noise, _assumed_noise(y[:, len(noise) :])])

@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.closeloop.policy import DEFAULT, Policy, StartPolicy
 from estimator.closeloop.question.input_noise import InputNoise
-from estimator.plant import PLANTS, Plant
+from estimator.plant import PLANTS, USUAL, Plant, Steps
 from estimator.record import Array, Record, Run
 from estimator.sensor_faults import faulty
 from fmus.aside import set_aside
@@ -72,9 +72,9 @@ class Problem:
     the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
     given; form_error: share of an output that the form of the FMU leaves open; other_forms: values of
     parameters that choose other forms of the model, as plausible as the chosen one; policy: the limits of the
-    decision; input_noise: noise that was smoothed away in the inputs of the record; finer: parts into which
-    each step of the simulation is divided. The object is small and picklable; worker processes open the FMU
-    themselves.
+    decision; input_noise: noise that was smoothed away in the inputs of the record; steps: those of the
+    simulation; searched: those with which hypotheses are searched. The object is small and picklable; worker
+    processes open the FMU themselves.
     """
 
     builder: Builder
@@ -88,7 +88,8 @@ class Problem:
     other_forms: tuple[dict[str, float], ...] = ()
     policy: Policy = DEFAULT
     input_noise: InputNoise | None = None
-    finer: int = 1
+    steps: Steps = USUAL
+    searched: Steps = USUAL
 
     @property
     def plant(self) -> Plant:
@@ -186,7 +187,7 @@ class Problem:
         return replace(self, record=replace(self.record, runs=tuple(_cut(self.record.runs, share))))
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
-        y = self.plant.simulate(run, self._start(run, theta), more, finer=self.finer)
+        y = self.plant.simulate(run, self._start(run, theta), more, steps=self.steps)
         return faulty(y, run.t, self.record.outputs, theta)
 
     def _residual(self, run: Run, theta: Mapping[str, float]) -> Array:
@@ -196,7 +197,7 @@ class Problem:
     def _rows(self, run: Run, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """Simulated outputs of a run for each of several unknowns; None if not all at once."""
         starts = [self._start(run, theta) for theta in thetas]
-        rows = self.plant.simulate_rows(run, starts, finer=self.finer)
+        rows = self.plant.simulate_rows(run, starts, steps=self.steps)
         if rows is None:
             return None
         return [faulty(y, run.t, self.record.outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
@@ -223,7 +224,7 @@ def simulate_ahead(asked: Sequence[tuple[Problem, Mapping[str, float]]]) -> None
     if others:
         runs = problem.record.runs
         starts = [[p._start(run, theta) for p, theta in asked] for run in runs]
-        problem.plant.simulate_ahead(runs, starts, problem.finer)
+        problem.plant.simulate_ahead(runs, starts, problem.steps)
 
 
 def smooth_start(t: Array, y: Array, limits: StartPolicy) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from fmus.effects.site import CLOCK, WAY
 from fmus.export.around.outside import Around, straight
 from fmus.integrators.rk4 import runge_kutta
 from fmus.sampled import Row
+from fmus.stepped import Stepped
 from fmus.variables import Expr
 
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
@@ -67,12 +68,11 @@ def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
     x[:, 0] = [s.start for s in made.states]
     for first in range(0, len(course.t) - 1, SAMPLES_AT_ONCE):
         last = min(first + SAMPLES_AT_ONCE, len(course.t) - 1)
-        run, seen = _run(made, (last - first) * n)
+        steps, seen = _stepped(made)
         part, at = slice(first, last + 1), np.arange((last - first) * n + 1) / n
         here = [np.broadcast_to((m if i == 0 else z)[row], len(course.t))[part] for i, row in seen]
         t, w = (_between(at, rows) for rows in (course.t[None, part], np.array(here)))
-        stepped = run(x[:, first], w[:, :-1], w[:, 1:], np.diff(t)).full()
-        x[:, first + 1 : last + 1] = stepped[:, n - 1 :: n]
+        x[:, first + 1 : last + 1] = steps(x[:, first], w, np.diff(t.ravel()))[:, n::n]
     return x
 
 
@@ -82,8 +82,8 @@ def _between(at: Array, rows: Array) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _run(made: Around, steps: int) -> tuple[cs.Function, list[tuple[int, int]]]:
-    """Runge-Kutta steps of the effect's states, run(x, w0, w1, dt) -> x, and the rows of (m, x, z) in w.
+def _stepped(made: Around) -> tuple[Stepped, list[tuple[int, int]]]:
+    """Runge-Kutta steps of the effect's states, and the rows of (m, x, z) in the w of these.
 
     w holds the motion, inputs and parameters that the states depend on; it is linear between w0 and w1.
     """
@@ -96,5 +96,4 @@ def _run(made: Around, steps: int) -> tuple[cs.Function, list[tuple[int, int]]]:
         given = iter(cs.vertsplit(w))
         return rates(*(state[row] if i == 1 else next(given) for i, row in rows))
 
-    step = cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, dt, straight(w0, w1))])
-    return step.mapaccum(steps), seen
+    return Stepped(cs.Function("step", [x, w0, w1, dt], [runge_kutta(f, x, dt, straight(w0, w1))])), seen

@@ -38,6 +38,13 @@ class Linearised:
         """The same linearisation with some of the outputs."""
         return replace(self, C=self.C[:, outputs], D=self.D[:, outputs])
 
+    def over(self, steps: int) -> "Linearised":
+        """The same for as many steps at once, with levers held over them."""
+        A, B = np.broadcast_to(np.eye(self.A.shape[1]), self.A.shape), np.zeros_like(self.B)
+        for _ in range(steps):
+            A, B = self.A @ A, self.A @ B + self.B
+        return replace(self, A=A, B=B)
+
     def near(self, samples: int) -> NDArray[np.intp]:
         """For each sample the index of the last linearisation before it, (samples,)."""
         near: NDArray[np.intp] = np.maximum(np.searchsorted(self.index, np.arange(samples), "right") - 1, 0)
@@ -77,23 +84,22 @@ def linearise(
     plant = problem.plant_with((*record.outputs, *more))
     index = np.unique(np.linspace(0, len(keep) - 2, min(LINEARISATIONS, len(keep) - 1)).astype(int))
     start, known = problem.start(theta), plant.fmu.description.variables
-    nudges = np.diag(1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9))
+    sizes = 1e-5 * (np.ptp(x, axis=0) + np.abs(x).max(axis=0) * 1e-3 + 1e-9)
+    nudges = dict(zip(plant.states, sizes.tolist(), strict=True))
     parts: list[tuple[Array, Array, Array, Array]] = []
     for k in index:
         here, dt = keep[k], float(run.t[keep[k + 1]] - run.t[keep[k]])
         u = dict(zip(plant.inputs, run.u[here : keep[k + 1] + 1].mean(axis=0).tolist(), strict=True))
         given = {**start, **u}
-        x0, y0 = plant.response(x[here], given, dt)
-        columns = [plant.response(x[here] + d, given, dt) for d in nudges]
-        size = np.diag(nudges)
-        a = np.column_stack([(x1 - x0) / d for (x1, _), d in zip(columns, size, strict=True)])
-        c = np.column_stack([(y1 - y0) / d for (_, y1), d in zip(columns, size, strict=True)])
-        b, e = np.empty((len(x0), len(levers))), np.empty((len(y0), len(levers)))
-        for i, name in enumerate(levers):
-            h = LEVER_NUDGE * _size(known[name], given)
-            x1, y1 = plant.response(x[here], {**given, name: _value(known[name], given) + h}, dt)
-            b[:, i], e[:, i] = (x1 - x0) / h, (y1 - y0) / h
-        parts.append((a, b, c, e))
+        given |= {name: _value(known[name], given) for name in levers}
+        given |= dict(zip(plant.states, x[here].tolist(), strict=True))
+        steps = nudges | {name: LEVER_NUDGE * _size(known[name], given) for name in levers}
+        moved = [{**given, name: given[name] + h} for name, h in steps.items()]
+        after, shown = plant.responses([given, *moved], dt)
+        h = np.array([*steps.values()])
+        by_each, in_outputs = ((some[1:] - some[0]).T / h for some in (after, shown))
+        n = len(plant.states)
+        parts.append((by_each[:, :n], by_each[:, n:], in_outputs[:, :n], in_outputs[:, n:]))
     A, B, C, D = (np.array(p) for p in zip(*parts, strict=True))
     return Linearised(index, A, B, C, D)
 
@@ -130,7 +136,7 @@ def influences(
     n_y, n = len(plant.outputs), len(plant.states)
     sizes = {name: LEVER_NUDGE * _size(known[name], start) for name in levers if name not in found}
     moved = [{**start, name: _value(known[name], start) + h} for name, h in sizes.items()]
-    kept = (y[keep] for y in plant.simulate_in_turn(run, [start, *moved], plant.states))
+    kept = (y[keep] for y in plant.simulate_in_turn(run, [start, *moved], plant.states, problem.steps))
     before = next(kept)
     for (name, h), after in zip(sizes.items(), kept, strict=True):
         dy, dx = np.split((after - before) / h, (n_y,), axis=1)

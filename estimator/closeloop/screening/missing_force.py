@@ -5,7 +5,7 @@ caused by a force at this port alone.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -14,6 +14,7 @@ from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.linear import linearise, shows_its_state
 from estimator.closeloop.screening.pushes import pushed
 from estimator.closeloop.screening.smoothing import smooth
+from estimator.plant import USUAL
 from estimator.record import Array
 from fmus.host.description import PortNames
 
@@ -44,9 +45,10 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
     linearised by restarts, its responses to force pulses are used instead of the smoother, from the first
     sample that is fitted: nobody can set how such an FMU starts.
     """
-    plant, run = problem.plant, problem.record.runs[0]
     if not problem.ports:
         return []
+    problem = replace(problem, steps=USUAL)  # as restarts make them
+    plant, run = problem.plant, problem.record.runs[0]
     names = [name for p in problem.ports for name in p.motion]
     [full, *_] = problem.simulate(theta, (*plant.states, *names))
     first, last = np.flatnonzero(run.fit)[[0, -1]] + (0, 1)

@@ -1,6 +1,6 @@
 """Regressors of candidates, projected orthogonal to the Jacobian of the calibrated parameters."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +15,7 @@ Changes = Sequence[tuple[Candidate, Array]]  # candidates with their changes (m,
 NOTHING = 1e-6  # share of a regressor's length after projection, below which only rounding is left
 RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
 COLUMNS_AT_ONCE = 64  # largest number of columns per batch
-ROWS_AT_ONCE = 2000  # rows of all regressors that are brought together in one array
+SKETCHED = 2000  # length of the random sketch of a long regressor
 BATCH = 1 << 26  # bytes of a batch; copies of hundreds of long columns would not fit into memory
 
 
@@ -37,23 +37,27 @@ class Calibration:
         return rest
 
 
-def batches(change: Changes) -> Iterator[tuple[slice, Array]]:
-    """All columns in batches (m, k), with the slice of their positions among all columns."""
-    first, held, width = 0, [], 0
-    for _, g in change:
+def batches(columns: Iterable[Array]) -> Iterator[tuple[list[slice], Array]]:
+    """Columns (m, k) one set after the other, many in an array, with the slice of each set in it.
+
+    A product with many columns takes little more time than one with few, as both read the other factor once.
+    """
+    held: list[Array] = []
+    width = 0
+    for g in columns:
         held.append(g)
         width += g.shape[1]
         if width >= COLUMNS_AT_ONCE or width * len(g) * g.itemsize >= BATCH:
-            yield slice(first, first + width), np.hstack(held)
-            first, held, width = first + width, [], 0
+            yield columns_of(held), np.hstack(held)
+            held, width = [], 0
             let_go()
     if held:
-        yield slice(first, first + width), np.hstack(held)
+        yield columns_of(held), np.hstack(held)
 
 
-def columns_of(change: Changes) -> list[slice]:
-    """The slice of each candidate's columns among all columns."""
-    ends = np.cumsum([0, *(g.shape[1] for _, g in change)])
+def columns_of(columns: Iterable[Array]) -> list[slice]:
+    """The slice of each set of columns among all."""
+    ends = np.cumsum([0, *(g.shape[1] for g in columns)])
     return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
 
@@ -62,56 +66,30 @@ def is_wave(c: Candidate) -> bool:
     return sorted(u.name[-4:] for u in c.amplitudes) == ["_cos", "_sin"]
 
 
-def lengths(calibration: Calibration, change: Changes) -> Array:
-    """Length of each column after projection (K,), zero if only rounding is left."""
-    found = []
-    for _, g in batches(change):
-        left = np.linalg.norm(calibration.without(g), axis=0)
-        found.append(np.where(left > NOTHING * np.linalg.norm(g, axis=0), left, 0.0))
-    return np.concatenate(found) if found else np.zeros(0)
+def alike(
+    calibration: Calibration, columns: Iterable[Array], rng: np.random.Generator, rows: int = SKETCHED
+) -> tuple[Array, Array]:
+    """Lengths of all projected columns (K,), zero if only rounding is left, and their cosines (K, K).
 
-
-def alike(calibration: Calibration, change: Changes, rows: int, rng: np.random.Generator) -> Array:
-    """Cosines between all projected columns (K, K), zero for columns that the projection removes.
-
-    For long columns they are estimated from random sums of rows (a count sketch: Charikar, Chen,
-    Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), with an error of about 1 / sqrt(rows).
+    columns: (m, k), one set after the other. For long columns cosines are estimated from random sums of rows
+    (a count sketch: Charikar, Chen, Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), with an
+    error of about 1 / sqrt(rows).
     """
     m = len(calibration.basis)
     rows = min(rows, m)
     signs = rng.choice([-1.0, 1.0], m) if m > rows else np.ones(m)
-    sums = []
-    for _, g in batches(change):
+    sums, lengths = [], []
+    for _, g in batches(columns):
         left = calibration.without(g)
-        left[:, np.linalg.norm(left, axis=0) <= NOTHING * np.linalg.norm(g, axis=0)] = 0.0
+        length = np.linalg.norm(left, axis=0)
+        nothing = length <= NOTHING * np.linalg.norm(g, axis=0)
+        left[:, nothing] = length[nothing] = 0.0
+        lengths.append(length)
         padded = np.zeros((-(-m // rows) * rows, g.shape[1]))
         padded[:m] = left * signs[:, None]
         sums.append(padded.reshape(-1, rows, g.shape[1]).sum(axis=0))
     if not sums:
-        return np.zeros((0, 0))
+        return np.zeros(0), np.zeros((0, 0))
     s = np.hstack(sums)
     s /= np.linalg.norm(s, axis=0) + 1e-300
-    cosines: Array = s.T @ s
-    return cosines
-
-
-def directions(screened: Fit, regressors: Sequence[Array]) -> tuple[Array, Array]:
-    """Products (k,) of the residual with the regressors, projected and of length 1, and of these (k, k)."""
-    q = Calibration.of(screened).basis
-    within = np.vstack([_products(g, q) for g in regressors])
-    along, gram = np.zeros(len(within)), np.zeros((len(within), len(within)))
-    for first in range(0, len(q), ROWS_AT_ONCE):
-        rows = slice(first, first + ROWS_AT_ONCE)
-        left = np.vstack([g[rows].T for g in regressors]) - within @ q[rows].T
-        along += left @ screened.residual[rows]
-        gram += left @ left.T
-        let_go()
-    size = np.sqrt(np.diag(gram)) + 1e-300
-    return along / size, gram / size[:, None] / size
-
-
-def _products(g: Array, q: Array) -> Array:
-    """Products (k, n) of columns g (m, k) with columns q (m, n)."""
-    found: Array = g.T @ q
-    let_go()
-    return found
+    return np.concatenate(lengths), s.T @ s

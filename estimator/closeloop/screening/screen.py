@@ -6,6 +6,7 @@ FMU has hidden states. The columns of the calibrated parameters are projected ou
 the candidates; the joint fits decide.
 """
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -29,14 +30,19 @@ from estimator.closeloop.screening.linear import (
     shows_its_state,
 )
 from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.closeloop.screening.regressors import batches
+from estimator.plant import USUAL
 from estimator.record import Array
 from estimator.sensor_faults import faulty
 from estimator.weighting import Weighting
-from fmus.aside import all_set_aside, let_go, set_aside
+from fmus.aside import all_set_aside, set_aside
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 
 USABLE = 1e-9  # share of a regressor's length after projection, below which it is not used
+
+
+EPSILON = float(np.finfo(float).eps)
 
 
 NEARLY_PARALLEL = 1e-2  # ridge, as share of a regressor's length; nearly equal regressors share the gain
@@ -149,7 +155,8 @@ class Screening:
     def _states(self) -> Array | None:
         """States of the simulation (n, n_x); None if the FMU has hidden states."""
         plant = self.problem.plant
-        [full, *_] = self.problem.simulate(self.theta, plant.states)
+        as_restarts = replace(self.problem, steps=USUAL)
+        [full, *_] = as_restarts.simulate(self.theta, plant.states)
         x: Array = full[: _last(self.problem), len(plant.outputs) :]
         return x if shows_its_state(self.problem, self.theta, x) else None
 
@@ -183,13 +190,14 @@ class Screening:
         for name, samples in change.items():
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
             push[name] = rest + np.interp(np.arange(len(run.t)), self.samples, samples)
-        moved = plant.simulate(run, start, push=push) - self._unchanged
+        moved = plant.simulate(run, start, push=push, steps=problem.steps) - self._unchanged
         return self._weighted(moved[run.fit])
 
     @cached_property
     def _unchanged(self) -> Array:
         """Outputs of the first run without any change (N, n_y)."""
-        return self.problem.plant.simulate(self.problem.record.runs[0], self.problem.start(self.theta))
+        problem = self.problem
+        return problem.plant.simulate(problem.record.runs[0], problem.start(self.theta), steps=problem.steps)
 
     def _fault(self, c: Candidate) -> Array:
         """Change of the residual by a fault of a sensor, (m, 1)."""
@@ -220,46 +228,73 @@ def _last(problem: Problem) -> int:
 
 def screen(base: Fit, sets: Iterable[tuple[tuple[Candidate, ...], Array]]) -> list[Promise]:
     """The promise of each set of candidates from its changes (m, k) by linear regression, best first."""
-    basis = np.linalg.qr(base.jacobian)
-    r = base.residual - basis[0] @ (basis[0].T @ base.residual)
+    basis, triangle = np.linalg.qr(base.jacobian)
+    back, seen = np.linalg.pinv(triangle, rcond=EPSILON * len(triangle)), basis.T @ base.residual
+    r = base.residual - basis @ seen
+    names: deque[tuple[Candidate, ...]] = deque()
+
+    def columns() -> Iterator[Array]:
+        for candidates, raw in sets:
+            names.append(candidates)
+            yield raw
+
     found = []
-    for candidates, raw in sets:
-        found.append(_promise(base, *basis, r, candidates, raw))
-        let_go()
+    for places, raw in batches(columns()):
+        within = basis.T @ raw
+        size = np.linalg.norm(raw, axis=0) + 1e-300
+        g = raw - basis @ within
+        gram, along = g.T @ g, g.T @ r
+        for at in places:
+            candidates = names.popleft()
+            beta, gain = _regressed(candidates, gram[at, at], along[at], size[at])
+            beta = np.clip(beta, -TRUSTED, TRUSTED)
+            shift = -back @ (seen + within[:, at] @ beta)
+            found.append(Promise(candidates, gain, _start(base, candidates, beta, shift)))
     return sorted(found, key=lambda p: -p.gain)
 
 
-def _bounded(g: Array, r: Array, low: Array, high: Array) -> Array:
-    """Least-squares amplitudes (k,) of regressors g (m, k) for r, within bounds, with a small ridge."""
-    if not g.shape[1]:
-        return np.zeros(0)
-    size = np.linalg.norm(g, axis=0)
-    q, triangle = np.linalg.qr(np.vstack([g / size, NEARLY_PARALLEL * np.eye(len(size))]))
-    whole = np.concatenate([r, np.zeros(len(size))])
-    found = lsq_linear(triangle, q.T @ whole, (low * size, high * size), method="bvls")
-    return np.asarray(found.x / size)
+def _regressed(
+    candidates: tuple[Candidate, ...], gram: Array, along: Array, size: Array
+) -> tuple[Array, float]:
+    """Amplitudes (k,) within bounds, in their scales, and the reduction of the sum of squares by these.
 
-
-def _promise(
-    base: Fit, basis: Array, triangle: Array, r: Array, candidates: tuple[Candidate, ...], raw: Array
-) -> Promise:
-    """The promise of candidates; r: (m,) the residual orthogonal to the basis (m, n) of the calibration."""
-    g = raw - basis @ (basis.T @ raw)
+    gram, along: products of the projected columns with each other (k, k) and with the residual (k,); size:
+    lengths (k,) of the columns before the projection. Columns of which nothing is left have no amplitude.
+    """
     amplitudes = [u for c in candidates for u in c.amplitudes]
-    size, left = np.linalg.norm(raw, axis=0) + 1e-300, np.linalg.norm(g, axis=0)
-    usable = left > USABLE * size
     low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
+    left = np.sqrt(np.diag(gram))
+    usable = np.flatnonzero(left > USABLE * size)
     beta = np.zeros(len(amplitudes))
-    beta[usable] = _bounded(g[:, usable], -r, low[usable], high[usable])
-    gain = float(r @ r - np.sum((r + g @ beta) ** 2))
-    beta = np.clip(beta, -TRUSTED, TRUSTED)
+    if len(usable):
+        scale = left[usable]
+        alike = gram[np.ix_(usable, usable)] / np.outer(scale, scale)
+        limits = low[usable] * scale, high[usable] * scale
+        beta[usable] = _bounded(alike, -along[usable] / scale, *limits) / scale
+    return beta, float(-2 * beta @ along - beta @ gram @ beta)
+
+
+def _bounded(alike: Array, along: Array, low: Array, high: Array) -> Array:
+    """Least-squares amplitudes (k,) of regressors of length 1 within bounds, with a small ridge.
+
+    alike: their cosines (k, k); along: their products (k,) with what they are to explain.
+    """
+    ridged = alike + NEARLY_PARALLEL**2 * np.eye(len(along))
+    if len(along) == 1:
+        return np.asarray(np.clip(along / ridged[0], low, high))
+    root = np.linalg.cholesky(ridged)
+    found = lsq_linear(root.T, np.linalg.solve(root, along), (low, high), method="bvls")
+    return np.asarray(found.x)
+
+
+def _start(base: Fit, candidates: tuple[Candidate, ...], beta: Array, shift: Array) -> dict[str, float]:
+    """Start values of a fit: amplitudes (k,) in their scales, shapes, and calibrated values with a shift."""
+    amplitudes = [u for c in candidates for u in c.amplitudes]
     start = {u.name: float(b * u.scale) for u, b in zip(amplitudes, beta, strict=True)}
     start |= {u.name: u.start for c in candidates for u in c.shape}
     if len(base.values):
-        rest = basis.T @ (base.residual + raw @ beta)
-        shift = np.linalg.lstsq(triangle, -rest, rcond=None)[0]
         low, high = (np.array([getattr(u, side) for u in base.unknowns]) for side in ("low", "high"))
         trusted = TRUSTED * np.array([u.scale for u in base.unknowns])
         moved = np.clip(base.values + np.clip(shift, -trusted, trusted), low, high)
         start |= {u.name: float(v) for u, v in zip(base.unknowns, moved, strict=True)}
-    return Promise(candidates, gain, start)
+    return start

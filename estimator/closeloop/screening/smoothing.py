@@ -10,6 +10,7 @@ from estimator.filters.algebra import compiled, symmetric
 from estimator.record import Array
 
 WALKS = (0.01, 0.1, 1.0)  # random walk intensities that are tried, in units of the force's first guess
+THINNED = 4  # samples of which one is taken to compare these
 FOLLOWS = 1e-3  # share of a force's effect in one sample, above which an output has direct feedthrough
 
 
@@ -30,16 +31,20 @@ class Smoothed:
 def smooth(local: Linearised, residual: Array, noise: Array, dt: Array) -> Smoothed:
     """The force at each lever alone that explains a residual (N, n_y) with noise (n_y,) and steps dt (N-1,).
 
-    The intensity of the random walk is the one with the largest likelihood of the residual.
+    The intensity of the random walk is the one with the largest likelihood of the residual, for which some of
+    the samples do, as the intensities that are tried are far apart.
     """
-    guess = _first_guess(local, residual, dt)
-    filters = [_Filter(local, residual, noise, dt, np.array([i])) for i in range(len(guess))]
-    tried = guess[:, None] * np.array(WALKS)
-    scored = [[f.likelihood(walk[None]) for walk in walks] for f, walks in zip(filters, tried, strict=True)]
+    guess, near = _first_guess(local, residual, dt), local.near(len(residual))
+    tried, thin = guess[:, None] * np.array(WALKS), local.over(THINNED)
+    few, at = residual[::THINNED].copy(), near[::THINNED].copy()
+    apart = np.add.reduceat(dt, np.arange(0, len(dt), THINNED))
+    ranks = (_Filter(thin, few, noise, apart, np.array([i]), at) for i in range(len(guess)))
+    scored = [[f.likelihood(walk[None]) for walk in walks] for f, walks in zip(ranks, tried, strict=True)]
     walk = guess * np.array(WALKS)[np.argmax(scored, axis=1)]
+    filters = (_Filter(local, residual, noise, dt, np.array([i]), near) for i in range(len(guess)))
     alone = [f.smoothed(w[None]) for f, w in zip(filters, walk, strict=True)]
     x, force, std = (np.array(of_all) for of_all in zip(*alone, strict=True))
-    together = _Filter(local, residual, noise, dt, np.arange(len(guess))).smoothed(walk)[0]
+    together = _Filter(local, residual, noise, dt, np.arange(len(guess)), near).smoothed(walk)[0]
     return Smoothed(x, force[..., 0], std[..., 0], together)
 
 
@@ -60,14 +65,15 @@ class _Filter:
     """Kalman filter and smoother with the forces of some levers (r,), as random walks, as further states."""
 
     def __init__(
-        self, local: Linearised, residual: Array, noise: Array, dt: Array, levers: NDArray[np.intp]
-    ) -> None:
+        self, local: Linearised, residual: Array, noise: Array, dt: Array, levers: NDArray[np.intp],
+        near: NDArray[np.intp],
+    ) -> None:  # fmt: skip
         points, n_y, n = local.C.shape
         m = n + len(levers)
         A, C = np.zeros((points, m, m)), np.zeros((points, n_y, m))
         A[:, :n, :n], A[:, :n, n:], A[:, n:, n:] = local.A, local.B[:, :, levers], np.eye(len(levers))
         C[:, :, :n], C[:, :, n:] = local.C, local.D[:, :, levers]
-        self.n, self.A, self.C, self.near = n, A, C, local.near(len(residual))
+        self.n, self.A, self.C, self.near = n, A, C, near
         self.residual, self.R, self.dt = residual, noise**2, dt
 
     def likelihood(self, walk: Array) -> float:

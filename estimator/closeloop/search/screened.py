@@ -1,8 +1,10 @@
 """Screens all candidates against the residual of the calibrated FMU."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
+
+import numpy as np
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.model_form import form_of
@@ -18,9 +20,12 @@ from estimator.closeloop.progress import Progress
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.closeloop.screening.regressors import Calibration, alike
 from estimator.closeloop.screening.screen import Screening, screen
 from estimator.closeloop.search.onset import onset
 from estimator.record import Array
+
+SEED = 0  # of the random sums that estimate cosines
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,15 @@ class Screened:
     promises: list[Promise]
     stages: Stages
     came: Callable[[], tuple[float, Fit] | None]
+    _alike: dict[tuple[str, ...], tuple[Array, Array]] = field(default_factory=dict, compare=False)
+
+    def alike(self, fit: Fit) -> tuple[Array, Array]:
+        """Lengths and cosines of all changes about a fit of the screening; see regressors.alike."""
+        names = tuple(u.name for u in fit.unknowns)
+        if names not in self._alike:
+            columns = (g for _, g in self.change)
+            self._alike[names] = alike(Calibration.of(fit), columns, np.random.default_rng(SEED))
+        return self._alike[names]
 
     @property
     def beyond_noise(self) -> float:

@@ -108,23 +108,26 @@ class ModelBuilder:
 
 @dataclass(frozen=True)
 class ForeignBuilder:
-    """A foreign FMU with effects around it; kept in a folder. isolation: how its builds run, see Archive."""
+    """A foreign FMU for co-simulation with effects around it; kept in a folder.
+
+    isolation: how its builds run, see Archive; carried: the FMU for model exchange alone that is inside of
+    `fmu`, if there is one, see `co_simulated`.
+    """
 
     fmu: Path
     ports: tuple[PortNames, ...]
     folder: Path
     isolation: Isolation | None = None
+    carried: Path | None = None
     quick: ClassVar[bool] = False
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
     form_error: ClassVar[float] = 0.0
 
-    def __post_init__(self) -> None:
-        if _described(self.fmu).exchange is not None:
-            raise BadInput(
-                f"{self.fmu}: is for model exchange alone; it can be run and compared, but effects are put "
-                "around FMUs for co-simulation; export it for co-simulation too"
-            )
+    @property
+    def source(self) -> Path:
+        """The FMU as its owner gave it."""
+        return self.carried or self.fmu
 
     @property
     def offers(self) -> Effects:
@@ -158,7 +161,9 @@ class ForeignBuilder:
     ) -> Path:
         """Write the FMU with effects around it and start values that were found, for use elsewhere."""
         target = out / f"{self.fmu.stem}_augmented.fmu"
-        return build_coupled(self.fmu, self.ports, effects, target, starts=starts, origin=origin)
+        return build_coupled(
+            self.fmu, self.ports, effects, target, starts=starts, origin=origin, source=self.carried
+        )
 
     def alone(self, effects: Effects, starts: Mapping[str, float], step: float) -> EffectsAlone:
         """The effects as a model of their own, to be connected to the FMU every `step`, s.
@@ -166,6 +171,22 @@ class ForeignBuilder:
         BadInput where an effect changes a parameter while running.
         """
         return EffectsAlone(describe(self.fmu), self.ports, effects, starts, step)
+
+
+def co_simulated(fmu: Path, folder: Path) -> Path:
+    """The FMU or, if it is for model exchange alone, one for co-simulation that carries and integrates it.
+
+    That one is kept in the folder. BadInput where no compiler is at hand, or the FMU has no library for this
+    platform.
+    """
+    if _described(fmu).exchange is None:
+        return fmu
+    target = folder / "co_simulation" / fmu.name
+    if not target.exists():
+        part = target.with_name(f"{os.getpid()}.fmu")
+        build_carrier(fmu, (), (), part)
+        part.replace(target)  # workers may build the same at once
+    return target
 
 
 @cache

@@ -31,7 +31,7 @@ from fmus.export.provenance import (
     rights,
     sealed,
 )
-from fmus.export.table import STOP, sizes, unit_table, variable_table
+from fmus.export.table import STOP, display_unit, shown_as, sizes, unit_table, variable_table
 from fmus.export.zipped import entry
 from fmus.files import write_at_once
 from fmus.model import Model, equations
@@ -82,7 +82,7 @@ def build_python(model: Model, out: Path, origin: Origin | None = None) -> Path:
     origin: what estimates in the model rest on, for its record of provenance. The same source gives the
     same bytes. BadInput where PythonFMU has no binary for this platform.
     """
-    made = equations(model)
+    made, variables = equations(model), variable_table(model)
     card = {
         "description": model.about,
         "step_size": model.step_size,
@@ -95,7 +95,8 @@ def build_python(model: Model, out: Path, origin: Origin | None = None) -> Path:
         },
         "sizes": sizes(model),
         "units": unit_table(v.unit for v in model.variables.values()),
-        "variables": variable_table(model),
+        "variables": variables,
+        "display": {r["name"]: shown_as(r["unit"], d) for r in variables if (d := display_unit(r))},
     }
     files = equations_files({"step": made.step, "outputs": made.h})
     page = documentation(model.name, card, [f"{e.kind}@{location}" for e, location in model.effects])

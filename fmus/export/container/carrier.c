@@ -41,18 +41,37 @@
 enum { WARNING = 1, PATH = 4096 };
 
 /* The functions of the carried FMU that are called, by their role here. */
+#if BASE_EXCHANGE
+#define STEPPING(EACH)                                                                                            \
+    EACH(event, EnterEventMode) EACH(go_on, EnterContinuousTimeMode) EACH(completed, CompletedIntegratorStep)     \
+    EACH(set_time, SetTime) EACH(set_states, SetContinuousStates) EACH(states, GetContinuousStates)               \
+    EACH(nominals, GetNominalsOfContinuousStates) EACH(indicators, GetEventIndicators)
+#else
+#define STEPPING(EACH) EACH(step, DoStep)
+#endif
+#define USUAL(EACH)                                                                                               \
+    EACH(reset, Reset) EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode)                   \
+    EACH(terminate, Terminate) EACH(free, FreeInstance) STEPPING(EACH)
 #if BASE_FMI == 2
 #define OF_BASE(name) fmi2##name
+#if BASE_EXCHANGE
+#define OWN(EACH) EACH(slopes, GetDerivatives) EACH(update, NewDiscreteStates)
+#else
+#define OWN(EACH)
+#endif
 #define FUNCTIONS(EACH)                                                                                           \
-    EACH(get, GetReal) EACH(set, SetReal) EACH(step, DoStep) EACH(reset, Reset) EACH(setup, SetupExperiment)      \
-    EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode) EACH(instantiate, Instantiate)       \
-    EACH(terminate, Terminate) EACH(free, FreeInstance)
+    EACH(get, GetReal) EACH(set, SetReal) EACH(setup, SetupExperiment) EACH(instantiate, Instantiate)             \
+    USUAL(EACH) OWN(EACH)
 #else
 #define OF_BASE(name) fmi3##name
-#define FUNCTIONS(EACH)                                                                                           \
-    EACH(get, GetFloat64) EACH(set, SetFloat64) EACH(step, DoStep) EACH(reset, Reset)                             \
-    EACH(enter, EnterInitializationMode) EACH(leave, ExitInitializationMode)                                      \
-    EACH(instantiate, InstantiateCoSimulation) EACH(terminate, Terminate) EACH(free, FreeInstance)
+#if BASE_EXCHANGE
+#define OWN(EACH)                                                                                                 \
+    EACH(slopes, GetContinuousStateDerivatives) EACH(update, UpdateDiscreteStates)                                \
+    EACH(instantiate, InstantiateModelExchange)
+#else
+#define OWN(EACH) EACH(instantiate, InstantiateCoSimulation)
+#endif
+#define FUNCTIONS(EACH) EACH(get, GetFloat64) EACH(set, SetFloat64) USUAL(EACH) OWN(EACH)
 #endif
 
 typedef struct {
@@ -69,6 +88,16 @@ typedef struct {
     double *res[AT_LEAST_1(WORK_RES)];
     int iw[AT_LEAST_1(WORK_IW)];
     double w[AT_LEAST_1(WORK_W)];
+#if BASE_EXCHANGE
+    double x[AT_LEAST_1(N_X)], nominal[AT_LEAST_1(N_X)]; /* its states, now and usually */
+    double z[AT_LEAST_1(N_Z)], next[AT_LEAST_1(N_Z)];    /* its event indicators, at the start and end of a part */
+    double jacobian[AT_LEAST_1(N_X * N_X)], factors[AT_LEAST_1(N_X * N_X)];
+    int pivot[AT_LEAST_1(N_X)];
+    bool known; /* the Jacobian of now */
+    bool over;  /* whether it has asked for the end */
+    double due; /* s, the next event of time */
+    char why[160];
+#endif
 #define FIELD(role, function) OF_BASE(function##TYPE) *role;
     FUNCTIONS(FIELD)
 } Instance;
@@ -105,6 +134,9 @@ static int set_base(Instance *m, const unsigned *references, size_t n, const dou
 #endif
 }
 
+#if BASE_EXCHANGE
+#include "exchange.c"
+#else
 static int step_base(Instance *m, double t, double dt) {
 #if BASE_FMI == 2
     return (int)m->step(m->base, t, dt, fmi2True);
@@ -115,6 +147,9 @@ static int step_base(Instance *m, double t, double dt) {
     return ends || early ? (int)fmi2Error : status;
 #endif
 }
+
+static int leave_base(Instance *m) { return (int)m->leave(m->base); }
+#endif
 
 static int enter_base(Instance *m) {
 #if BASE_FMI == 2
@@ -217,6 +252,10 @@ static void begin(Instance *m) {
     memset(m->touched, 0, sizeof m->touched);
     memset(m->motion, 0, sizeof m->motion);
     m->failed = m->running = m->stepped = m->seen = false;
+#if BASE_EXCHANGE
+    *m->why = '\0';
+    m->over = false;
+#endif
 }
 
 #define TEXT_OF(name) #name
@@ -231,7 +270,7 @@ static bool found(Instance *m) {
 }
 
 static bool carried(Instance *m, const char *uri) {
-    char path[PATH], resources[PATH];
+    char path[PATH], resources[PATH + sizeof "/base/resources/"];
     if (!folder_of(uri, path)) return refuse(m, fmi2Error, "the path of its resources is too long"), false;
     size_t n = strlen(path);
 #if BASE_FMI == 2
@@ -244,10 +283,15 @@ static bool carried(Instance *m, const char *uri) {
         return refuse(m, fmi2Error, "the carried FMU cannot be loaded: %s", path), false;
     if (!found(m)) return false;
 #if BASE_FMI == 2
-    m->base = m->instantiate(m->name, fmi2CoSimulation, BASE_TOKEN, resources, m->host, fmi2False, fmi2True);
+    fmi2Type kind = BASE_EXCHANGE ? fmi2ModelExchange : fmi2CoSimulation;
+    m->base = m->instantiate(m->name, kind, BASE_TOKEN, resources, m->host, fmi2False, fmi2True);
+#else
+#if BASE_EXCHANGE
+    m->base = m->instantiate(m->name, BASE_TOKEN, resources, fmi3False, fmi3True, m, heard);
 #else
     m->base = m->instantiate(m->name, BASE_TOKEN, resources, fmi3False, fmi3True, fmi3False, fmi3False, NULL, 0, m,
                              heard, NULL);
+#endif
 #endif
     if (!m->base) refuse(m, fmi2Error, "the carried FMU cannot be instantiated");
     return m->base != NULL;
@@ -286,6 +330,9 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
 static fmi2Status answer(Instance *m, int status, const char *call) {
     if (status <= WARNING) return fmi2OK;
     m->failed = true;
+#if BASE_EXCHANGE
+    if (*m->why) return refuse(m, fmi2Error, "%s: the carried FMU fails: %s", call, m->why);
+#endif
     return refuse(m, fmi2Error, "%s: the carried FMU answers with status %d", call, status);
 }
 
@@ -304,7 +351,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     int status = pass_on(m, INPUTS);
     if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
     if (status <= WARNING) status = by_the_laws(m, 0.0);
-    if (status <= WARNING) status = (int)m->leave(m->base);
+    if (status <= WARNING) status = leave_base(m);
     m->running = status <= WARNING;
     return answer(m, status, __func__);
 }
@@ -414,6 +461,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real duration, fmi2Boolea
     m->time = t;
     if (status <= WARNING) return fmi2OK;
     m->failed = true;
+#if BASE_EXCHANGE
+    if (*m->why) return refuse(m, fmi2Discard, "the carried FMU cannot make the step at t = %g s: %s", t, m->why);
+#endif
     return refuse(m, fmi2Discard, "the carried FMU cannot make the step at t = %g s (status %d)", t, status);
 }
 

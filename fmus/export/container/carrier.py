@@ -1,7 +1,8 @@
 """Pack a foreign FMU with effects around it as a native FMU, for runs in this process.
 
 It takes the same steps as the container in Python (see coupled.py), which is what users get: that one needs
-no compiler and runs on every platform that PythonFMU supports.
+no compiler and runs on every platform that PythonFMU supports. An FMU for model exchange alone is integrated
+over each step (see exchange.c), so that it becomes one for co-simulation.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def build_carrier(
             for path in inside.rglob("*")
             if path.is_file()
         }
-    files[f"binaries/{where.folder(2)}/{NAME}{where.suffix}"] = built
+    files[f"binaries/{where.folder(2)}/{_named(description)[1]}{where.suffix}"] = built
     write_at_once(out, packed(files, zipfile.ZIP_STORED))
     return out
 
@@ -80,6 +81,7 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
         "c": _c,
         "token": NO_TOKEN,
         "fmi": description.fmi_version[0],
+        "exchange": description.exchange,
         "base_token": description.guid,
         "library": library,
         "longest": repr(card["step_size"]),
@@ -100,8 +102,9 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     }
     templates = Environment(loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True)
     headers = Path(fmpy.__file__).parent / "c-code"
+    sources = ("carrier.c", "exchange.c") if description.exchange else ("carrier.c",)
     files = {
-        "carrier.c": (HERE / "carrier.c").read_text(encoding="utf-8"),
+        **{name: (HERE / name).read_text(encoding="utf-8") for name in sources},
         "carrier.h": templates.get_template("carrier.h.j2").render(facts),
         "laws.c": generator.dump(),
     }
@@ -130,17 +133,24 @@ def _limit(row: dict[str, Any], key: str, without: float) -> str:
     return repr(without if given is None else min(max(float(given), -LARGEST), LARGEST))
 
 
+def _named(description: FmuDescription) -> tuple[str, str]:
+    """Name of the model, and of the library: those of an FMU that stands in the place of what it carries."""
+    return (description.name, description.identifier) if description.exchange else (NAME, NAME)
+
+
 def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
     """modelDescription.xml."""
+    name, identifier = _named(description)
     root = Element(
-        "fmiModelDescription", fmiVersion="2.0", modelName=NAME, guid=NO_TOKEN,
+        "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=NO_TOKEN,
         description=card["description"], variableNamingConvention="structured",
     )  # fmt: skip
     once = {"canBeInstantiatedOnlyOncePerProcess": flag(description.once_per_process)}
-    SubElement(root, "CoSimulation", {"modelIdentifier": NAME, **once, **ABILITIES})
-    units = SubElement(root, "UnitDefinitions")
-    for name, exponents in card["units"].items():
-        SubElement(SubElement(units, "Unit", name=name), "BaseUnit", exponents)
+    SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **once, **ABILITIES})
+    if card["units"]:
+        units = SubElement(root, "UnitDefinitions")
+        for name, exponents in card["units"].items():
+            SubElement(SubElement(units, "Unit", name=name), "BaseUnit", exponents)
     variables, outputs = SubElement(root, "ModelVariables"), []
     for i, v in enumerate(card["variables"]):
         keys = ("name", "causality", "variability", "initial", "description")
@@ -155,4 +165,9 @@ def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
     node = SubElement(structure, "Outputs")
     for i in outputs:
         SubElement(node, "Unknown", index=str(i + 1))
+    computed = [i for i in outputs if card["variables"][i]["initial"] == "calculated"]
+    if computed:
+        node = SubElement(structure, "InitialUnknowns")
+        for i in computed:
+            SubElement(node, "Unknown", index=str(i + 1))
     return text(root)

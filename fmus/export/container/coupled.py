@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.effects import EFFECTS
+from fmus.errors import BadInput
 from fmus.export.around.outside import Laws, laws
 from fmus.export.builders.portable import equations_files
 from fmus.export.builders.pythonfmu import EVALUATED, Content, documentation, pack
@@ -30,13 +31,17 @@ def build_coupled(
     name: str | None = None,
     starts: Mapping[str, float] | None = None,
     origin: Origin | None = None,
+    source: Path | None = None,
 ) -> Path:
     """Write an FMU with `base` inside and effects (kind, location) around it; returns its path.
 
     A location is the name of a port, of an input or of a tunable parameter.
-    starts: start values that replace those of the carried FMU and of the effects; origin: what they rest on.
+    starts: start values that replace those of the carried FMU and of the effects; origin: what they rest on;
+    source: the FMU that the record of provenance names, where `base` was made from another one.
     """
     description = describe(base)
+    if description.exchange is not None:
+        raise BadInput(f"{base}: is for model exchange alone; carry it by one for co-simulation first")
     made = laws(description, ports, effects)
     card = carrying(description, ports, effects, made, starts or {})
     table, names = card["variables"], [f"{kind}@{location}" for kind, location in effects]
@@ -46,7 +51,7 @@ def build_coupled(
     needs = "It carries another FMU and runs it with the package fmpy, which the importing process needs too."
     page = documentation(title, card, names, needs)
     values = {r["name"]: (r["start"], r["unit"]) for r in table if r["causality"] == "parameter"}
-    about = record_around(base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
+    about = record_around(source or base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
     return pack(Content(title, card, ("coupled", "carried", *EVALUATED), files, page, False, about), out)
 
 

@@ -103,7 +103,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]  # PythonFMU comes without types
 
     def display(self) -> dict[str, dict[str, str]]:
         """By variable the <DisplayUnit> of its unit in which a person reads it, where one is stated."""
-        return {}
+        return dict(MODEL.get("display", {}))
 
     def fail(self, reason: str) -> None:
         """Log a reason; the instance refuses to step until it is reset or restored."""

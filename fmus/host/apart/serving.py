@@ -18,9 +18,9 @@ from typing import Any
 from fmus.host.apart.channel import Channel
 from fmus.host.apart.memory import Memory
 from fmus.host.watch import PAGE
+from fmus.processes import end_with_parent
 
 GB = 10**9  # bytes
-DEATH_SIGNAL = 1  # of the call prctl: the signal when the parent ends
 KEPT: dict[int, Any] = {}  # objects that stay here, by number
 NUMBERS = count(1)
 CHANNELS: list[Channel] = []  # the one of this process
@@ -99,8 +99,8 @@ def limit_process(memory: float) -> None:
         hard = resource.getrlimit(which)[1]
         least = size if hard == resource.RLIM_INFINITY else min(size, hard)
         resource.setrlimit(which, (least, hard))
+    end_with_parent(signal.SIGKILL)
     library = ctypes.CDLL(None)
-    library.prctl(DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     library.setvbuf(ctypes.c_void_p.in_dll(library, "stdout"), None, 1, 0)
 
 

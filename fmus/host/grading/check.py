@@ -1,6 +1,5 @@
 """Grade an FMU for use here: what an estimator relies on is tried out, not believed."""
 
-import errno
 import json
 import os
 import re
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.errors import BadInput
+from fmus.files import DISK
 from fmus.host.archive import describe
 from fmus.host.grading.cost import WAY_OUT
 from fmus.host.grading.fitness import LETTER, Fit, fitness, simulates
@@ -22,7 +22,6 @@ from fmus.host.grading.trials import TRIALS
 PATIENCE = 120.0  # s, for all trials together
 LEAST = 2.0  # s, for the time of a step where the trials took all
 MOST = 1_000_000  # bytes, that the trials may tell; an FMU may write there, too
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)  # errors of a disk
 ENDS, LATE = "It brings down the process that runs it", "It did not come to an end"
 RUN, COST = "fmus.host.grading.trials", "fmus.host.grading.cost"
 
@@ -129,7 +128,7 @@ def _mistake(path: Path, told: str) -> Exception:
     """The error of a check that failed itself: of a full disk where the traceback ends with one."""
     last = told.rstrip().rpartition("\n")[2]
     number = re.match(r"OSError: \[Errno (\d+)\]", last)
-    if number and int(number[1]) in FULL:
+    if number and int(number[1]) in DISK:
         return BadInput(f"{path}: cannot be unpacked ({os.strerror(int(number[1]))}); {WAY_OUT}")
     return RuntimeError(f"{path}: the check itself failed:\n{told}")
 

@@ -59,11 +59,7 @@ def fitness(outcomes: Outcomes, d: FmuDescription, step: float | None) -> tuple[
             'initial="exact" and a start value'
         )
         estimation = Fit("estimation", "no", why)
-    closing = _costing("close-loop", step, SIMULATIONS)
-    if d.exchange is not None:
-        why = "effects are put around FMUs for co-simulation; export it for co-simulation too"
-        closing = Fit("close-loop", "no", why)
-    return (simulation, estimation, closing)
+    return (simulation, estimation, _costing("close-loop", step, SIMULATIONS))
 
 
 def _costing(use: str, step: float | None, times: int) -> Fit:

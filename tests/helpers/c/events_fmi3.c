@@ -1,6 +1,6 @@
 /* A ball that bounces, as an FMI 3.0 FMU for model exchange alone, strict about the mode of each call:
    h' = v, v' = -g, at h = 0 the velocity becomes -e v; `bounces` counts. At every quarter of a second `quarters`
-   grows, and at `last` of them it asks for the end. A change of the discrete input `kick` changes v by as much,
+   grows, and so does `ticks`; at `last` of them, or `stop` s, it asks for the end. A change of the discrete input `kick` changes v by as much,
    in two updates. Below `floor` it has no derivatives. */
 
 #include "fmi3FunctionTypes.h"
@@ -9,11 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TIME, H, V, DER_H, DER_V, G, E, FLOOR, KICK, BOUNCES, QUARTERS, LAST };
+enum { TIME, H, V, DER_H, DER_V, G, E, FLOOR, KICK, BOUNCES, QUARTERS, LAST, Z, TICKS, STOP };
 typedef enum { INSTANTIATED = 1, INITIALIZATION = 2, EVENT = 4, CONTINUOUS = 8, TERMINATED = 16 } Mode;
 
 typedef struct {
-    double time, h, v, g, e, floor, next;
+    double time, h, v, g, e, floor, next, stop;
     fmi3Int32 kick, done, bounces, quarters, last;
     Mode mode;
 } State;
@@ -24,7 +24,7 @@ typedef struct {
     fmi3LogMessageCallback log;
 } Ball;
 
-static const State START = {0, 1, 0, 9.81, 0.7, -1e9, 0.25, 0, 0, 0, 0, 1000000, INSTANTIATED};
+static const State START = {0, 1, 0, 9.81, 0.7, -1e9, 0.25, 1e9, 0, 0, 0, 0, 1000000, INSTANTIATED};
 
 static fmi3Status refuse(Ball *m, fmi3Status status, const char *why) {
     m->log(m->environment, status, "logStatusError", why);
@@ -120,7 +120,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *again, f
         *values = true;
         *again = s->done != s->kick;
     }
-    *terminate = s->quarters >= s->last;
+    *terminate = s->quarters >= s->last || s->time >= s->stop - 1e-12;
     *timed = true;
     *next = s->next;
     return fmi3OK;
@@ -191,6 +191,7 @@ static double *place(State *s, fmi3ValueReference vr) {
     case G: return &s->g;
     case E: return &s->e;
     case FLOOR: return &s->floor;
+    case STOP: return &s->stop;
     default: return NULL;
     }
 }
@@ -202,7 +203,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference vr[], 
     if (n != nValues) return refuse(m, fmi3Error, "scalars have one value");
     for (size_t i = 0; i < n; i++) {
         const double *from = place(s, vr[i]);
-        values[i] = from ? *from : vr[i] == DER_H ? s->v : vr[i] == DER_V ? -s->g : s->time;
+        values[i] = from ? *from : vr[i] == DER_H ? s->v : vr[i] == DER_V ? -s->g : vr[i] == TICKS ? s->quarters : s->time;
     }
     return fmi3OK;
 }

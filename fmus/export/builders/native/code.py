@@ -36,23 +36,34 @@ class Work:
     w: int
 
 
-def sources(table: Table, made: Equations, fmi: int, token: str, working: bool = False) -> dict[str, str]:
+def sources(
+    table: Table,
+    made: Equations,
+    fmi: int,
+    token: str,
+    working: bool = False,
+    joined: cs.Function | None = None,
+) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others.
 
     working: for this machine and FMI 2.0 only, without derivatives, whose calls are refused; what the
-    equations for several rows call is a unit of its own, `lanes_object.c`.
+    equations for several rows call is a unit of its own, `lanes_object.c`. joined: its step over several
+    samples, see fmus/integrators/joined.py.
     """
     code, work = _equations(table.name, made, derivatives=not working)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
     if working:
         wrapper["derivatives.c"] = (HERE / "sources" / "no_derivatives.c").read_text(encoding="utf-8")
-        wrapper["lanes_object.c"] = (HERE / "sources" / "lanes_object.c").read_text(encoding="utf-8")
+        for name in ("lanes_object.c", "lanes_joined.c"):
+            wrapper[name] = (HERE / "sources" / name).read_text(encoding="utf-8")
         wrapper["lanes.h"] = f"#define WIDTH {widest()}\n{wrapper['lanes.h']}"
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
-    lanes = lanes_of((made.f, made.h, made.step))
+    lanes = lanes_of((made.f, made.h, made.step, *([joined] if joined else ())))
     rows = {"lanes_equations.c": lanes.functions, "lanes_called.c": lanes.called} if lanes else {}
-    header = _header(table, work, fmi, token, lanes=bool(lanes), working=working)
+    header = _header(
+        table, work, fmi, token, lanes=bool(lanes), working=working, joins=bool(lanes and joined)
+    )
     return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}
 
 

@@ -25,7 +25,7 @@ BOTH = {
 MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "true"}
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
-    "canInterpolateInputs": "false",
+    "canInterpolateInputs": "true",
     "maxOutputDerivativeOrder": "0",
     "canRunAsynchronuously": "false",
 }

@@ -13,18 +13,9 @@ import casadi as cs
 
 from fmus.export.builders.native.dependencies import Dependencies, dependencies
 from fmus.export.provenance import rights
-from fmus.export.table import KINDS, row, unit_table
+from fmus.export.table import KINDS, display_unit, row, shown_as, unit_table
 from fmus.model import Equations, Model
 from fmus.variables import Rate, State
-
-SHOWN = {  # unit: how a person reads it, and from what size on
-    "rad": ("deg", 0.0),
-    "rad/s": ("rpm", 1.0),
-    "m/s": ("km/h", 5.0),
-    "N": ("kN", 1e3),
-    "Pa": ("GPa", 1e9),
-    "N/m": ("kN/m", 1e3),
-}
 
 
 @dataclass(frozen=True)
@@ -113,7 +104,7 @@ def table(model: Model, made: Equations) -> Table:
         outputs=tuple(_running(u, sizes) for u in (*states, *computed)),
         initial=(*computed, *rest),
         units=unit_table(e.unit for e in entries),
-        display={u: (d, _display(u, d)) for u, d in sorted(shown.items())},
+        display={u: (d, shown_as(u, d)) for u, d in sorted(shown.items())},
         terminals=tuple(_terminals(model)),
         effects=tuple(f"{effect.kind}@{location}" for effect, location in model.effects),
         rights=rights(model),
@@ -140,12 +131,10 @@ def _entries(model: Model) -> tuple[list[Entry], list[int], list[int]]:
 
 
 def _entry(reference: int, r: dict[str, Any], derivative_of: int | None) -> Entry:
-    unit, largest = SHOWN.get(r["unit"], (None, 0.0))
-    size = max(abs(r["start"]), r["nominal"] or 0.0)
     return Entry(
         reference=reference,
         start=float(r["start"]) if r["starts"] else None,
-        display_unit=unit if size >= largest else None,
+        display_unit=display_unit(r),
         derivative_of=derivative_of,
         **{k: r[k] for k in ("name", "unit", "causality", "variability", "initial", "min", "max", "nominal")},
         description=r["description"],
@@ -179,13 +168,6 @@ def rate_unit(unit: str) -> str:
     if slash and (power == "" or power.isdigit()):
         return f"{base}/s{int(power or 1) + 1}"
     return f"{unit}/s"
-
-
-def _display(unit: str, display: str) -> dict[str, str]:
-    """FMI's <DisplayUnit>: value in it = factor * value in the unit."""
-    of, base = unit_table([display])[display], unit_table([unit])[unit]
-    factor = float(base.get("factor", "1")) / float(of.get("factor", "1"))
-    return {"name": display, "factor": repr(factor)}
 
 
 def _unknown(reference: int, needs: Dependencies, unknown: int) -> Unknown:

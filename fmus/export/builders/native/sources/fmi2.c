@@ -167,7 +167,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominals[
     return answer(get_nominals(ME(c), __func__, nominals, n));
 }
 
-/* ---- co-simulation: steps are made at once, inputs held ---- */
+/* ---- co-simulation: steps are made at once, inputs held or linear ---- */
 
 static fmi2Status not_offered(const Instance *m, const char *call, const char *what) {
     return m ? answer(refuse(m, ERROR, "%s: %s", call, what)) : fmi2Error;
@@ -175,11 +175,7 @@ static fmi2Status not_offered(const Instance *m, const char *call, const char *w
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-    (void)vr;
-    (void)n;
-    (void)order;
-    (void)value;
-    return not_offered(ME(c), __func__, "inputs are held over a step");
+    return answer(set_rates(ME(c), __func__, vr, n, order, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,

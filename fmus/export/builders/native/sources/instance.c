@@ -45,6 +45,7 @@ static void forget_results(Instance *m) { m->outputs_known = m->slopes_known = f
 
 static void restart(Instance *m) {
     for (int i = 0; i < N_SET; i++) m->now.values[i] = VARIABLES[i].start;
+    memset(m->now.rates, 0, sizeof m->now.rates);
     m->now.time = 0.0;
     m->now.mode = INSTANTIATED;
     m->any_time = false;

@@ -47,7 +47,8 @@ enum { FIRST_INPUT = N_STATES, FIRST_PARAMETER = N_STATES + N_INPUTS, FIRST_LOCA
 
 /* All that there is to the state of an FMU; without gaps, so that its bytes repeat. */
 typedef struct {
-    double values[AT_LEAST_1(N_SET)]; /* states, inputs, parameters */
+    double values[AT_LEAST_1(N_SET)];   /* states, inputs, parameters */
+    double rates[AT_LEAST_1(N_INPUTS)]; /* of the inputs over the next communication step, 1/s */
     double time;                      /* s */
     int kind, mode;
 } Memory;
@@ -65,6 +66,7 @@ typedef struct {
     bool any_time; /* a restored state may go on at any time, the equations do not contain it */
 
     double next[N_STATES], before[N_STATES]; /* of an internal step, of a communication step */
+    double first[AT_LEAST_1(N_INPUTS)];      /* inputs at the start of a communication step */
     double seed[AT_LEAST_1(N_SET)];          /* of a derivative: by states, inputs, parameters */
     double tangent[N_STATES + N_OUTPUTS];    /* by slopes, outputs */
     const double *arg[WORK_ARG];

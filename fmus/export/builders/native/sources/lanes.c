@@ -42,6 +42,7 @@ typedef struct {
     int first;          /* whether values before the first step are read too */
     double *found;      /* (n_rows, n_samples - 1 + first, n_get) */
     int processor;      /* 0 at first; then what is known, for the question takes longer than a step */
+    int joined;         /* whether a step goes over four samples: `during` has all samples (n_samples, n_inputs) then */
 } Rows;
 
 enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
@@ -56,6 +57,9 @@ enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
 #endif
 #include "lanes_equations.c"
 #include "lanes_rows.c"
+#ifdef JOINS
+#include "lanes_joined.c"
+#endif
 
 #if defined(FMI2_OVERRIDE_FUNCTION_PREFIX) || defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
 #define LANES_NAMED(name) name
@@ -93,8 +97,20 @@ LANES_EXPORTED long long LANES_NAMED(railfmi_rows)(Rows *asked) {
         for (size_t k = 0; k < asked->n_put; k++)
             if (!within(index_of(asked->put[k]), asked->rows[i * asked->n_put + k])) return (long long)i;
     long long failed = -1;
+#ifdef JOINS
+    if (asked->joined) {
+        if (!all_within(asked)) return 0;
+        for (size_t row = 0; row < asked->n_rows && failed < 0; row += WIDTH) failed = group_of_joined(asked, row);
+        return failed;
+    }
+#endif
     for (size_t row = 0; row < asked->n_rows && failed < 0; row += WIDTH) failed = group_of_rows(asked, row);
     return failed;
 }
+
+#ifdef JOINS
+/* Number of samples that a step may go over. */
+LANES_EXPORTED int LANES_NAMED(railfmi_joins)(void) { return QUARTERS; }
+#endif
 
 #endif

@@ -70,6 +70,14 @@ VECTORS static inline __attribute__((always_inline)) bool lanes_everywhere(const
     return all != 0;
 }
 
+/* Whether a condition holds in any lane. */
+VECTORS static inline __attribute__((always_inline, unused)) bool any_lane(const Bits *condition) {
+    const Bits c = *condition;
+    long long any = 0;
+    EACH(i) any |= c[i];
+    return any != 0;
+}
+
 /* e to the x: 2 to a whole number times the Taylor series of what is left, up to 0.35. */
 ONLY lanes_exp(const Lanes *a, Lanes *y) {
     Lanes x = *a, shifted = x * 1.4426950408889634 + ROUNDING, n = shifted - ROUNDING;

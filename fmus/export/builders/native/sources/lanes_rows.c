@@ -4,17 +4,44 @@ typedef struct {
     Lanes values[N_SET], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
 } Group;
 
-/* The arguments of the equations one after the other: states, inputs and parameters are so already. */
-VECTORS static bool advance_group(Group *m, double duration, int active) {
+/* What has to be known to read what is asked. */
+typedef struct {
+    bool outputs, slopes, states[N_STATES];
+} Needed;
+
+static Needed needed_for(const Rows *asked) {
+    Needed found = {0};
+    for (size_t k = 0; k < asked->n_get; k++) {
+        unsigned from = index_of(asked->get[k]);
+        found.outputs = found.outputs || (from >= N_SET && from < FIRST_LOCAL);
+        found.slopes = found.slopes || from >= FIRST_LOCAL;
+        if (from < N_STATES) found.states[from] = true;
+    }
+    for (int k = 0; k < N_STATES; k++) found.states[k] = found.states[k] || found.outputs || found.slopes;
+    return found;
+}
+
+/* The first lanes, as a condition. */
+VECTORS static inline Bits lanes_below(int active) {
+    Bits found = ALL_BITS(0);
+    EACH(i) found[i] = i < active ? -1 : 0;
+    return found;
+}
+
+/* Advance the lanes of `wanted`, with inputs held; false where no step is short enough.
+
+   The arguments of the equations one after the other: states, inputs and parameters are so already. */
+VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted) {
     Lanes given[N_SET + 1], next[N_STATES + 1];
     double done[WIDTH] = {0}, h_now[WIDTH];
-    bool moving[WIDTH];
+    bool moving[WIDTH], any = false;
     double whole = duration / number_of_parts(duration * (1 - TIME_TOLERANCE), LONGEST_STEP);
     EACH(i) {
         h_now[i] = whole;
-        moving[i] = i < active;
+        moving[i] = (*wanted)[i] != 0;
+        any = any || moving[i];
     }
-    for (bool any = active > 0; any;) {
+    while (any) {
         any = false;
         Lanes h = ALL(whole);
         EACH(i) if (moving[i]) h[i] = h_now[i] = least(least(h_now[i], LONGEST_STEP), duration - done[i]);
@@ -45,15 +72,11 @@ VECTORS static bool advance_group(Group *m, double duration, int active) {
     return true;
 }
 
-VECTORS static void read_group(Group *m, const Rows *asked, size_t row, size_t sample, size_t n_found, int active) {
-    bool outputs = false, slopes = false;
-    for (size_t k = 0; k < asked->n_get; k++) {
-        unsigned from = index_of(asked->get[k]);
-        outputs = outputs || (from >= N_SET && from < FIRST_LOCAL);
-        slopes = slopes || from >= FIRST_LOCAL;
-    }
-    if (outputs) lanes_h(m->values, m->outputs);
-    if (slopes) lanes_f(m->values, m->slopes);
+VECTORS static void read_group(
+    Group *m, const Rows *asked, const Needed *needed, size_t row, size_t sample, int active) {
+    size_t n_found = asked->n_samples - (asked->first ? 0 : 1);
+    if (needed->outputs) lanes_h(m->values, m->outputs);
+    if (needed->slopes) lanes_f(m->values, m->slopes);
     for (size_t k = 0; k < asked->n_get; k++) {
         unsigned from = index_of(asked->get[k]);
         const Lanes *value = from < N_SET         ? &m->values[from]
@@ -74,23 +97,31 @@ VECTORS static bool set_inputs(Group *m, const Rows *asked, const double *sample
     return true;
 }
 
-/* -1, or the first of the rows from this one on, if one of them cannot be advanced. */
-VECTORS static long long group_of_rows(const Rows *asked, size_t row) {
-    Group m;
+/* Set a group to its rows; the number of lanes that have one. */
+VECTORS static int begin_group(Group *m, const Rows *asked, size_t row) {
     int active = asked->n_rows - row < WIDTH ? (int)(asked->n_rows - row) : WIDTH;
-    size_t first = asked->first ? 1 : 0, n_found = asked->n_samples - 1 + first;
-    for (int k = 0; k < N_SET; k++) m.values[k] = ALL(asked->base[k]);
+    for (int k = 0; k < N_SET; k++) m->values[k] = ALL(asked->base[k]);
     for (size_t k = 0; k < asked->n_put; k++)
         EACH(i) {
             size_t from = row + (size_t)(i < active ? i : 0); /* lanes without a row do as the first one */
-            m.values[index_of(asked->put[k])][i] = asked->rows[from * asked->n_put + k];
+            m->values[index_of(asked->put[k])][i] = asked->rows[from * asked->n_put + k];
         }
-    if (first) read_group(&m, asked, row, 0, n_found, active);
+    return active;
+}
+
+/* -1, or the first of the rows from this one on, if one of them cannot be advanced. */
+VECTORS static long long group_of_rows(const Rows *asked, size_t row) {
+    Group m;
+    int active = begin_group(&m, asked, row);
+    Bits going = lanes_below(active);
+    size_t first = asked->first ? 1 : 0;
+    Needed needed = needed_for(asked);
+    if (first) read_group(&m, asked, &needed, row, 0, active);
     for (size_t k = 0; k + 1 < asked->n_samples; k++) {
         if (!set_inputs(&m, asked, asked->during, k)) return (long long)row;
-        if (!advance_group(&m, asked->t[k + 1] - asked->t[k], active)) return (long long)row;
+        if (!advance_group(&m, asked->t[k + 1] - asked->t[k], &going)) return (long long)row;
         if (asked->after && !set_inputs(&m, asked, asked->after, k)) return (long long)row;
-        read_group(&m, asked, row, k + first, n_found, active);
+        read_group(&m, asked, &needed, row, k + first, active);
     }
     return -1;
 }

@@ -53,6 +53,8 @@ static bool plausible(const Memory *memory) {
     if ((mode & modes) == 0 || (mode & (mode - 1)) != 0 || !isfinite(memory->time)) return false;
     for (int i = 0; i < N_SET; i++)
         if (!isfinite(memory->values[i])) return false;
+    for (int i = 0; i < N_INPUTS; i++)
+        if (!isfinite(memory->rates[i])) return false;
     return true;
 }
 

@@ -27,14 +27,30 @@ static bool all_finite(const double *x) {
     return true;
 }
 
-/* Advance the states; false, with the states as they were, where no step is short enough. */
+static bool moves(const Instance *m) {
+    for (int i = 0; i < N_INPUTS; i++)
+        if (m->now.rates[i] != 0) return true;
+    return false;
+}
+
+/* Set the inputs to what they are some time after the start of a communication step, where they were `first`. */
+static void move_inputs(Instance *m, const double *first, double after) {
+    for (int i = 0; i < N_INPUTS; i++) m->now.values[FIRST_INPUT + i] = first[i] + m->now.rates[i] * after;
+}
+
+/* Advance the states, and the inputs that have rates; false, with all as it was, where no step is short enough.
+
+   Within an internal step, inputs are held at what they are in its middle. */
 static bool advance(Instance *m, double duration) {
     double *x = m->now.values, done = 0.0, error = 0.0;
     double h_now = duration / number_of_parts(duration * (1 - TIME_TOLERANCE), LONGEST_STEP);
+    const bool moving = moves(m);
     memcpy(m->before, x, sizeof m->before);
+    memcpy(m->first, x + FIRST_INPUT, N_INPUTS * sizeof(double));
     forget_results(m);
     while (duration - done > TIME_TOLERANCE * duration) {
         h_now = least(least(h_now, LONGEST_STEP), duration - done);
+        if (moving) move_inputs(m, m->first, done + h_now / 2);
         bind(m, x);
         m->arg[3] = &h_now;
         m->res[0] = m->next;
@@ -50,9 +66,14 @@ static bool advance(Instance *m, double duration) {
             h_now *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;
             if (h_now < SHORTEST * duration) {
                 memcpy(x, m->before, sizeof m->before);
+                memcpy(x + FIRST_INPUT, m->first, N_INPUTS * sizeof(double));
                 return false;
             }
         }
+    }
+    if (moving) {
+        move_inputs(m, m->first, duration);
+        memset(m->now.rates, 0, sizeof m->now.rates);
     }
     return true;
 }
@@ -65,6 +86,10 @@ static Status do_step(Instance *m, const char *call, double time, double duratio
     double gap = fabs(time - m->now.time);
     if (!m->any_time && gap > LATE_TOLERANCE * duration + TIME_TOLERANCE * fabs(time))
         return refuse(m, ERROR, "%s: begins at %.9g s, but the instance is at %.9g s", call, time, m->now.time);
+    for (int i = 0; i < N_INPUTS; i++) {
+        double end = m->now.values[FIRST_INPUT + i] + m->now.rates[i] * duration;
+        if (m->now.rates[i] != 0 && acceptable(m, call, (unsigned)(FIRST_INPUT + i), end) != OK) return DISCARD;
+    }
     if (!advance(m, duration))
         return refuse(m, DISCARD, "%s: no step is short enough after t = %g s", call, time);
     m->now.time = time + duration;

@@ -90,6 +90,27 @@ static Status set_values(Instance *m, const char *call, const unsigned *referenc
     return OK;
 }
 
+#if FMI_VERSION == 2
+/* Rates of inputs over the next communication step, after which they are zero again. */
+static Status set_rates(Instance *m, const char *call, const unsigned *references, size_t n, const int *orders,
+                        const double *rates) {
+    if (!allowed(m, call, INSTANTIATED | INITIALIZATION | STEP)) return ERROR;
+    if (n && !(given(m, call, references) && given(m, call, orders) && given(m, call, rates))) return ERROR;
+    for (size_t k = 0; k < n; k++) {
+        unsigned i = index_of(references[k]);
+        if (i < FIRST_INPUT || i >= FIRST_PARAMETER)
+            return refuse(m, ERROR, "%s: reference %u is not that of an input", call, references[k]);
+        if (orders[k] != 1)
+            return refuse(m, ERROR, "%s: %s: order %d; inputs are linear within a step", call, VARIABLES[i].name,
+                          orders[k]);
+        if (!isfinite(rates[k]))
+            return refuse(m, ERROR, "%s: %s: a rate of %g is not a finite number", call, VARIABLES[i].name, rates[k]);
+    }
+    for (size_t k = 0; k < n; k++) m->now.rates[index_of(references[k]) - FIRST_INPUT] = rates[k];
+    return OK;
+}
+#endif
+
 /* ---- continuous states of model exchange ---- */
 
 static Status states_fit(const Instance *m, const char *call, const void *array, size_t n) {
