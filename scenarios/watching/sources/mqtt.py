@@ -56,6 +56,7 @@ class Broker(Source):
             client.tls_set(str(where.parent / d.certificates))
         client.max_inflight_messages_set(QUEUED)
         client.on_connect, client.on_message = self._on_connect, self._on_message
+        client.on_subscribe = self._on_subscribe
         at = f"{where}: [stream.mqtt] {d.host}:{d.port}"
         try:
             client.connect(d.host, d.port, KEEP_ALIVE)
@@ -76,6 +77,13 @@ class Broker(Source):
             self._refused = str(code)
             return
         client.subscribe(self._declared.topic, AT_LEAST_ONCE)
+
+    def _on_subscribe(self, _client: Any, _data: Any, _mid: int, codes: Any, _properties: Any) -> None:
+        """What is published before this is not sent to a new session."""
+        refused = [code for code in codes if code.is_failure]
+        if refused:
+            self._refused = str(refused[0])
+            return
         self._connected.set()
 
     def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
