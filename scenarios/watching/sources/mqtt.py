@@ -39,7 +39,7 @@ class Broker(Source):
         self._open: dict[str, Any] = {}  # messages by name, that are not confirmed
         self._settled: list[str] = []
         self._count = 0
-        self._connected = threading.Event()
+        self._subscribed = threading.Event()
         self._refused = ""
         self._client = self._connect(where)
         self._work = tempfile.TemporaryDirectory(prefix="railfmi_mqtt_")
@@ -65,10 +65,10 @@ class Broker(Source):
                 f"{at} cannot be reached ({error}); start the broker or correct the key"
             ) from error
         client.loop_start()
-        if not self._connected.wait(CONNECTING):
+        if not self._subscribed.wait(CONNECTING):
             client.loop_stop()
             said = self._refused or "it does not answer"
-            raise BadInput(f"{at} takes no connection ({said}); correct user, password_file or port")
+            raise BadInput(f"{at} takes no connection ({said}); correct user, password_file, port or topic")
         return client
 
     def _on_connect(self, client: Any, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
@@ -79,12 +79,12 @@ class Broker(Source):
         client.subscribe(self._declared.topic, AT_LEAST_ONCE)
 
     def _on_subscribe(self, _client: Any, _data: Any, _mid: int, codes: Any, _properties: Any) -> None:
-        """What is published before this is not sent to a new session."""
-        refused = [code for code in codes if code.is_failure]
-        if refused:
-            self._refused = str(refused[0])
+        """The broker has answered to the subscription: what is published from now on comes here."""
+        [code] = codes  # of the one topic
+        if code.is_failure:
+            self._refused = f"topic {self._declared.topic}: {code}"
             return
-        self._connected.set()
+        self._subscribed.set()
 
     def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
         self._messages.put(message)
