@@ -120,9 +120,9 @@ class RunningGear(Model):
         if options:
             track = Track.parse(**{**asdict(track), **options})
         self.track = track
-        self.worn = Track.parse(**{**asdict(track), "wheel": worn})
+        self.worn = Track.parse(**{**asdict(track), "wheel": worn, "wheel_right": ""})
         super().__init__(effects, probes, **asdict(track), worn=worn)
-        for name, start in (("r0", track.r0), ("s", track.half_distance)):
+        for name, start in (("r0", track.nominal_radius), ("s", track.half_distance)):
             self.variables[name] = replace(self.variables[name], start=start)
         search = self.variables["contact_search"]
         self.variables["contact_search"] = replace(search, doc=f"{search.doc}; {self._built_in}")
