@@ -523,7 +523,7 @@ class PriorPolicy:
         0.01,
         "share of an output's rms",
         "largest size that the form of a right model leaves on average, as far as its order is known",
-        "convention: half of `signal_share`, so that what matters is left by one right model in seven at most",
+        "convention: half of `signal_share`, so that one right model in seven at most leaves what matters",
     )
 
 

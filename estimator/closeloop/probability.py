@@ -117,7 +117,7 @@ def odds_of_effect(share: float, error: float, form: float) -> float:
 
 
 def _smallest(error: float, form: float) -> float:
-    """Smallest size, over the signal, that a record can show, at most a hundredth of what a right form leaves.
+    """Smallest size, over the signal, that a record can show, at most a hundredth of what a form leaves.
 
     error: standard error of the share of the mean square.
     """

@@ -50,7 +50,7 @@ def both_contacts(track: Track) -> cs.Function:
 
 
 def of_both(name: str, left: cs.Function, right: cs.Function) -> cs.Function:
-    """Function (contact_search, shifts of both wheels) -> rows of what functions of one wheel's shift give."""
+    """Function (contact_search, shifts of both wheels) -> rows of what a function of each shift gives."""
     search, shifts = cs.MX.sym("search"), cs.MX.sym("shifts", 2)
     each = [curves(search, shifts[i]).T for i, curves in enumerate((left, right))]
     return cs.Function(name, [search, shifts], [cs.vertcat(*each)])

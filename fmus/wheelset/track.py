@@ -62,7 +62,9 @@ class Track:
         """The same as arguments of contact_table."""
         both = {"wheel": self._wheels, "rail": self._rails, "r0": self._radii}
         where = {"cant": self.cant, "gauge": self.gauge, "back_to_back": self.back_to_back}
-        return {name: left if left == right else (left, right) for name, (left, right) in both.items()} | where
+        return {
+            name: left if left == right else (left, right) for name, (left, right) in both.items()
+        } | where
 
     @property
     def nominal_radius(self) -> float:

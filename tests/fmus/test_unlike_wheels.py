@@ -1,4 +1,4 @@
-"""Wheels and rails that differ from left to right: mirror images, the place where both roll alike, messages."""
+"""Wheels and rails that differ from left to right: mirror images, where both roll alike, messages."""
 
 from functools import cache
 
@@ -85,7 +85,11 @@ def test_what_is_built_in_names_both_sides():
 
 @pytest.mark.parametrize(
     ("options", "said"),
-    [({"wheel_right": "S1003"}, "S1003"), ({"r0_right": "4.6"}, "r0 = 4.6"), ({"rail_right": 3.0}, "rail_right")],
+    [
+        ({"wheel_right": "S1003"}, "S1003"),
+        ({"r0_right": "4.6"}, "r0 = 4.6"),
+        ({"rail_right": 3.0}, "rail_right"),
+    ],
 )
 def test_a_wrong_right_side_is_named(options, said):
     with pytest.raises(BadInput, match=said):
