@@ -106,15 +106,21 @@ class Near:
         What lies beyond the barrier belongs to the other part. The lower the barrier, the more of it belongs
         to this one: where there is none, there is one contact, in which both parts have the same mean.
         """
-        own = self.steep == (part == "flange")
-        depth = self.barrier - np.maximum(self.gaps["tread"], self.gaps["flange"])
         beyond = np.maximum(self.distance - self.gaps[part][:, None], 0.0)
-        weight = np.exp(-beyond / width) * np.where(own, 1.0, np.exp(-depth / width)[:, None])
+        weight = np.exp(-beyond / width) * self.belonging(part, width)
         weight[self.distance >= OPEN] = 0.0
         # a part that is nowhere near has the contact of the other one
         nowhere = weight.sum(axis=1) == 0.0
         weight[nowhere] = np.exp(-self.distance[nowhere] / width)
         return averaged(self.grid, weight, self.y, self.phi)
+
+    def belonging(self, part: str, width: float) -> Array:
+        """How far each place (n, m) belongs to a part: 1 its own, others the less, the higher the barrier.
+
+        width: m, by which the barrier rises for e times less.
+        """
+        depth = self.barrier - np.maximum(self.gaps["tread"], self.gaps["flange"])
+        return np.where(self.steep == (part == "flange"), 1.0, np.exp(-depth / width)[:, None])
 
 
 def flange_begins(grid: WheelGrid) -> float:
