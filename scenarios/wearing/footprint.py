@@ -53,7 +53,7 @@ def footprints(track: Track, reach: float) -> dict[str, Footprint]:
     """Footprints of the left and the right wheel at shifts up to `reach`, m, to either side."""
     sides = track.sides
     steps = int(np.ceil(reach / SPACING))
-    y = SPACING * np.arange(-steps, steps + 1)
+    y: Array = np.asarray(SPACING * np.arange(-steps, steps + 1), dtype=np.float64)
     standing = stand(sides, y)
     table = parts_table(sides, y, SEARCH, LOAD, E, NU)
     found = {}

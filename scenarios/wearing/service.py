@@ -43,7 +43,7 @@ class Ride:
 
 @dataclass(frozen=True)
 class Service:
-    """The scenario, the FMU in it whose wheels wear, its wheelsets by number, and its track with new wheels."""
+    """The scenario, the FMU in it whose wheels wear, its wheelsets, and its track with new wheels."""
 
     scenario: Scenario
     fmu: str
@@ -52,7 +52,7 @@ class Service:
 
     @staticmethod
     def read(file: Path) -> "Service":
-        """The service of a scenario file; BadInput where no FMU or more than one of it has wheels that wear."""
+        """The service of a scenario file; BadInput unless one of its FMUs has wheels that wear."""
         scenario = load_scenario(file)
         with of_file(scenario.file):
             declared = next(iter(scenario.variants.values()))
