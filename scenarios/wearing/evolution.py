@@ -20,6 +20,7 @@ from scenarios.wearing.sizes import Sizes, sizes
 from scenarios.wearing.wheel import WornWheel
 
 AMPLITUDE = 3e-3  # m, of the conicity that is told, as EN 14363 has it
+SHIFTS = np.linspace(-7e-3, 7e-3, 281)  # m, of the table for it
 PER_KM = 1e-3
 
 
@@ -60,7 +61,7 @@ class State:
 
 @dataclass(frozen=True)
 class Evolution:
-    """States over mileage, the first with new wheels; ended: why it ends before the way that was asked for."""
+    """States over mileage, the first with new wheels; ended: why it ends before the way asked for."""
 
     service: Service
     plan: Plan
@@ -194,6 +195,6 @@ def _state(
 
 def _conicity(track: Track) -> float:
     try:
-        return float(equivalent_conicity(contact_table(**track.stands), AMPLITUDE))
+        return float(equivalent_conicity(contact_table(**track.stands, shifts=SHIFTS), AMPLITUDE))
     except ValueError:
         return float("nan")

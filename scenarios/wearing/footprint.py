@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmus.contact.arguments import Array
-from fmus.contact.geometry.parts_table import PARTS, Near, parts_table
+from fmus.contact.geometry.parts_table import PARTS, Near
 from fmus.contact.geometry.search import QUASI_ELASTIC, stand
-from fmus.contact.normal import LINDER
+from fmus.contact.geometry.table import curvature_sums
+from fmus.contact.normal import LINDER, hertz
 from fmus.wheelset.curves import LOAD, NU, E
 from fmus.wheelset.track import Track
 
-SPACING = 2.5e-5  # m between the shifts for which footprints are made
-SEARCH = "quasi_elastic"
+SPACING = 5e-5  # m between the shifts for which footprints are made
 UPRIGHT = 0.05  # least cosine of a slope; walls that are steeper never touch
 
 
@@ -55,7 +55,6 @@ def footprints(track: Track, reach: float) -> dict[str, Footprint]:
     steps = int(np.ceil(reach / SPACING))
     y: Array = np.asarray(SPACING * np.arange(-steps, steps + 1), dtype=np.float64)
     standing = stand(sides, y)
-    table = parts_table(sides, y, SEARCH, LOAD, E, NU)
     found = {}
     for side, (pair, sign) in sides.named.items():
         near = Near.of(pair, sign, standing, side)
@@ -63,9 +62,9 @@ def footprints(track: Track, reach: float) -> dict[str, Footprint]:
         along = near.grid.width / across  # of the cells on the profile
         area, share = {}, {}
         for part in PARTS:
-            name = f"{side}_{part}"
-            angle = table[f"delta_{name}"].to_numpy() + sign * standing.phi
-            penetration = LINDER * table[f"approach_{name}"].to_numpy() / np.cos(angle)
+            _, delta, A, B = curvature_sums(pair, near.contact(part, QUASI_ELASTIC))
+            a, b, approach, _ = (np.asarray(x) for x in hertz(A, B, LOAD, E, NU))
+            penetration = LINDER * approach / np.cos(delta + sign * standing.phi)
             # where the bodies penetrate, the loss is as deep as they do, as pressure times length is
             deep = near.belonging(part, QUASI_ELASTIC) * np.maximum(
                 penetration[:, None] - np.maximum(near.distance - near.gaps[part][:, None], 0.0), 0.0
@@ -75,6 +74,6 @@ def footprints(track: Track, reach: float) -> dict[str, Footprint]:
             share[part] = np.divide(deep, total[:, None], out=np.zeros_like(deep), where=total[:, None] > 0)[
                 ::sign
             ]
-            area[part] = (np.pi * table[f"a_hertz_{name}"] * table[f"b_hertz_{name}"]).to_numpy()[::sign]
+            area[part] = (np.pi * a * b)[::sign]
         found[side] = Footprint(y, near.grid.eta, along, area, share)
     return found

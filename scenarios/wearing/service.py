@@ -59,9 +59,8 @@ class Service:
             wearing = [name for name, m in declared.fmus.items() if m.model and _wears(m.model)]
             if len(wearing) != 1:
                 known = " or ".join(f"'{n}'" for n in MODELS if _wears(n))
-                raise BadInput(
-                    f"wear needs one FMU with model = {known}; the scenario has {', '.join(wearing) or 'none'}"
-                )
+                names = ", ".join(wearing) or "none"
+                raise BadInput(f"wear needs one FMU with model = {known}; the scenario has {names}")
             [name] = wearing
             member = declared.fmus[name]
             options = {k: beside(v, scenario.file.parent) for k, v in member.options.items()}
