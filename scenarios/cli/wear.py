@@ -14,7 +14,7 @@ from scenarios.cli.voice import echo, found, progress
 @app.command()
 def wear(
     scenario: Annotated[
-        Path, typer.Argument(help="scenario file with one bogie or lateral vehicle; its variants count alike")
+        Path, typer.Argument(help="scenario file with one vehicle on rails; its variants are its service")
     ],
     km: Annotated[float, typer.Option(help="way that the vehicle runs, km")],
     step: Annotated[float, typer.Option(help="depth, m, after which the worn wheels are run again")] = 4e-5,
@@ -33,10 +33,10 @@ def wear(
     from scenarios.wearing.followed import followed
     from scenarios.wearing.page import write_page
     from scenarios.wearing.result import Wear
-    from scenarios.wearing.service import Service
+    from scenarios.wearing.service import EXAMPLE, Service
 
     plan = Plan(km, step, both_ways)
-    service = Service.read(declared(scenario, "a scenario, such as scenarios/shipped/bogie_in_service.toml"))
+    service = Service.read(declared(scenario, EXAMPLE))
     will_write(out)
     with progress("reading the scenario") as status:
         folder = writable(out)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -81,9 +82,7 @@ def evolved(service: Service, plan: Plan, folder: Path, tell: Tell = lambda _: N
     while True:
         at = f"{km:.0f} of {plan.km:g} km"
         try:
-            rides = list(
-                service.rides(_options(service.track, track), lambda what, at=at: tell(f"{at}: {what}"))
-            )
+            rides = list(service.rides(_options(service.track, track), partial(_told, tell, at)))
             tell(f"{at}: wearing the wheels")
             prints = footprints(track, _reach(track))
             _check_on_rails(rides, prints)
@@ -103,6 +102,10 @@ def evolved(service: Service, plan: Plan, folder: Path, tell: Tell = lambda _: N
             track = worn_track(service.track, wheels, folder, len(states), km)
         except BadInput as error:
             return Evolution(service, plan, tuple(states), f"at {km:.0f} km: {error}")
+
+
+def _told(tell: Tell, at: str, what: str) -> None:
+    tell(f"{at}: {what}")
 
 
 def new_wheels(track: Track) -> dict[str, WornWheel]:

@@ -21,6 +21,7 @@ from scenarios.simulating.case import prepared
 from scenarios.simulating.declaration import Declaration
 
 SIDES = {"left": 1, "right": -1}  # sign of the wheelset's shift, as each wheel sees it
+EXAMPLE = "a scenario, such as scenarios/shipped/bogie_in_service.toml"
 SPEED = "V"
 DISSIPATED, AT_FLANGE = "T_gamma", "T_gamma_flange"
 Tell = Callable[[str], None]
