@@ -519,6 +519,12 @@ class PriorPolicy:
         "share that a right answer leaves on average if the model form is open",
         "convention: five times `left`",
     )
+    material: float = limit(
+        0.01,
+        "share of an output's rms",
+        "largest size that the form of a right model leaves on average, as far as its order is known",
+        "convention: half of `signal_share`, so that one right model in seven at most leaves what matters",
+    )
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ Three questions are answered one after the other, each with the prior of the pol
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
    share. Where noise hides so small a share, the prior decides.
+
+A residual that is too small to matter is not searched. Whether an effect left it, which the calibration
+compensates or which is weak, or the form of a right model, is told by its size alone: see `odds_of_effect`.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from collections.abc import Sequence
 from math import comb
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import logsumexp
 
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.detection.importance import TINY, signal_size
@@ -34,6 +37,8 @@ from estimator.record import Array
 NO_DISCREPANCY = "no_discrepancy"
 WHOLE: tuple[Part, ...] = ("fit", "unseen")  # the whole record
 SHARES = 4001  # points of the grid of shares that an answer may leave
+SIZES = 2001  # points of the grid of sizes that a residual may have
+LEAST = 1e-6  # of a signal, the smallest size of that grid: no logger resolves less
 SHOWN = 1e-3  # answers that are less probable are not listed
 
 
@@ -72,23 +77,51 @@ def _is(h: Hypothesis, member: Hypothesis) -> bool:
 
 
 def _of_size(baseline: Baseline) -> float:
-    """Probability that the residual, of which noise is a part, is smaller than what matters.
+    """Probability that no effect left a residual that is too small to be searched.
 
-    The mean square of a residual has the scatter of noise; the worst output and part of the record count.
+    The mean square of a residual has the scatter of noise. The output and the part of the record that leave
+    the largest share of their signal count.
     """
-    b, limits, share = baseline, baseline.policy.detection, baseline.problem.form_error
-    noise, signal = b.noise.std**2, signal_size(b.problem) ** 2
-    least = np.minimum(limits.signal_share**2 * signal, limits.noise_share**2 * noise)
-    if share:
-        form = np.maximum(share**2 * signal, (limits.open_form_noises**2 - 1) * noise)
-        least = np.maximum(form, least)
-    sure = []
-    for part in WHOLE[1:] if share else WHOLE:
+    b, prior = baseline, baseline.policy.prior
+    noise, signal = b.noise.std**2, np.maximum(signal_size(b.problem) ** 2, TINY)
+    shares, errors = [], []
+    for part in WHOLE:
         residual = b.hypothesis.of(b.problem, part)
         error = noise * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
-        beyond = np.mean(residual**2, axis=0) - noise
-        sure.append(np.min((least - beyond) / np.maximum(error, TINY)))
-    return float(ndtr(min(sure)))
+        shares.append((np.mean(residual**2, axis=0) - noise) / signal)
+        errors.append(error / signal)
+    share, error = np.array(shares).ravel(), np.array(errors).ravel()
+    most = int(np.argmax(share))
+    form = max(prior.material, b.problem.form_error)
+    odds = odds_of_effect(float(share[most]), float(error[most]), form) * prior.effect / (1 - prior.effect)
+    return float(1 / (1 + odds))
+
+
+def odds_of_effect(share: float, error: float, form: float) -> float:
+    """How much more probable an effect makes what is left of a signal than the form of a right model does.
+
+    share: of the mean square of a signal that is left beyond noise; error: its standard error. What an effect
+    leaves may have any order of magnitude up to the signal itself. What the form of a right model leaves is
+    exponentially distributed; its mean may have any order of magnitude up to `form`, in root mean squares
+    over that of the signal. Orders of magnitude begin at the smallest size that the record can show.
+    """
+    least = _smallest(error, form)
+    size = np.geomspace(least, 1.0, SIZES)  # each order of magnitude weighs alike
+    share = min(share, 1.0)
+    step = 2 * np.log(1 / least) / SIZES  # of the square, relative; what lies between two sizes counts too
+    seen = np.exp(-0.5 * ((share - size**2) / max(error, step * share)) ** 2)
+    of_form = np.exp(-size / form) - np.exp(-size / least)
+    form_left = float(seen @ of_form / np.sum(of_form))
+    tiny = np.finfo(float).tiny
+    return max(float(np.mean(seen)), tiny) / max(form_left, tiny)
+
+
+def _smallest(error: float, form: float) -> float:
+    """Smallest size, over the signal, that a record can show, at most a hundredth of what a form leaves.
+
+    error: standard error of the share of the mean square.
+    """
+    return float(np.clip(np.sqrt(error), LEAST, form / 100))
 
 
 def _of_screening(baseline: Baseline, promises: Sequence[Promise]) -> float:

@@ -76,5 +76,13 @@ def wheelset_variables(number: str, what: str, behind: Sequence[str]) -> dict[st
             f"Q_{number}_{side}": Output("N", doc=f"wheel load of {wheel}", nominal=5e4),
             f"YQ_{number}_{side}": Output("1", doc=f"guiding force over wheel load of {wheel}", nominal=0.1),
             f"delta_{number}_{side}": Output("rad", doc=f"contact angle of {wheel}", nominal=0.1),
+            f"T_gamma_{number}_{side}": Output(
+                "N",
+                doc=f"energy that {wheel} dissipates by the way, creep forces times creepages",
+                nominal=10.0,
+            ),
+            f"T_gamma_flange_{number}_{side}": Output(
+                "N", doc=f"of it that in contacts at the flange of {wheel}", nominal=10.0
+            ),
         }
     return found

@@ -120,13 +120,15 @@ class Bogie:
         return found
 
     def outputs(self) -> dict[str, Expr]:
-        """Guiding forces, wheel loads, their ratio and contact angles of all wheels."""
+        """Guiding forces, wheel loads, their ratio, contact angles and dissipation of all wheels."""
         found: dict[str, Expr] = {}
         for i, contact_ in zip(self.wheelsets, self.contacts, strict=True):
             for side, name in enumerate(SIDES):
                 Y, Q = contact_.Y[side], contact_.Q[side]
                 found |= {f"Y_{i}_{name}": Y, f"Q_{i}_{name}": Q, f"YQ_{i}_{name}": Y / Q}
                 found[f"delta_{i}_{name}"] = contact_.delta[side]
+                found[f"T_gamma_{i}_{name}"] = contact_.T_gamma[side]
+                found[f"T_gamma_flange_{i}_{name}"] = contact_.T_gamma_flange[side]
         return found
 
     @property

@@ -48,7 +48,9 @@ class Bogie(RunningGear):
             for name, unit, what in PORT.values()
         }
     )
-    flange_contact = Output("1", doc="1 where a flange touches: beyond it the model is not valid")
+    flange_contact = Output(
+        "1", doc="1 where a flange touches; with one contact of a wheel, not valid beyond it"
+    )
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
@@ -59,7 +61,7 @@ class Bogie(RunningGear):
         from fmus.contact.geometry.search import FLANGE_ANGLE  # loads SciPy, which other models do without
 
         found = m._bogie.outputs() | {f"{PORT[q][0]}_c": force for q, force in m._bogie.on_body.items()}
-        steepest = cs.mmax(cs.vertcat(*(c.delta for c in m._bogie.contacts)))
+        steepest = cs.mmax(cs.vertcat(*(c.steepest for c in m._bogie.contacts)))
         return found | {"flange_contact": steepest > FLANGE_ANGLE}
 
     def ports(m) -> dict[str, Port]:

@@ -15,6 +15,7 @@ from fmus.contact.forces.friction import CRITICAL
 from fmus.contact.forces.laws import LAWS, law_codes
 from fmus.contact.forces.laws.polach import Polach
 from fmus.effects.effect import Effect
+from fmus.errors import BadInput
 from fmus.model import Model
 from fmus.option import BuildOption, Choice
 from fmus.variables import Expr, Parameter
@@ -32,6 +33,9 @@ HOLLOW = "S1002_Hollow"
 WORN = BuildOption(
     "worn", Path, "", "profile of the wheels where they are worn, by name or point file", HOLLOW
 )
+CONTACTS = BuildOption(
+    "contacts", int, "", "contacts of a wheel, 1, or 2 where its tread and its flange may both carry", 1
+)
 
 
 class RunningGear(Model):
@@ -46,7 +50,7 @@ class RunningGear(Model):
     form_choices = MappingProxyType({"patch": (0.0, 1.0)})
     form_alike = ("G", "nu")
     form_error = 0.02
-    build_options = (*OPTIONS, WORN)
+    build_options = (*OPTIONS, WORN, CONTACTS)
 
     m_w = Parameter("kg", 1813.0, min=1.0, doc="mass of a wheelset", source=BENCHMARK)
     I_wy = Parameter("kg.m2", 112.0, min=1.0, doc="rolling inertia of a wheelset", source=BENCHMARK)
@@ -115,14 +119,17 @@ class RunningGear(Model):
         track: Track = Track(),  # noqa: B008  frozen
         **options: Choice,
     ) -> None:
-        """effects, probes: see Model; track: the profiles and how they stand, or by options, as `worn` is."""
+        """effects, probes: see Model; track: the profiles and how they stand, or by options."""
         worn = WORN.read(options.pop(WORN.name, WORN.default))
+        self.contacts = int(CONTACTS.read(options.pop(CONTACTS.name, CONTACTS.default)))
+        if self.contacts not in (1, 2):
+            raise BadInput(f"contacts = {self.contacts}: a wheel has 1 contact, or 2, of tread and flange")
         if options:
             track = Track.parse(**{**asdict(track), **options})
         self.track = track
-        self.worn = Track.parse(**{**asdict(track), "wheel": worn})
-        super().__init__(effects, probes, **asdict(track), worn=worn)
-        for name, start in (("r0", track.r0), ("s", track.half_distance)):
+        self.worn = Track.parse(**{**asdict(track), "wheel": worn, "wheel_right": ""})
+        super().__init__(effects, probes, **asdict(track), worn=worn, contacts=self.contacts)
+        for name, start in (("r0", track.nominal_radius), ("s", track.half_distance)):
             self.variables[name] = replace(self.variables[name], start=start)
         search = self.variables["contact_search"]
         self.variables["contact_search"] = replace(search, doc=f"{search.doc}; {self._built_in}")
@@ -134,7 +141,8 @@ class RunningGear(Model):
 
     @property
     def _built_in(self) -> str:
-        return f"{self.track}; worn wheel {Path(self.worn.wheel).stem}"
+        apart = "" if self.contacts == 1 else "; two contacts of a wheel, of tread and flange"
+        return f"{self.track}; worn wheel {Path(self.worn.wheel).stem}{apart}"
 
     def notes(self) -> list[str]:
         """See Model.notes."""

@@ -64,7 +64,9 @@ class VehicleLateral(RunningGear):
             for end, (_, at) in BOGIES.items()
         }
     )
-    flange_contact = Output("1", doc="1 where a flange touches: beyond it the model is not valid")
+    flange_contact = Output(
+        "1", doc="1 where a flange touches; with one contact of a wheel, not valid beyond it"
+    )
 
     def derivatives(m) -> dict[str, Expr]:
         """See Model.derivatives."""
@@ -77,7 +79,7 @@ class VehicleLateral(RunningGear):
         from fmus.contact.geometry.search import FLANGE_ANGLE  # loads SciPy, which other models do without
 
         found = {k: v for bogie in m._bogies.values() for k, v in bogie.outputs().items()}
-        angles = [contact.delta for bogie in m._bogies.values() for contact in bogie.contacts]
+        angles = [contact.steepest for bogie in m._bogies.values() for contact in bogie.contacts]
         return found | {"flange_contact": cs.mmax(cs.vertcat(*angles)) > FLANGE_ANGLE}
 
     def ports(m) -> dict[str, Port]:

@@ -1,11 +1,12 @@
 """The contact of one wheel over its shift towards the flange, as one CasADi function.
 
-Both sides of a track with like rails use the same curves: the left wheel at the wheelset's shift, the
-right one at the shift with its sign turned.
+The left wheel is at the wheelset's shift, the right one at the shift with its sign turned. Sides that are
+alike share one function.
 """
 
-from dataclasses import asdict
+from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 import casadi as cs
 import numpy as np
@@ -24,7 +25,7 @@ FIELDS = ("growth", "delta", "lift", *PATCH, "lift_slope")
 
 
 @cache
-def contact_curves(track: Track) -> cs.Function:
+def contact_curves(track: Track, side: str = "left") -> cs.Function:
     """Function (contact_search, shift of a wheel towards its flange, m) -> column of FIELDS.
 
     growth: rolling radius less the nominal one, m; delta: contact angle, rad; lift: height, m, by which
@@ -34,40 +35,59 @@ def contact_curves(track: Track) -> cs.Function:
     """
     from fmus.contact.geometry.table import SEARCHES  # loads SciPy and pandas, which other models do without
 
-    curves = [_curves(track, search) for search in SEARCHES]
+    if side != "left" and track.alike:
+        return contact_curves(track)
+    curves = [
+        spline_over(search, *_tabulated(track, search, side), [FIELDS.index("lift")]) for search in SEARCHES
+    ]
     return cs.Function.conditional("contact", curves[:-1], curves[-1])
 
 
 @cache
 def both_contacts(track: Track) -> cs.Function:
     """Function (contact_search, shifts of both wheels towards their flanges, m) -> FIELDS of each, a row."""
+    return of_both("both_contacts", contact_curves(track), contact_curves(track, "right"))
+
+
+def of_both(name: str, left: cs.Function, right: cs.Function) -> cs.Function:
+    """Function (contact_search, shifts of both wheels) -> rows of what a function of each shift gives."""
     search, shifts = cs.MX.sym("search"), cs.MX.sym("shifts", 2)
-    curves = contact_curves(track)
-    each = [curves(search, shifts[i]).T for i in (0, 1)]
-    return cs.Function("both_contacts", [search, shifts], [cs.vertcat(*each)])
+    each = [curves(search, shifts[i]).T for i, curves in enumerate((left, right))]
+    return cs.Function(name, [search, shifts], [cs.vertcat(*each)])
 
 
 @cache
 def usual_patch(track: Track) -> cs.Function:
-    """Function (contact_search) -> geometric means of PATCH over the USUAL shifts, and their reciprocals."""
+    """Function (contact_search) -> geometric means of PATCH over the USUAL shifts, and their reciprocals.
+
+    A column for each of PATCH, with one row for both sides where these are alike, else with one for each.
+    """
     from fmus.contact.geometry.table import SEARCHES  # as above
 
+    sides = ("left",) if track.alike else ("left", "right")
     means = []
-    for shifts, values in (_tabulated(track, search) for search in SEARCHES):
-        usual = values[np.abs(shifts) <= USUAL, FIELDS.index(PATCH[0]) :]
-        mean = np.exp(np.log(usual).mean(axis=0))
+    for search in SEARCHES:
+        mean = np.array([_usual(*_tabulated(track, search, side)) for side in sides])
         means.append(cs.Function("means", [], [cs.DM(mean), cs.DM(1 / mean)]))
     return cs.Function.conditional("usual_patch", means[:-1], means[-1])
 
 
-def _curves(track: Track, search: str) -> cs.Function:
-    shifts, values = _tabulated(track, search)
+def _usual(shifts: Array, values: Array) -> Array:
+    usual = values[np.abs(shifts) <= USUAL, FIELDS.index(PATCH[0]) :]
+    return np.asarray(np.exp(np.log(usual).mean(axis=0)))
+
+
+def spline_over(name: str, shifts: Array, values: Array, sloped: Sequence[int] = ()) -> cs.Function:
+    """Function of a shift, m -> a column of the values (n, k) tabulated over shifts (n,) SPACING apart.
+
+    Then follow the slopes of the columns `sloped`.
+    """
     # one row more at each end, so that the outermost shifts too have their full share of the basis
     rows = _spline_coefficients(np.vstack([values[0], values, values[-1]]))
     q = cs.MX.sym("q")
     number, t, rate = _place(shifts)(q)
-    found = _spline(rows.shape[1])(rows_from(rows, number, CUBIC + 1), t, rate)
-    return cs.Function(search, [q], [found], ["shift"], ["contact"])
+    found = _spline(rows.shape[1], tuple(sloped))(rows_from(rows, number, CUBIC + 1), t, rate)
+    return cs.Function(name, [q], [found], ["shift"], ["contact"])
 
 
 def _place(shifts: Array) -> cs.Function:
@@ -80,14 +100,13 @@ def _place(shifts: Array) -> cs.Function:
     return cs.Function("place", [q], [number, place - number, rate])
 
 
-def _spline(width: int) -> cs.Function:
-    """Function (four rows of coefficients, place t between 0 and 1, dt/dq) -> values, slope of the lift."""
+def _spline(width: int, sloped: tuple[int, ...]) -> cs.Function:
+    """Function (four rows of coefficients, place t between 0 and 1, dt/dq) -> values, slopes of some."""
     rows, t, rate = cs.SX.sym("rows", width, CUBIC + 1), cs.SX.sym("t"), cs.SX.sym("rate")
     s = 1 - t
     basis = cs.vertcat(s**3, 4 - 3 * t**2 * (1 + s), 4 - 3 * s**2 * (1 + t), t**3) * (1 / 6)
-    of_lift = rows[FIELDS.index("lift"), :]
-    slope = cs.mtimes(of_lift, cs.jacobian(basis, t)) * rate
-    found = cs.cse(cs.vertcat(cs.mtimes(rows, basis), slope))
+    slopes = [cs.mtimes(rows[i, :], cs.jacobian(basis, t)) * rate for i in sloped]
+    found = cs.cse(cs.vertcat(cs.mtimes(rows, basis), *slopes))
     return cs.Function("spline", [cs.vec(rows), t, rate], [found])
 
 
@@ -106,25 +125,34 @@ def _spline_coefficients(rows: Array) -> Array:
     return found
 
 
-def _tabulated(track: Track, search: str) -> tuple[Array, Array]:
-    """Shifts (n,), m, and FIELDS without the slope there (n, 7), of the left wheel."""
+def tabulated_shifts(track: Track, search: str) -> Array:
+    """Shifts (n,), m, SPACING apart, over which the contacts of a track are tabulated."""
+    from fmus.contact.geometry.table import contact_table
+
+    steps = int(contact_table(**loaded(track, search)).index[-1] / SPACING)
+    return np.asarray(SPACING * np.arange(-steps, steps + 1), dtype=float)
+
+
+def loaded(track: Track, search: str) -> dict[str, Any]:
+    """Arguments of contact_table for a track under LOAD."""
+    return {**track.stands, "N": LOAD, "search": search, "E": E, "nu": NU}
+
+
+def _tabulated(track: Track, search: str, side: str) -> tuple[Array, Array]:
+    """Shifts (n,) of a wheel towards its flange, m, and FIELDS without the slope there (n, 7)."""
     from fmus.contact.geometry.table import contact_table
     from fmus.contact.normal import hertz, virtual_penetration
 
-    where = {**asdict(track), "N": LOAD, "search": search, "E": E, "nu": NU}
-    reach = contact_table(**where).index[-1]
-    steps = int(reach / SPACING)
-    shifts = SPACING * np.arange(-steps, steps + 1)
-    table = contact_table(**where, shifts=shifts)
-    A, B = table["A_left"].to_numpy(), table["B_left"].to_numpy()
+    shifts, sign = tabulated_shifts(track, search), 1 if side == "left" else -1
+    table = contact_table(**loaded(track, search), shifts=shifts)[::sign]
+    A, B = table[f"A_{side}"].to_numpy(), table[f"B_{side}"].to_numpy()
     virtual = virtual_penetration(A, B, hertz(A, B, LOAD, E, NU)[2])
     columns = (
-        table["r_left"] - track.r0,
-        table["delta_left"],
-        table["z"] + track.half_distance * table["phi"],
-        table["a_left"],
-        table["b_left"],
+        table[f"r_{side}"] - track.nominal_radius,
+        table[f"delta_{side}"],
+        table["z"] + sign * track.half_distance * table["phi"],
+        table[f"a_{side}"],
+        table[f"b_{side}"],
         *virtual,
     )
-    values: Array = np.column_stack([np.asarray(c, dtype=float) for c in columns])
-    return np.asarray(shifts, dtype=float), values
+    return shifts, np.column_stack([np.asarray(c, dtype=float) for c in columns])

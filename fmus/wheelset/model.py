@@ -203,7 +203,7 @@ class Wheelset(Model):
             track = Track.parse(**{**asdict(track), **options})
         self.track = track
         super().__init__(effects, probes, **asdict(track))
-        for name, start in (("r0", track.r0), ("s", track.half_distance)):
+        for name, start in (("r0", track.nominal_radius), ("s", track.half_distance)):
             self.variables[name] = replace(self.variables[name], start=start)
         search = self.variables["contact_search"]
         self.variables["contact_search"] = replace(search, doc=f"{search.doc}; {track}")
@@ -289,8 +289,8 @@ class Wheelset(Model):
     def _usual(m) -> dict[str, list[Expr]]:
         """Semi-axes a and b, m, of the usual shifts at the tabulated load, each with its reciprocal."""
         found = [
-            dict(zip(PATCH, cs.vertsplit(column), strict=True))
-            for column in m.call(usual_patch(m.track), m.contact_search)
+            dict(zip(PATCH, cs.horzsplit(columns), strict=True))
+            for columns in m.call(usual_patch(m.track), m.contact_search)
         ]
         return {which: [m._by_patch(one, which) for one in found] for which in ("a", "b")}
 

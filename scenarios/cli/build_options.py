@@ -53,5 +53,7 @@ def _annotation(of: list[tuple[str, BuildOption]]) -> object:
 
 def _meaning(option: BuildOption) -> str:
     unit = f" in {option.unit}," if option.unit not in ("", "1") else ","
+    if option.default == "":
+        return option.meaning
     default = f"{option.default:g}" if option.is_number else option.default
     return f"{option.meaning}{unit} by default {default}"

@@ -23,6 +23,7 @@ PAGES = (
     "estimate.html",
     "conicity.html",
     "bifurcation.html",
+    "wear.html",
     "plan.html",
     "norm.html",
     "fleet.html",
@@ -171,6 +172,13 @@ def _bifurcation(t: Table) -> Said:
     return Said(name, ", ".join(said) or "rest stays as it is over the range", "good")
 
 
+def _wear(t: Table) -> Said:
+    deepest = max(max(s["worn_left"], s["worn_right"]) for s in t["states"])
+    said = f"{deepest * 1e3:.2f} mm worn off after {t['km']:.0f} km"
+    ended = f"; ended early, {t['ended']}" if t["ended"] else ""
+    return Said(t["scenario"], said + ended, "doubtful" if ended else "good")
+
+
 def _both(sides: Any) -> str:
     """A profile, or the two of unlike sides."""
     return " / ".join(dict.fromkeys(map(str, sides))) if isinstance(sides, list) else str(sides)
@@ -212,6 +220,7 @@ KINDS = (
     Kind("close-loop", frozenset({"results", "together"}), _several),
     Kind("estimate", frozenset({"estimated", "consistent"}), _estimate),
     Kind("run", frozenset({"scenario", "expectations"}), _run),
+    Kind("wear", frozenset({"states", "asked_km"}), _wear),
     Kind("compare", frozenset({"a_sha256", "outputs"}), _compare),
     Kind("row", frozenset({"row", "findings"}), _row),
     Kind("conicity", frozenset({"wheel_found", "conicity"}), _conicity),

@@ -18,6 +18,7 @@ OWN = (
     "scenarios/literature/",
     "scenarios/shipped/",
     "scenarios/conicity/",
+    "scenarios/wearing/",
 )
 GENERIC = {
     path: file
@@ -30,6 +31,8 @@ SYMBOL = re.compile(r"[A-Za-z]\d?|mu|nu|phi|psi|omega")  # letters of any formul
 VARIABLES = {v for model in MODELS.values() for v in declared(model) if not SYMBOL.fullmatch(v)}
 WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 ALLOWED = {
+    ("scenarios/cli/wear.py", "wear"): "the name of a command",
+    ("scenarios/reporting/entries.py", "wear"): "the name of a command and of its page",
     ("scenarios/simulating/declaration.py", "patch"): "an argument of fmus.contact.contact_table",
     ("scenarios/simulating/functions.py", "r_left"): "a column of contact_table, for equivalent_conicity",
     ("scenarios/simulating/functions.py", "r_right"): "a column of contact_table, for equivalent_conicity",

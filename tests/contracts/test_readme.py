@@ -15,7 +15,7 @@ COMMANDS = [shlex.split(line, comments=True)[1:] for line in BLOCK.splitlines()]
 # compiles, or takes minutes
 LONG = (
     "--platform", "--kind", "run", "bifurcation", "export-ssp", "compare", "plan", "close-loop", "fleet",
-    "campaign",
+    "campaign", "wear",
 )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
-from estimator.closeloop.probability import NO_DISCREPANCY, probabilities
+from estimator.closeloop.probability import NO_DISCREPANCY, odds_of_effect, probabilities
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Record, Run
 from tests.helpers.baselines import baseline, fit_with
@@ -149,12 +149,39 @@ def test_without_fits_the_screening_says_whether_there_is_an_effect():
         assert least <= found[NO_DISCREPANCY] <= most
 
 
-def test_a_detected_residual_that_is_small_is_as_sure_as_its_size():
+def test_a_small_residual_may_be_of_an_effect_and_a_large_one_is():
     rng = np.random.default_rng(8)
-    for size, least, most in ((0.2, 0.95, 1.0), (5.0, 0.0, 0.01)):
+    for size, least, most in ((0.0, 0.55, 0.8), (0.2, 0.5, 0.75), (15.0, 0.0, 0.01)):
         measured = rng.standard_normal(SAMPLES) + size * LAWS[0]
         found = probabilities(on(measured), SEEN, judged("no_discrepancy"), [], [])
-        assert least <= found[NO_DISCREPANCY] <= most
+        assert least <= found[NO_DISCREPANCY] <= most, size
+
+
+@pytest.mark.parametrize("samples", [10, 1000, 10**5, 10**7])
+@pytest.mark.parametrize("signal_over_noise", [1.0, 30.0, 1000.0])
+def test_the_larger_what_is_left_the_more_probable_is_an_effect(samples, signal_over_noise):
+    error = np.sqrt(2 / samples) / signal_over_noise**2
+    odds = [odds_of_effect(s, error, DEFAULT.prior.material) for s in np.geomspace(1e-9, 1.0, 60)]
+    assert np.diff(odds).min() > -1e-3 * max(odds)
+    assert 0.2 < odds[0] <= 1.0
+    assert odds[-1] > 1e3 or error > 0.1
+
+
+@pytest.mark.parametrize("spread", [0.5, 0.8])
+def test_the_probability_of_no_effect_is_true_on_sizes_of_another_form(spread):
+    """What a right model leaves is lognormal, not exponential; that of effects a Pareto tail."""
+    rng, form, n = np.random.default_rng(9), DEFAULT.prior.material, 4000
+    effect = rng.random(n) < 0.5
+    strong = np.minimum(1e-3 * (1 + rng.pareto(0.7, n)), 1.0)
+    mean = form * 10.0 ** rng.uniform(-2, 0, n)
+    weak = mean * np.exp(rng.normal(-(spread**2) / 2, spread, n))
+    error = 10.0 ** rng.uniform(-7, -4, n)
+    share = np.where(effect, strong, weak) ** 2 + error * rng.standard_normal(n)
+    said = np.array([1 / (1 + odds_of_effect(s, e, form)) for s, e in zip(share, error, strict=True)])
+    for low, high in ((0.0, 0.1), (0.1, 0.55), (0.55, 1.0)):
+        held = (said >= low) & (said < high)
+        assert held.sum() > 100
+        assert (~effect[held]).mean() == pytest.approx(said[held].mean(), abs=0.15), (low, high)
 
 
 def test_a_record_that_shows_nothing_leaves_the_prior():

@@ -64,12 +64,14 @@ class Refitter(Fitter):
         guess: Mapping[str, Array] | None = None, step: float = STEP,
     ) -> list[Hypothesis]:  # fmt: skip
         """See Fitter; as there, a fit goes on from where it ends until it has converged."""
-        return [self._finished(p, step) for p in promises]
+        return [self._finished(p, unknowns or (), step) for p in promises]
 
-    def _finished(self, promise: Promise, step: float) -> Hypothesis:
+    def _finished(self, promise: Promise, others: Sequence[Unknown], step: float) -> Hypothesis:
         start = promise.start
         for _ in range(ROUNDS):
-            h = at_rest(self.baseline.problem, promise.candidates[0], Weighting.white(SIZE), start, step)
+            h = at_rest(
+                self.baseline.problem, promise.candidates[0], Weighting.white(SIZE), start, step, others
+            )
             if h.fit.converged:
                 break
             start = h.fit.theta
@@ -81,10 +83,11 @@ def fitter(asked: Problem) -> Refitter:
 
 
 def at_rest(
-    problem: Problem, c: Candidate, weighting: Weighting, start: Mapping[str, float], step: float = STEP
-) -> Hypothesis:
+    problem: Problem, c: Candidate, weighting: Weighting, start: Mapping[str, float], step: float = STEP,
+    others: Sequence[Unknown] = (),
+) -> Hypothesis:  # fmt: skip
     """Where a fit from `start` ends."""
-    return Hypothesis((c,), fit(problem, c.unknowns, weighting, start, step=step), ())
+    return Hypothesis((c,), fit(problem, [*others, *c.unknowns], weighting, start, step=step), ())
 
 
 def swung(seed: int, off: float) -> tuple[Swinging, Hypothesis]:
@@ -113,6 +116,18 @@ def test_where_noise_alone_is_left_nothing_is_fitted_again():
     asked, h = swung(1, 0.0)
     assert cost(h) < refined.RUGGED * len(h.fit.residual)
     assert refined.refined(fitter(asked), h) is h
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_fit_in_a_false_minimum_is_begun_at_the_declared_values(seed):
+    """The stiffness is calibrated beside a law, and a calibration without the law had led it far away."""
+    asked, law = Swinging(10.0, seed), Candidate("constant_force", "spring", (AMPLITUDE,))
+    h = at_rest(asked, law, Weighting.white(SIZE), {"q": 1.0, "k": 11.5}, others=[STIFFNESS])
+    assert abs(h.fit.theta["k"] - 10.0) > 0.5
+    found = refined.from_declared(fitter(asked), h)
+    assert found.fit.theta["k"] == pytest.approx(10.0, abs=5 * found.fit.std["k"])
+    assert cost(found) < 1.1 * len(found.fit.residual)
+    assert refined.from_declared(fitter(asked), found) is found
 
 
 def test_what_fits_worse_is_not_taken_and_worth_is_kept():

@@ -313,6 +313,24 @@ def test_a_universal_binary_holds_its_parts(tmp_path):
         assert whole[offset : offset + size] == part.read_bytes()
 
 
+def least_macos(data: bytes) -> set[tuple[int, int]]:
+    """The oldest systems that the slices of a Mach-O library run on, by their LC_BUILD_VERSION."""
+    starts = [0]
+    if data[:4] == b"\xca\xfe\xba\xbe":
+        (slices,) = struct.unpack_from(">I", data, 4)
+        starts = [struct.unpack_from(">5I", data, 8 + 20 * i)[2] for i in range(slices)]
+    found = set()
+    for start in starts:
+        commands, at = struct.unpack_from("<I", data, start + 16)[0], start + 32
+        for _ in range(commands):
+            kind, size = struct.unpack_from("<2I", data, at)
+            if kind == 0x32:
+                minos = struct.unpack_from("<4I", data, at)[3]
+                found.add((minos >> 16, minos >> 8 & 0xFF))
+            at += size
+    return found
+
+
 @pytest.mark.slow
 @every_version
 def test_one_machine_builds_for_all_platforms(fmi, tmp_path):
@@ -340,3 +358,4 @@ def test_one_machine_builds_for_all_platforms(fmi, tmp_path):
             data = one.read_bytes()
             assert all(f"_{f}\0".encode() in data or f.encode() in data for f in functions(fmi))
             assert data[:4] == (b"\xca\xfe\xba\xbe" if fmi == 2 else b"\xcf\xfa\xed\xfe")
+            assert least_macos(data) == {(11, 0)}

@@ -19,6 +19,8 @@ INPUTS = {  # by the name of a parameter, or of a command and its parameter
     "experiment": "experiment.toml",
     "experiments": "experiment.toml",
     "scenario": "scenario.toml",
+    "wear.scenario": str(SHIPPED / "bogie_in_service.toml"),
+    "km": "1",
     "scenarios": "scenario.toml",
     "init.data": "data.csv",
     "inspect.file": "data.csv",

@@ -362,12 +362,13 @@ def test_each_command_has_a_folder_of_its_own():
         plan,
         row,
         run,
+        wear,
     )
 
     modules = [
         close_loop.close_loop, estimate.estimate, compare.compare, row.rebuild, run.run_scenarios,
         import_ssp.import_package, plan.plan, inspect.inspect, conicity.conicity, conicity_norm.conicity_norm,
-        bifurcation.bifurcation,
+        bifurcation.bifurcation, wear.wear,
     ]  # fmt: skip
     folders = [str(signature(command).parameters["out"].default) for command in modules]
     assert len(set(folders)) == len(folders)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import cos, exp, hypot, sin
+from math import cos, exp, hypot, sin, tan
 from pathlib import Path
 
 import numpy as np
@@ -65,8 +65,9 @@ def on_rails(truth: Truth, V: float, motion: Row, loads: tuple[float, float]) ->
     for side, Q in zip((1.0, -1.0), loads, strict=True):
         growth, delta, a, b, *c = looked_up(*table, side * shift)[:8].tolist()
         r, leans = p.r0 + growth, delta + side * phi
-        along, across = V - r * turning - side * p.s * psi_dot, y_dot + r * phi_dot - V * psi
-        spin = psi_dot - side * delta * turning
+        # the wheel slides in the contact plane: what it moves aside, it also climbs
+        along, across = V - r * turning - side * p.s * psi_dot, (y_dot + r * phi_dot - V * psi) / cos(leans)
+        spin = psi_dot * cos(leans) - side * sin(delta) * turning
         mu = mu0 * ((1 - A) * exp(-B * hypot(along, across)) + A)
         N = Q / cos(leans)
         size = (N / LOAD) ** (1 / 3)
@@ -77,11 +78,11 @@ def on_rails(truth: Truth, V: float, motion: Row, loads: tuple[float, float]) ->
         share = 1 / (1 + side * F_y * sin(leans) / Q)
         N, F_x, F_y, M_z = share * N, share * F_x, share * F_y, share * M_z
         lateral = F_x * psi + F_y * cos(leans) - side * N * sin(leans)
-        forward = F_x - F_y * cos(leans) * psi
-        arm = side * p.s + r * phi
+        forward = F_x - F_y * psi / cos(leans)
+        ahead = (side * r * tan(leans) - side * p.s - r * phi) * psi
         F += lateral
-        M += -arm * psi * lateral - arm * forward + M_z * cos(leans)
-        axle -= r * F_x
+        M += ahead * lateral - (side * p.s + r * phi) * forward + M_z * cos(leans)
+        axle -= r * F_x + side * M_z * sin(delta)
     return F, M, axle
 
 

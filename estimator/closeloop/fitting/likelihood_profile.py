@@ -14,7 +14,7 @@ from estimator.closeloop.fitting.fit import in_turn
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.profile_trace import WIDTH, ends
-from estimator.closeloop.fitting.refined import lower, refined
+from estimator.closeloop.fitting.refined import from_declared, lower, refined
 from estimator.closeloop.fitting.resolution import in_divided_steps
 from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
@@ -59,8 +59,8 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
 
 
 def carefully(fitter: Fitter, h: Hypothesis) -> Hypothesis:
-    """The hypothesis fitted as an answer is: in divided steps, with its durations, with finer differences."""
-    return refined(fitter, with_duration(fitter, in_divided_steps(fitter, h)))
+    """The hypothesis fitted as an answer is: in divided steps, with its durations, in the lowest minimum."""
+    return refined(fitter, from_declared(fitter, with_duration(fitter, in_divided_steps(fitter, h))))
 
 
 def reached(h: Hypothesis, b: Hypothesis) -> Array:

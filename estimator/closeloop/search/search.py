@@ -6,7 +6,7 @@ from functools import cached_property
 
 from estimator.closeloop.decision.model_form import ModelForm, form_of
 from estimator.closeloop.fitting.fitter import BRIEF, Fitter
-from estimator.closeloop.fitting.refined import evenly
+from estimator.closeloop.fitting.refined import evenly, from_declared
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.progress import Progress
@@ -121,7 +121,8 @@ class Search:
         s, fitter = self.screened, self.fitter
         self.tell("long fits", "fitting the leading effects until convergence")
         finals = s.stages.done("singles", lambda: fitter.to_the_end(brief))
-        alone = s.stages.done("dated", lambda: dated(fitter, finals))
+        dates = s.stages.done("dated", lambda: dated(fitter, finals))
+        alone = s.stages.done("declared", lambda: self._from_declared(dates))
         if s.baseline.noise.known and not s.explained(alone):
             self.tell("growing", "fitting the leading effects to a growing part of the record")
             found, hopes = alone, [*sudden, *self._promises]
@@ -131,6 +132,12 @@ class Search:
         self.tell("pairs", "trying pairs of effects")
         pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, alone, self._single))
         return best_by_label([*alone, *freed]), pairs
+
+    def _from_declared(self, found: list[Hypothesis]) -> list[Hypothesis]:
+        """The hypotheses, best first, the leading ones also begun at the declared values if none explains."""
+        if self.screened.explained(found):
+            return found
+        return best_by_label(evenly(self.fitter, found, from_declared))
 
     def _beside(self, one: Hypothesis) -> list[Hypothesis]:
         """Pairs of one effect that explains and a second effect."""

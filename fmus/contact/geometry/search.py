@@ -131,16 +131,20 @@ def quasi_elastic_contact(
     """
     grid = WheelGrid.of(pair)
     gap = grid.gaps(y, phi) - touch.gap[:, None]
-    row, column = np.nonzero(gap < WEIGHTLESS * eps)
-    weight = np.exp(-gap[row, column] / eps) * grid.width[column]
-    eta = grid.eta[column]
-    total = np.bincount(row, weight, len(y))
+    return averaged(grid, np.where(gap < WEIGHTLESS * eps, np.exp(-gap / eps), 0.0), y, phi)
+
+
+def averaged(grid: WheelGrid, weight: Array, y: Array, phi: Array) -> Contact:
+    """The mean contact of a wheel at shifts y, m, and rolls phi, rad, (n,) by weights (n, m) of places."""
+    row, column = np.nonzero(weight)
+    shares = weight[row, column] * grid.width[column]
+    total = np.bincount(row, shares, len(y))
 
     def mean(values: Array) -> Array:
-        return np.asarray(np.bincount(row, weight * values, len(y)) / total)
+        return np.asarray(np.bincount(row, shares * values, len(y)) / total)
 
     kappa_rail = grid.rail_curvature(column, y[row], phi[row])
-    return Contact(mean(eta), mean(grid.curvature[column]), mean(kappa_rail))
+    return Contact(mean(grid.eta[column]), mean(grid.curvature[column]), mean(kappa_rail))
 
 
 def check_touches(pair: Pair | Sides, roll: bool = True) -> None:

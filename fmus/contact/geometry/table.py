@@ -153,15 +153,21 @@ def _columns(sides: Sides, given: Array | None, roll: bool, search: str, patch: 
 
 def _wheel(pair: Pair, contact: Contact, patch: str, N: float, E: float, nu: float) -> dict[str, Array]:
     """What the table tells of one wheel."""
-    r = pair.r0 - pair.wheel.height(contact.eta)
-    delta = np.arctan(pair.wheel.slope(contact.eta))
-    A = np.cos(delta) / (2 * r)
-    B = np.maximum((contact.kappa_wheel - contact.kappa_rail) / 2, B_MIN)
+    r, delta, A, B = curvature_sums(pair, contact)
     a, b, approach, _ = hertz(A, B, N, E, nu)
     if patch == "virtual_penetration":
         a, b = virtual_penetration(A, B, approach)
     named = {"r": r, "delta": delta, "a": a, "b": b, "eta": contact.eta, "A": A, "B": B}
     return {name: np.asarray(values) for name, values in named.items()}
+
+
+def curvature_sums(pair: Pair, contact: Contact) -> tuple[Array, Array, Array, Array]:
+    """Rolling radius r, m, contact angle delta, rad, and curvature sums A and B, 1/m, of a contact (n,)."""
+    r = pair.r0 - pair.wheel.height(contact.eta)
+    delta = np.arctan(pair.wheel.slope(contact.eta))
+    A = np.cos(delta) / (2 * r)
+    B = np.maximum((contact.kappa_wheel - contact.kappa_rail) / 2, B_MIN)
+    return r, delta, A, B
 
 
 def _shifts(shifts: ArrayLike) -> Array:

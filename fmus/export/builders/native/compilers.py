@@ -41,8 +41,8 @@ PLATFORMS = {
         Platform("x86_64-linux", "x86_64-linux-gnu.2.17", "linux64", ".so", ELF),
         Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "aarch64-linux", ".so", ELF),
         Platform("x86_64-windows", "x86_64-windows-gnu", "win64", ".dll"),
-        Platform("x86_64-darwin", "x86_64-macos", "darwin64", ".dylib"),
-        Platform("aarch64-darwin", "aarch64-macos", "darwin64", ".dylib"),
+        Platform("x86_64-darwin", "x86_64-macos.11.0", "darwin64", ".dylib"),
+        Platform("aarch64-darwin", "aarch64-macos.11.0", "darwin64", ".dylib"),
     )
 }
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
