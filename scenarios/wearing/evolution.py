@@ -95,8 +95,9 @@ def evolved(service: Service, plan: Plan, folder: Path, tell: Tell = lambda _: N
         if km >= plan.km:
             return Evolution(service, plan, tuple(states))
         most = max(float(d.max()) for d in depth.values())
-        way = min(plan.step / most, (plan.km - km) / PER_KM) if most > 0 else (plan.km - km) / PER_KM
-        km += way * PER_KM
+        left = (plan.km - km) / PER_KM
+        way = min(plan.step / most, left) if most > 0 else left
+        km = km + way * PER_KM if way < left else plan.km
         wheels = {s: w.after(prints[s].eta, way * depth[s]) for s, w in wheels.items()}
         try:
             track = worn_track(service.track, wheels, folder, len(states), km)

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 from fmus.contact.geometry.exact import exact_profile
 from fmus.contact.geometry.measured import load_profile
 from fmus.errors import BadInput
 from fmus.wheelset.track import Track
-from scenarios.cli import app
+from scenarios.cli.app import run_safely
 from scenarios.simulating import load_scenario
 from scenarios.wearing.evolution import Plan, evolved, new_wheels, worn_track
 from scenarios.wearing.followed import followed
@@ -211,10 +210,8 @@ def test_a_service_is_read_with_its_wheelsets():
 @pytest.mark.slow
 def test_the_command_wears_wheels_and_estimates_follow(tmp_path):
     out = tmp_path / "wear"
-    ran = CliRunner().invoke(
-        app, ["wear", str(SERVICE), "--km", "60", "--follow", "--both-ways", "--out", str(out)]
-    )
-    assert ran.exit_code == 0, ran.output
+    words = ["wear", str(SERVICE), "--km", "60", "--follow", "--both-ways", "--out", str(out)]
+    assert run_safely(words) == 0
     said = json.loads((out / "result.json").read_text())
     assert said["km"] == pytest.approx(60.0)
     worn = said["states"][-1]
