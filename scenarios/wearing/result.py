@@ -88,7 +88,9 @@ class Wear:
         for f in self.followed:
             yield (
                 f"least squares at {f.km:.0f} km: conicity at 2 mm {_three(f.conicity)}, true "
-                f"{_three(f.true_conicity)}; error of the radii {100 * f.error:.2g} % of their range"
+                f"{_three(f.true_conicity)}; error of the radii {100 * f.error:.2g} % of their range, and "
+                f"{100 * f.looped[0]:.2g} % where the alignment is not known either, which is off by "
+                f"{100 * f.looped[1]:.2g} %"
             )
 
 
@@ -109,7 +111,9 @@ def _row(s: State) -> dict[str, Any]:
 def _found(f: Followed) -> dict[str, Any]:
     columns = {name: getattr(f, name).tolist() for name in ("shift", "found", "std", "true")}
     conicity = {name: _known(getattr(f, name)) for name in ("conicity", "true_conicity")}
-    return {"km": f.km, **conicity, "error": f.error, **columns}
+    radii, alignment = f.looped
+    looped = {"looped_error": radii, "alignment_error": alignment}
+    return {"km": f.km, **conicity, "error": f.error, **looped, **columns}
 
 
 def _known(value: Any) -> Any:
