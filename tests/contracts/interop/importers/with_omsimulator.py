@@ -2,23 +2,18 @@
 
 import subprocess
 from pathlib import Path
-from types import MappingProxyType
 
 from tests.contracts.interop.importer import SOLVED, Case, Importer, table, told
-
-ZERO = "took value reference 0 of builds until then for an error; not run as a whole since"
 
 
 class OMSimulator(Importer):
     name = "OMSimulator"
     about = "C++ around fmi4c; model exchange by CVode"
-    reads = frozenset({("CS", 2), ("CS", 3), ("ME", 2)})
+    reads = frozenset({("CS", 2), ("CS", 3), ("ME", 2), ("ME", 3)})
     program = "OMSimulator"
     solver = "cvode"
     sets_start = False
     tolerance = SOLVED
-    fails = MappingProxyType({("native", "CS", 3): ZERO})
-    remark = "reads FMI 3.0 for co-simulation only"
 
     @classmethod
     def version(cls) -> str:
