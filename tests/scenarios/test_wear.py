@@ -134,6 +134,7 @@ def test_a_smaller_step_leads_to_the_same_wheel(tmp_path):
     assert np.abs(ends[0] - ends[1]).max() < 0.1 * ends[1].max()
 
 
+@pytest.mark.slow
 def test_exchanged_sides_wear_as_the_mirror_image(tmp_path):
     rates = []
     for about in (2e-3, -2e-3):
