@@ -10,6 +10,7 @@ import numpy as np
 
 from estimator.record import Array
 from fmus.contact import contact_table, equivalent_conicity
+from fmus.contact.geometry.parts_table import PARTS
 from fmus.contact.geometry.table import default_shifts
 from fmus.errors import BadInput
 from fmus.host.fmu import FmuError
@@ -123,19 +124,18 @@ def worn_track(new: Track, wheels: Mapping[str, WornWheel], folder: Path, number
         name = f"wheel_{number:03d}_{km:07.0f}km" if alike else f"wheel_{side}_{number:03d}_{km:07.0f}km"
         about = f"wheel after {km:.0f} km" if alike else f"{side} wheel after {km:.0f} km"
         files[side] = str(wheels[side].write(folder / f"{name}.txt", about))
-    changed = {"wheel": files["left"], "r0": left.radius}
-    if not alike:
-        changed |= {"wheel_right": files["right"], "r0_right": right.radius}
-    return replace(new, **changed)  # type: ignore[arg-type]
+    if alike:
+        return replace(new, wheel=files["left"], r0=left.radius, wheel_right="", r0_right=0.0)
+    return replace(
+        new, wheel=files["left"], r0=left.radius, wheel_right=files["right"], r0_right=right.radius
+    )
 
 
 def _options(new: Track, track: Track) -> dict[str, Any]:
     """Build options of the wheels of a state; none for new wheels, which the scenario states."""
     if track == new:
         return {}
-    names = ("wheel", "wheel_right", "r0", "r0_right")
-    found = {name: getattr(track, name) for name in names}
-    return {name: value for name, value in found.items() if value}
+    return {name: getattr(track, name) for name in ("wheel", "wheel_right", "r0", "r0_right")}
 
 
 def _reach(track: Track) -> float:
@@ -145,11 +145,12 @@ def _reach(track: Track) -> float:
 def _check_on_rails(rides: Sequence[Ride], prints: Mapping[str, Footprint]) -> None:
     """BadInput where a wheel has gone further than where it touches."""
     for ride in rides:
-        far = float(np.nanmax(np.abs(ride.shift))) if np.isfinite(ride.shift).all() else float("inf")
-        if far > prints[ride.side].reach:
+        far = float(np.max(np.abs(ride.shift)))  # nan where the motion diverges
+        if not far <= prints[ride.side].reach:
+            how = f"is shifted by {1e3 * far:.0f} mm" if np.isfinite(far) else "has no place any more"
             raise BadInput(
-                f"the vehicle derails: a {ride.side} wheel is shifted by {1e3 * far:.0f} mm; run slower, in "
-                "wider curves, or with less friction"
+                f"the vehicle derails: a {ride.side} wheel {how}; run slower, in wider curves, or with less "
+                "friction"
             )
 
 
@@ -162,7 +163,7 @@ def _depths(
         own = [ride for ride in rides if ride.side == side]
         lost = np.zeros_like(prints[side].eta)
         for ride in own:
-            for part in ("tread", "flange"):
+            for part in PARTS:
                 lost += prints[side].depth(part, ride.shift, _losses(ride, part, prints[side], pair.r0))
         found[side] = lost / sum(float(ride.way.sum()) for ride in own)
     if plan.both_ways:

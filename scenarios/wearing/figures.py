@@ -9,7 +9,7 @@ from scenarios.wearing.service import SIDES
 WIDTH = 4.9  # in; read on a telephone, too
 SHADES = colormaps["viridis_r"]
 DRAWN = 8  # states in a figure of curves, at most about this many
-MEGA = 1e-3  # thousands of km
+THOUSANDS = 1e-3  # of km
 
 
 def all_plots(found: Wear) -> list[Plot]:
@@ -69,7 +69,7 @@ def mileage_plot(found: Wear) -> Plot:
     rows = (("conicity",), ("Sh",), ("Sd",), ("qR",), ("T_gamma",))
     figure, axes = sheet(6.6, rows, width=WIDTH, sharex=True)
     table = found.table()
-    km = MEGA * table["km"].to_numpy(dtype=float)
+    km = THOUSANDS * table["km"].to_numpy(dtype=float)
     axes["conicity"].plot(km, table["conicity"], "o-", color=INK, markersize=3, linewidth=1.2)
     for side, colour, style in (("left", AFTER, "o-"), ("right", BEFORE, "s--")):
         look = {"color": colour, "markersize": 3, "linewidth": 1.2, "label": f"{side} wheel"}

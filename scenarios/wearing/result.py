@@ -14,7 +14,7 @@ from scenarios.wearing.evolution import Evolution, State
 from scenarios.wearing.followed import Followed
 from scenarios.wearing.service import SIDES
 
-MILLI, SQUARE_MILLI = 1e3, 1e6
+MILLI = 1e3
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class WornWheel:
         slope = np.abs(profile.slope(grid))
         kept = grid[np.isfinite(slope) & (slope < UPRIGHT)]
         z = profile.height(kept)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(kept), np.diff(z)))])
+        along = _way(kept, z)
         y = np.interp(np.arange(0.0, along[-1], APART), along, kept)
         return WornWheel(y, profile.height(y), np.zeros_like(y), r0)
 
@@ -59,14 +59,15 @@ class WornWheel:
     @property
     def section(self) -> float:
         """Area of the cross-section that is lost, m2."""
-        return float(np.trapezoid(self.worn, self._along))
-
-    @property
-    def _along(self) -> Array:
-        return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(self.y), np.diff(self.z)))])
+        return float(np.trapezoid(self.worn, _way(self.y, self.z)))
 
     def write(self, file: Path, about: str) -> Path:
         """Write a point file in mm; about: a line that says what it is."""
         rows = [f"{y:.6f} {z:.6f}" for y, z in zip(MILLI * self.y, MILLI * self.z, strict=True)]
         write_at_once(file, "\n".join([f"# {about}", "# y z [mm]", *rows, ""]).encode())
         return file
+
+
+def _way(y: Array, z: Array) -> Array:
+    """Length of the profile from its first point to each (n,), m."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(y), np.diff(z)))])

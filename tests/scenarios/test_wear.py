@@ -188,6 +188,8 @@ def test_sides_that_wear_alike_share_a_file(tmp_path):
     alike = worn_track(Track(), wheels, tmp_path, 1, 10.0)
     assert alike.alike
     assert Path(alike.wheel).name == "wheel_001_0000010km.txt"
+    stated = worn_track(Track(wheel_right="S1002", r0_right=0.46), wheels, tmp_path, 1, 10.0)
+    assert stated == alike  # a right wheel that the scenario states wears, too
 
 
 @pytest.mark.parametrize(
