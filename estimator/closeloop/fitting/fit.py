@@ -74,8 +74,10 @@ def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -
 
 def _limited(problem: Problem, residual: Array, weighting: Weighting) -> Array:
     found = weighting.of(residual, problem.record.stretches("fit")).ravel()
-    np.clip(found, -REFUSED, REFUSED, out=found)
-    return set_aside(np.nan_to_num(found, copy=False, nan=REFUSED))
+    if not (found.max(initial=0.0) <= REFUSED and found.min(initial=0.0) >= -REFUSED):  # also where it is nan
+        np.clip(found, -REFUSED, REFUSED, out=found)
+        np.nan_to_num(found, copy=False, nan=REFUSED)
+    return set_aside(found)
 
 
 def fit(
