@@ -142,7 +142,7 @@ def mean_square(difference: Callable[[slice], Floats], rows: int, row_bytes: int
 
 
 def by_rows(shape: tuple[int, ...], part: Callable[[slice], Floats]) -> Floats:
-    """An array whose rows come from a function of a slice; computed in blocks, set aside if there are several.
+    """An array whose rows come from a function of a slice, computed in blocks; several are set aside.
 
     One block stays in memory, for such arrays are used for a moment and many times: a file takes ten times as
     long.

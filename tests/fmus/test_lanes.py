@@ -94,6 +94,17 @@ def test_rows_are_simulated_as_instances_are(name):
                 assert k == 1 or np.ptp(found[:, -1], axis=0).max() > 0
 
 
+@by_size
+def test_of_every_so_many_samples_one_is_read_with_the_same_bits(name):
+    model = MODELS[name]()
+    t, inputs, starts = record(model, 3, 5, n=61)
+    with Fmu(native(name)) as fmu:
+        asked = t, inputs, fmu.description.outputs, starts
+        whole = fmu.simulate_rows(*asked)
+        for every in (1, 2, 5, 60):
+            assert_array_equal(fmu.simulate_rows(*asked, every=every), whole[:, ::every])
+
+
 @pytest.mark.skipif(len(WIDTHS) == 1, reason="this processor has four lanes only")
 @by_size
 def test_a_row_is_the_same_however_many_are_advanced_at_once(name, tmp_path):

@@ -341,7 +341,9 @@ def test_omsimulator_runs_it(ride, tmp_path):
     """Its rows begin at time 0; its clock and ours differ in the last bits."""
     program = which("OMSimulator") or pytest.skip("OMSimulator is not on the path; its authors publish it")
     options = ["--stopTime=0.5", "--intervals=500", "--resultFile=found.csv", "--stripRoot=true"]
-    done = subprocess.run([program, *options, ride], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [program, *options, ride], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout[-2000:]
     found = pd.read_csv(tmp_path / "found.csv").drop_duplicates("time", keep="last")
     agree(found[MOTION].to_numpy(), ours(ride, tmp_path))

@@ -64,7 +64,13 @@ def sources(
     lanes = lanes_of((made.f, made.h, made.step, *([joined] if joined else ())))
     rows = {"lanes_equations.c": lanes.functions, "lanes_called.c": lanes.called} if lanes else {}
     header = _header(
-        table, work, fmi, token, lanes=bool(lanes), working=working, joins=bool(lanes and joined),
+        table,
+        work,
+        fmi,
+        token,
+        lanes=bool(lanes),
+        working=working,
+        joins=bool(lanes and joined),
         in_rows=bool(lanes) and in_rows and has_vectors(),
     )
     return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}

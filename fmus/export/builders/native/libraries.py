@@ -92,7 +92,7 @@ def _sealed(key: str, made: bytes) -> bytes:
 
 
 def _save(key: str, made: bytes) -> None:
-    """Keep a library with its checksum before it, and drop those not used for longest where there are too many."""
+    """Keep a library with its checksum before it; of too many, those not used for longest are dropped."""
     try:
         folder().mkdir(mode=0o700, parents=True, exist_ok=True)
         write_at_once(folder() / key, _sealed(key, made) + made)
