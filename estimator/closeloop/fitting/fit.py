@@ -185,10 +185,10 @@ def compressed(residual: Function, jacobian: Function, x: Array) -> tuple[Functi
 
 
 def triangle(r: Array, j: Array) -> Array:
-    """The triangular factor R (n + 1, n + 1) of a residual (m,) and its Jacobian (m, n), R[0, 0] not negative.
+    """The triangular factor R (n + 1, n + 1) of a residual (m,) and its Jacobian (m, n), R[0, 0] >= 0.
 
-    It comes from their products with each other, in a fifth of the time of a decomposition of all samples. The
-    products lose the digits of columns that nearly depend on each other; then the samples are decomposed.
+    It comes from their products with each other, in a fifth of the time of a decomposition of all samples.
+    The products lose the digits of columns that nearly depend on each other; then the samples are decomposed.
     """
     pieces = [slice(i, i + PIECE) for i in range(0, len(r), PIECE)]  # each fits into the processor's cache
     some = (np.column_stack([r[piece], j[piece]]) for piece in pieces)
