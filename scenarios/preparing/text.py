@@ -7,8 +7,9 @@ from math import sqrt
 from pathlib import Path
 
 from scenarios.preparing.draft import AROUND, IDENTIFY, Draft, Signal, bounds_of, is_factor, sure, uncertain
-from scenarios.preparing.survey import Raster
+from scenarios.preparing.survey import TIME_GUESSED, Raster
 
+BY_NAME = "a guess, by the name of the column"
 CALIBRATED = 6  # parameters; with more the user has to choose
 
 
@@ -27,8 +28,7 @@ def _head(made: Draft, folder: Path) -> Iterator[str]:
     yield f"fmu = {_text(_path(made.fmu, folder))}"
     if not r.options:
         yield f"data = {_text(_path(r.file, folder))}"
-    yield f"time = {_text(r.time)}"
-    yield from _time_unit(r)
+    yield from _time(r)
     yield ""
     if r.options:
         yield "[data]"
@@ -44,9 +44,10 @@ def _head(made: Draft, folder: Path) -> Iterator[str]:
     yield f"test = [{middle!r}, {end!r}]  # the rest: errors are reported on it"
 
 
-def _time_unit(r: Raster) -> Iterator[str]:
+def _time(r: Raster) -> Iterator[str]:
+    yield f"time = {_text(r.time)}" + f"  # {TIME_GUESSED}" * r.time_guessed
     if r.time_unit:
-        yield f"time_unit = {_text(r.time_unit)}  # a guess, by the name of the column"
+        yield f"time_unit = {_text(r.time_unit)}  # {BY_NAME}"
 
 
 def _options(r: Raster) -> Iterator[str]:
@@ -62,8 +63,7 @@ def _clocks(made: Draft, folder: Path) -> Iterator[str]:
         yield f"[files.{_key(made.name(raster))}]  # {rates}"
         if raster.file != made.raster.file:
             yield f"file = {_text(_path(raster.file, folder))}"
-        yield f"time = {_text(raster.time)}"
-        yield from _time_unit(raster)
+        yield from _time(raster)
         yield from _options(raster)
         clock = made.clock(raster)
         said = (

@@ -88,7 +88,7 @@ def test_without_a_time_a_survey_says_so(tmp_path):
     file.write_text("a,b\n1,2\n0,3\n2,1\n")
     with pytest.raises(BadInput, match=r"no column increases from row to row.*--time"):
         survey(file)
-    with pytest.raises(BadInput, match="column 'a' does not increase"):
+    with pytest.raises(BadInput, match="line 3: time column 'a' goes from 1 to 0 s"):
         survey(file, "a")
     with pytest.raises(BadInput, match="has no time column 'c'"):
         survey(file, "c")
