@@ -101,11 +101,12 @@ def _signals(made: Draft) -> Iterator[str]:
         yield ""
         yield "[inputs]"
     for s in made.inputs:
-        units = [f"unit = {_text(s.unit)}"] if s.unit else []
-        units += [f"model_unit = {_text(s.model_unit)}"] if s.model_unit and s.unit else []
+        unit, guess = _unit(s)
+        units = [f"unit = {_text(unit)}"] if unit else []
+        units += [f"model_unit = {_text(s.model_unit)}"] if s.model_unit else []
         units += [f"file = {_text(made.name(s.raster))}"] if s.raster is not made.raster else []
         table = ", ".join([f"column = {_text(s.channel.name)}", *units])
-        yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}"
+        yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}" + (f"; unit is {guess}" if guess else "")
     for v in made.free_inputs:
         yield f"{_key(v.name)} = {v.start or 0.0!r}  # no column looks like it: constant at its start value"
     for s in made.outputs:
@@ -114,8 +115,9 @@ def _signals(made: Draft) -> Iterator[str]:
         yield f"column = {_text(s.channel.name)}"
         if s.raster is not made.raster:
             yield f"file = {_text(made.name(s.raster))}"
-        unit = s.unit or s.variable.unit or s.model_unit or "1"
-        yield f"unit = {_text(unit)}" + ("" if s.unit else f"  # a guess: the record states {_other(s)}")
+        found, guess = _unit(s)
+        unit = found or "1"
+        yield f"unit = {_text(unit)}" + (f"  # {guess}" if guess else "")
         if not s.variable.unit:
             yield f"model_unit = {_text(s.model_unit or unit)}  # a guess: the FMU states no unit"
         thinned = sqrt(min(1.0, s.raster.step / made.raster.step))  # what a filter leaves of white noise
@@ -125,8 +127,12 @@ def _signals(made: Draft) -> Iterator[str]:
         yield f"# columns that are not used: {', '.join(made.unused)}"
 
 
-def _other(s: Signal) -> str:
-    return f"{_text(s.channel.unit)}, which is not known" if s.channel.unit else "none"
+def _unit(s: Signal) -> tuple[str | None, str]:
+    """The unit that the numbers of a column are taken in, and how it was guessed, empty if it is stated."""
+    if s.unit:
+        return s.unit, BY_NAME * s.by_name
+    other = f"{_text(s.channel.unit)}, which is not known" if s.channel.unit else "none"
+    return s.variable.unit or s.model_unit, f"a guess: the record states {other}"
 
 
 def _why(s: Signal) -> str:
