@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from fmus.host.description import FmuDescription, FmuVariable
-from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.units import dates_apart
 from scenarios.experiment.sampling import SAME
 from scenarios.preparing.matching import SURE, Match, matches
@@ -173,9 +172,9 @@ def _drafted(fmu: Path, description: FmuDescription, rasters: Sequence[Raster]) 
 
 
 def _signal(m: Match, raster: Raster) -> Signal:
-    v, stated = m.variable, spelled(m.channel.unit or "")
-    named = None if known(stated) else _unit_by_name(v, m.channel.name)
-    unit = stated if known(stated) else named
+    v, stated = m.variable, m.channel.unit if known(m.channel.unit) else None
+    named = None if stated else _unit_by_name(v, m.channel.name)
+    unit = stated or named
     guess = None if v.unit else likely_unit(v.name, v.description, unit)
     return Signal(v, raster, m.channel, unit, guess, m.likeness, named is not None)
 

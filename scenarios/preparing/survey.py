@@ -29,7 +29,7 @@ FEWEST = 4  # numbers that a channel needs to be one
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A channel of a record: samples x (N,), nan where there is none, and the unit that the file states."""
+    """A channel of a record: samples x (N,), nan where there is none; its unit as railfmi spells it."""
 
     name: str
     unit: str | None
@@ -216,7 +216,7 @@ def _channel(sheet: Sheet, name: str) -> Channel | str:
         return f"not used: {error}"
     many = int(np.isfinite(x).sum())
     if many >= FEWEST:
-        return Channel(name, sheet.units.get(name), x, tuple(_remarks(sheet, name, x)))
+        return Channel(name, spelled(sheet.units.get(name, "")) or None, x, tuple(_remarks(sheet, name, x)))
     return f"not used: column '{name}' holds fewer than {FEWEST} numbers" if many else ""
 
 

@@ -85,6 +85,15 @@ def test_a_survey_finds_time_rate_units_and_gaps(tmp_path):
     assert raster.longest() == pytest.approx((1234.5, 1239.47))
 
 
+def test_units_are_spelled_alike_whatever_the_format(tmp_path):
+    table = pd.DataFrame({"time": T, "n": np.sin(T), "phi": np.cos(T)})
+    file = tmp_path / "a.csv"
+    table.to_csv(file, index=False)
+    (tmp_path / "a.csv.units.json").write_text('{"n": "U/min", "phi": "[Grad]"}')
+    [raster] = survey(file)
+    assert [c.unit for c in raster.channels] == ["rpm", "deg"]
+
+
 def test_without_a_time_a_survey_says_so(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text("a,b\n1,2\n0,3\n2,1\n")
