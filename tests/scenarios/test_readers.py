@@ -282,7 +282,7 @@ def test_a_word_that_means_another_kind_of_quantity_is_noted(tmp_path, kind, col
 
 def test_the_time_may_be_declared_against_a_word_of_another_kind(tmp_path):
     file = experiment(tmp_path, "csv", units={"time": "S"})
-    with pytest.raises(BadInput, match="unit 'S' does not fit 's'"):
+    with pytest.raises(BadInput, match=r"unit 'S' does not fit 's'; .*declare it: .*time_unit"):
         load(file)
     file.write_text('time_unit = "s"\n' + file.read_text())
     assert any("'S', which is of another kind" in n.sentence for n in load(file).notes)

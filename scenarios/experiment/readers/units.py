@@ -58,7 +58,15 @@ class StatedUnits:
         if stated is None:
             return SAME
         place = f"{where}: column '{column}' of {self._file}"
-        found = column_conversion(stated, target, "the input", place)
+        try:
+            found = column_conversion(stated, target, "the input", place)
+        except BadInput as error:
+            if target and another_kind(stated, target):
+                way = (
+                    'if the file means another one, declare it: unit = "...", time_unit = "..." for the time'
+                )
+                raise BadInput(f"{error}; {way}") from error
+            raise
         if found != SAME:
             said = f"{self._file.name}: column '{column}' is converted from {stated}, as the file states"
             self.notes.append(Note("unit", column, f"{said}, to {target}"))
