@@ -17,7 +17,7 @@ from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.reader import NO_OPTIONS
 from scenarios.experiment.readers.sheet import Sheet
-from scenarios.experiment.readers.units import StatedUnits
+from scenarios.experiment.readers.units import StatedUnits, overruled
 from scenarios.experiment.record import LARGEST
 
 
@@ -123,9 +123,11 @@ class Reading:
 
     def _check_units(self, sheet: Sheet) -> None:
         """Raise BadInput if a window states another unit than the record that the filter was set up with."""
-        for c in self._conversions.values():
+        inputs = self._e.input_columns
+        for name, c in self._conversions.items():
             stated = spelled(sheet.units.get(c.column, ""))
-            if not stated or stated == c.unit:
+            declared = name not in inputs or inputs[name].unit is not None
+            if not stated or stated == c.unit or (declared and overruled(stated, str(c.unit))):
                 continue
             where = f"{sheet.file}: column '{c.column}'"
             if c.unit is None:

@@ -21,8 +21,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from estimator.record import Record
 from fmus.errors import BadInput
 from fmus.host.master.recording import Recording
+from fmus.units import base_exponents
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.readers import READERS, read_sheet
+from scenarios.experiment.readers.header import units_of
 from scenarios.experiment.readers.layout import layout_of
 from scenarios.experiment.readers.mat import Mat
 from scenarios.experiment.readers.sheet import Sheet
@@ -174,6 +176,10 @@ WRITERS = {
     "mdf 4": (write_mdf, "data.mf4"),
     "mdf 3": (write_mdf3, "data.mdf"),
 }
+BEHIND = (  # a name in brackets, as people write it
+    "Grad Gs Mm MA Ms Gm Max Min max min Soll Ist soll ist links rechts L R l r ges abs rel raw roh cal MW "
+    "mean Mittel std Std St kn KN Mg mg Masse Mol Gas Tag Tage Jahr day h t T in out ft Mess Dach Pass Mast"
+)
 BLANKS = "txt, mark"  # blanks between the columns, so that each needs a unit in the line of units
 WITH_UNITS = [kind for kind in WRITERS if not kind.startswith("mat") and kind != BLANKS]
 every_kind = pytest.mark.parametrize("kind", WRITERS)
@@ -249,7 +255,7 @@ def test_a_time_in_milliseconds_is_converted(tmp_path, kind):
     ("column", "unit", "words"),
     [
         ("n_wheel", "rad/s", '[outputs.omega_w] unit = "rpm", but'),
-        ("n_wheel", "m", "write unit = \"m\", or correct the file"),
+        ("n_wheel", "Hz", "write unit = \"Hz\", or correct the file"),
         ("omega", "deg/s", "states '(deg/s)/s' for it"),
         ("torque", "m", "unit 'm' does not fit 'N.m'"),
     ],
@@ -259,6 +265,44 @@ def test_units_that_contradict_are_refused(tmp_path, kind, column, unit, words):
     with pytest.raises(BadInput) as refused:
         load(file)
     assert_one_clear_line(refused, file, words)
+
+
+@pytest.mark.parametrize("kind", WITH_UNITS)
+@pytest.mark.parametrize(
+    ("column", "unit", "declared"), [("n_wheel", "min", "rpm"), ("omega", "g", "rad/s2")]
+)
+def test_a_word_that_means_another_kind_of_quantity_is_noted(tmp_path, kind, column, unit, declared):
+    """As n (min), a minimum, or an acceleration in g: who declares the unit knows what the word means."""
+    (tmp_path / "reference").mkdir()
+    record = load(experiment(tmp_path, kind, units={column: unit}))
+    assert_same(record, load(experiment(tmp_path / "reference", "csv")))
+    said = f"'{unit}', which is of another kind; it is taken as {declared}, as declared"
+    assert any(said in n.sentence for n in record.notes)
+
+
+def test_the_time_may_be_declared_against_a_word_of_another_kind(tmp_path):
+    file = experiment(tmp_path, "csv", units={"time": "S"})
+    with pytest.raises(BadInput, match=r"unit 'S' does not fit 's'; .*declare it: .*time_unit"):
+        load(file)
+    file.write_text('time_unit = "s"\n' + file.read_text())
+    assert any("'S', which is of another kind" in n.sentence for n in load(file).notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("q[1]", None), ("q(12)", None), ("q [1]", "1"), ("phi [Grad]", "deg"), ("w (Grad/s)", "deg/s"),
+        ("x [μm]", "μm"), ("Q [l/min]", "l/min"), ("n (mean)", None), ("v [Gs]", None), ("a[m/s2]", "m/s2"),
+    ],
+)  # fmt: skip
+def test_what_stands_in_brackets(name, unit):
+    assert units_of([name]) == ({name: unit} if unit else {})
+
+
+@given(st.sampled_from(BEHIND.split()), st.sampled_from(["x [{}]", "x ({})", "x({})"]))
+def test_no_word_in_brackets_is_a_huge_unit(word, name):
+    for unit in units_of([name.format(word)]).values():
+        assert base_exponents(unit).factor <= 1e6  # MW, which is a German mean, too
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet", "mdf 4"])

@@ -333,6 +333,15 @@ def test_a_window_in_another_unit_is_refused(rig, tmp_path):
         Reading(rig.e, rig.record.conversions, ()).read("w", file)
 
 
+def test_a_word_of_the_files_of_a_stream_does_not_outdo_the_declared_unit(rig, tmp_path):
+    file = tmp_path / "w.csv"
+    rig.data.iloc[:50].to_csv(file, index=False)
+    plain = Reading(rig.e, rig.record.conversions, ()).read("w", file)
+    for word in ("Kästchen", "min"):
+        (tmp_path / "w.csv.units.json").write_text(f'{{"omega_w": "{word}"}}')
+        assert_array_equal(Reading(rig.e, rig.record.conversions, ()).read("w", file).rows.y, plain.rows.y)
+
+
 def test_dates_count_from_1970_so_that_windows_follow_one_another(rig, tmp_path):
     dates = pd.to_datetime("2026-01-02T03:04:05") + pd.to_timedelta(rig.data["time"], unit="s")
     found = [

@@ -2,20 +2,12 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 
 from fmus.errors import BadInput
-from fmus.units import base_exponents
+from fmus.units import SPELLINGS, base_exponents, plain
 
-# usual in measured files, but not in the grammar of units
-SPELLINGS = MappingProxyType(
-    {
-        "-": "1", "Nm": "N.m", "kNm": "kN.m", "°C": "degC", "U/min": "rpm", "1/min": "rpm", "min-1": "rpm",
-        "RPM": "rpm", "r/min": "rpm", "rev/min": "rpm", "sec": "s", "msec": "ms", "Volt": "V", "Ampere": "A",
-        "Sekunden": "s", "seconds": "s",
-    }
-)  # fmt: skip
-BRACKETS = re.compile(r".*\S\s*(\[[^\]]+\]|\([^)]+\))")
+# a unit behind a name; digits alone in brackets directly at it are an index, as in q[1]
+BRACKETS = re.compile(r".*\S(?![\[(]\d+[\])])\s*(\[[^\]]+\]|\([^)]+\))")
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
 
 
@@ -24,7 +16,7 @@ def spelled(unit: str) -> str:
     bare = unit.strip()
     if _in_brackets(bare):
         bare = bare[1:-1].strip()
-    return SPELLINGS.get(bare, bare)
+    return SPELLINGS.get(plain(bare), bare)
 
 
 def is_unit(text: str) -> bool:

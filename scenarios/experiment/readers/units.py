@@ -8,8 +8,8 @@ import pandas as pd
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput
-from fmus.units import base_exponents, column_conversion, conversion
-from scenarios.experiment.readers.header import is_number, spelled
+from fmus.units import another_kind, base_exponents, column_conversion, conversion
+from scenarios.experiment.readers.header import is_number, is_unit, spelled
 from scenarios.experiment.readers.sheet import Sheet
 
 SAME = (1.0, 0.0)  # factor and offset
@@ -24,26 +24,20 @@ class StatedUnits:
         self.notes = [Note("file", "", remark) for remark in sheet.remarks]
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
-        """Raise BadInput if the file contradicts the unit declared at `where` for a measured output.
+        """Raise BadInput if the file states another unit than the one declared at `where`, of the same kind.
 
-        derived: how many times the column is differentiated to become the output.
+        derived: how many times the column is differentiated to become what has the declared unit. A word of
+        the file that cannot be its unit is noted only: who declares one knows better.
         """
-        if not derived and self._sheet.units.get(column) == declared:
+        said = self._sheet.units.get(column, "")
+        if not spelled(said) or (not derived and said == declared):
             return
-        try:
-            stated = self.stated(column, where)
-        except BadInput:  # who declares a unit knows better than a file that writes it in its own way
-            said = (
-                f"{self._file.name}: column '{column}' has the unit '{self._sheet.units[column]}', which is"
-            )
-            self.notes.append(
-                Note("unit", column, f"{said} not known; it is taken as {declared}, as declared")
-            )
+        stated = differentiated(spelled(said), derived)
+        why = overruled(stated, declared)
+        if why:
+            told = f"{self._file.name}: column '{column}' has the unit '{said}', which {why}"
+            self.notes.append(Note("unit", column, f"{told}; it is taken as {declared}, as declared"))
             return
-        if stated is None:
-            return
-        for _ in range(derived):
-            stated = f"({stated})/s"
         try:
             found = conversion(stated, declared, where)
         except BadInput:
@@ -64,7 +58,15 @@ class StatedUnits:
         if stated is None:
             return SAME
         place = f"{where}: column '{column}' of {self._file}"
-        found = column_conversion(stated, target, "the input", place)
+        try:
+            found = column_conversion(stated, target, "the input", place)
+        except BadInput as error:
+            if target and another_kind(stated, target):
+                way = (
+                    'if the file means another one, declare it: unit = "...", time_unit = "..." for the time'
+                )
+                raise BadInput(f"{error}; {way}") from error
+            raise
         if found != SAME:
             said = f"{self._file.name}: column '{column}' is converted from {stated}, as the file states"
             self.notes.append(Note("unit", column, f"{said}, to {target}"))
@@ -109,9 +111,19 @@ class StatedUnits:
                 f"{where}: column '{column}' of {self._file} has the unit '{unit}', which is not known; "
                 'declare one that is, unit = "..." for a channel, time_unit = "..." for the time'
             ) from error
-        for _ in range(derived):
-            unit = f"({unit})/s"
-        return unit
+        return differentiated(unit, derived)
+
+
+def differentiated(unit: str, times: int) -> str:
+    """The unit of the derivative with respect to time of a quantity in a unit, taken several times."""
+    return unit if times == 0 else f"({differentiated(unit, times - 1)})/s"
+
+
+def overruled(stated: str, declared: str) -> str:
+    """Why a declared unit holds whatever a file states; empty if the file could contradict it."""
+    if not is_unit(stated):
+        return "is not known"
+    return "is of another kind" if another_kind(stated, declared) else ""
 
 
 def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> float:
