@@ -127,7 +127,7 @@ class Reading:
         for name, c in self._conversions.items():
             stated = spelled(sheet.units.get(c.column, ""))
             declared = name not in inputs or inputs[name].unit is not None
-            if not stated or stated == c.unit or (declared and overruled(stated, str(c.unit))):
+            if not stated or stated == c.unit or (declared and overruled(c.column, stated, str(c.unit))):
                 continue
             where = f"{sheet.file}: column '{c.column}'"
             if c.unit is None:

@@ -337,9 +337,8 @@ def test_a_word_of_the_files_of_a_stream_does_not_outdo_the_declared_unit(rig, t
     file = tmp_path / "w.csv"
     rig.data.iloc[:50].to_csv(file, index=False)
     plain = Reading(rig.e, rig.record.conversions, ()).read("w", file)
-    for word in ("Kästchen", "min"):
-        (tmp_path / "w.csv.units.json").write_text(f'{{"omega_w": "{word}"}}')
-        assert_array_equal(Reading(rig.e, rig.record.conversions, ()).read("w", file).rows.y, plain.rows.y)
+    (tmp_path / "w.csv.units.json").write_text('{"omega_w": "Kästchen"}')
+    assert_array_equal(Reading(rig.e, rig.record.conversions, ()).read("w", file).rows.y, plain.rows.y)
 
 
 def test_dates_count_from_1970_so_that_windows_follow_one_another(rig, tmp_path):

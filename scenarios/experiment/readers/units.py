@@ -1,6 +1,7 @@
 """Compare the units that a file states for its columns with the units declared for them."""
 
 from math import isclose
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from scenarios.experiment.readers.header import is_number, is_unit, spelled
 from scenarios.experiment.readers.sheet import Sheet
 
 SAME = (1.0, 0.0)  # factor and offset
+ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
 
 
 class StatedUnits:
@@ -24,16 +26,16 @@ class StatedUnits:
         self.notes = [Note("file", "", remark) for remark in sheet.remarks]
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
-        """Raise BadInput if the file states another unit than the one declared at `where`, of the same kind.
+        """Raise BadInput if the file states another unit than the one declared at `where`.
 
         derived: how many times the column is differentiated to become what has the declared unit. A word of
-        the file that cannot be its unit is noted only: who declares one knows better.
+        the file that need not be its unit is noted only: who declares one knows better.
         """
         said = self._sheet.units.get(column, "")
         if not spelled(said) or (not derived and said == declared):
             return
-        stated = differentiated(spelled(said), derived)
-        why = overruled(stated, declared)
+        stated = meant(spelled(said), derived, declared)
+        why = overruled(column, stated, declared)
         if why:
             told = f"{self._file.name}: column '{column}' has the unit '{said}', which {why}"
             self.notes.append(Note("unit", column, f"{told}; it is taken as {declared}, as declared"))
@@ -43,10 +45,10 @@ class StatedUnits:
         except BadInput:
             found = None
         if found is None or not (isclose(found[0], 1.0, rel_tol=1e-9) and found[1] == 0):
-            raise BadInput(
-                f"{where} unit = \"{declared}\", but {self._file} states '{stated}' for it; "
-                f'write unit = "{stated}", or correct the file'
-            )
+            way = f'write unit = "{stated}", or correct the file'
+            if another_kind(stated, declared):
+                way = f"name another column than '{column}', or correct the word in the file"
+            raise BadInput(f"{where} unit = \"{declared}\", but {self._file} states '{stated}' for it; {way}")
 
     def to(self, column: str, target: str | None, where: str, derived: int = 0) -> tuple[float, float]:
         """Factor and offset from the file's unit to another; identity if the file states no unit.
@@ -119,11 +121,24 @@ def differentiated(unit: str, times: int) -> str:
     return unit if times == 0 else f"({differentiated(unit, times - 1)})/s"
 
 
-def overruled(stated: str, declared: str) -> str:
-    """Why a declared unit holds whatever a file states; empty if the file could contradict it."""
+def meant(word: str, derived: int, declared: str) -> str:
+    """The unit of a column's derivative by a word of the file, in the light of the unit declared for it."""
+    also = ALSO.get(word)
+    if also and not another_kind(differentiated(also, derived), declared):
+        word = also
+    return differentiated(word, derived)
+
+
+def overruled(column: str, stated: str, declared: str) -> str:
+    """Why a declared unit holds whatever a file states; empty if the file contradicts it.
+
+    A word in round brackets behind a name may be a remark, as in n (min), the least speed.
+    """
     if not is_unit(stated):
         return "is not known"
-    return "is of another kind" if another_kind(stated, declared) else ""
+    if column.rstrip().endswith(")") and another_kind(stated, declared):
+        return "is of another kind"
+    return ""
 
 
 def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> float:
