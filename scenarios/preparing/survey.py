@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -161,7 +161,7 @@ def _why_no_time(sheet: Sheet) -> str:
 
 def _plain(sheet: Sheet) -> StatedUnits:
     """The columns of a sheet without the units that it states."""
-    return StatedUnits(Sheet(sheet.file, sheet.cells, sheet.known, row=sheet.row, first=sheet.first))
+    return StatedUnits(replace(sheet, units={}, remarks=()))
 
 
 def _rises(sheet: Sheet, column: str) -> bool:

@@ -1,0 +1,138 @@
+"""Text files as loggers and spreadsheets write them: each comes back as it was written, or is refused."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from fmus.errors import BadInput
+from scenarios.experiment.readers import read_sheet
+from scenarios.experiment.readers.header import is_line_of_units, is_value
+
+FEW = 40  # rows
+MANY = 1400  # rows, more than are looked at for the layout
+
+
+def written(folder, head, row, rows=FEW, encoding="utf-8", name="log.csv"):
+    """A file of the lines of a head and of a row for each i."""
+    file = folder / name
+    file.write_bytes("\n".join([*head, *(row(i) for i in range(rows)), ""]).encode(encoding))
+    return file
+
+
+def refused(act, *words):
+    """The refusal, which is one line that holds these words."""
+    with pytest.raises(BadInput) as raised:
+        act()
+    said = str(raised.value)
+    assert "\n" not in said
+    assert all(word in said for word in words), said
+    return said
+
+
+def comma(x, places=2):
+    return f"{x:.{places}f}".replace(".", ",")
+
+
+# --- one decimal sign
+
+
+@pytest.mark.parametrize(
+    ("cell", "line"),
+    [
+        (lambda i: "OVL" if i == 30 else comma(1.5 * i), 32),
+        (lambda i: f"{1.5 * i:.2f}" if i >= 1350 else comma(1.5 * i), 1352),
+        (lambda i: f"{i - 300:,}".replace(",", ".") if i >= 300 else "0", 1302),
+    ],
+    ids=["a word", "points from there on", "thousands from there on"],
+)
+def test_the_cell_that_is_no_number_is_named(tmp_path, cell, line):
+    sheet = read_sheet(written(tmp_path, ["time;n"], lambda i: f"{comma(i / 100)};{cell(i)}", MANY))
+    words = f"line {line}: column 'n' holds '{cell(line - 2)}', not a number with the decimal sign ','"
+    refused(lambda: sheet.numbers("n"), words, "decimal, thousands", "na_values")
+
+
+def test_words_for_no_number_are_said_in_the_options(tmp_path):
+    row = lambda i: f"{comma(i / 100)};{'OVL' if i == 30 else comma(1.5 * i)}"  # noqa: E731
+    n = read_sheet(written(tmp_path, ["time;n"], row), options={"na_values": ["OVL"]}).numbers("n")
+    assert_array_equal(np.flatnonzero(np.isnan(n)), [30])
+    assert n[29] == 43.5
+
+
+def test_a_word_leaves_the_thousands_of_the_options(tmp_path):
+    row = lambda i: f"{i};{990 + i:,};{'x' if i == 30 else '1,000'}".replace(",", ".")  # noqa: E731
+    sheet = read_sheet(written(tmp_path, ["t;n;m"], row), options={"thousands": "."})
+    assert_array_equal(sheet.numbers("n"), 990 + np.arange(FEW))
+    refused(lambda: sheet.numbers("m"), "line 32: column 'm' holds 'x'")
+
+
+def test_the_decimal_sign_is_found_below_whole_numbers(tmp_path):
+    row = lambda i: f"{10 * i};{comma(1.5 * i) if i >= 1200 else 0}"  # noqa: E731
+    n = read_sheet(written(tmp_path, ["time;n"], row, MANY)).numbers("n")
+    assert_array_equal(n[1200:], 1.5 * np.arange(1200, MANY))
+
+
+def test_a_switch_is_0_or_1_with_empty_cells_and_without(tmp_path):
+    for empty in (False, True):
+        row = lambda i, e=empty: f"{i},{'' if e and i == 9 else i % 3 == 0}"  # noqa: E731
+        on = read_sheet(written(tmp_path, ["t,on"], row)).numbers("on")
+        assert_array_equal(np.isnan(on), (np.arange(FEW) == 9) & empty)
+        assert_array_equal(on[~np.isnan(on)], (np.arange(FEW) % 3 == 0)[~np.isnan(on)])
+
+
+# --- heads
+
+
+def test_lines_are_counted_as_an_editor_does(tmp_path):
+    """A quotation mark above the names opens nothing, and one in a name adds a line."""
+    head = ['Rig 5" wheel', '"open', '"t\n[s]",n']
+    row = lambda i: f"{i},{'off' if i == 9 else i}"  # noqa: E731
+    sheet = read_sheet(written(tmp_path, head, row), options={"skiprows": 2})
+    refused(lambda: sheet.numbers("n"), "line 14: column 'n' holds 'off'")
+    bad = written(tmp_path, head, lambda i: "1,2,3" if i == 9 else f"{i},{i}")
+    refused(lambda: read_sheet(bad, options={"skiprows": 2}), "line 14: has 3 cells")
+
+
+@pytest.mark.parametrize("line", [["-", "-"], ["2026-01-01", "V"], ["12:00:00", "V"], ["1.000,5", "V"], []])
+def test_no_line_of_units(line):
+    assert not is_line_of_units(line)
+    assert is_line_of_units(["s", "-", "V"])
+
+
+@pytest.mark.parametrize("cell", ["1,5", "-1e-3", "1.000,5", "1'000", "01.02.2026 12:00", "12:00:01,5"])
+def test_what_is_measured_is_no_name(cell):
+    assert is_value(cell)
+    assert not any(map(is_value, ["n", "1/min", "q[1]", "2.1 Speed", "1st", "", "-"]))
+
+
+def test_the_head_of_numpy_is_names(tmp_path):
+    file = tmp_path / "log.txt"
+    np.savetxt(file, np.column_stack([np.arange(9) / 10, np.arange(9)]), header="time speed")
+    assert read_sheet(file).known == ("time", "speed")
+    np.savetxt(file, np.arange(27).reshape(9, 3), header="time speed")
+    assert read_sheet(file).known == ("#", "time", "speed")  # as many as there are columns
+
+
+def test_names_that_no_separator_divides_are_refused(tmp_path):
+    file = written(tmp_path, ["time [s] speed [rpm]"], lambda i: f"{i} {i}", name="log.txt")
+    refused(lambda: read_sheet(file), "4 and 2 by blanks", "1 and 1 by commas", "in [data] sep", "skiprows")
+
+
+# --- options of pandas
+
+
+@pytest.mark.parametrize("engine", [{}, {"engine": "python"}, {"engine": "c"}])
+def test_lines_below_the_data_may_be_skipped(tmp_path, engine):
+    file = written(tmp_path, ["time,n"], lambda i: "end of record" if i == FEW - 1 else f"{i},{i}")
+    if engine.get("engine") == "c":
+        refused(lambda: read_sheet(file, options={"skipfooter": 1, **engine}), "skipfooter", "of [data]")
+    else:
+        sheet = read_sheet(file, options={"skipfooter": 1, **engine})
+        assert_array_equal(sheet.numbers("n"), np.arange(FEW - 1))
+
+
+def test_comments_are_no_names(tmp_path):
+    row = lambda i: f"{i},{'off' if i == 9 else i}"  # noqa: E731
+    sheet = read_sheet(written(tmp_path, ["# Logger 5", "# x", "time,n"], row), options={"comment": "#"})
+    assert sheet.known == ("time", "n")
+    refused(lambda: sheet.numbers("n"), "line 13: column 'n' holds 'off'")
+    refused(lambda: read_sheet(sheet.file, options={"header": 2}), "say skiprows")
