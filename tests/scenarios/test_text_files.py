@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from fmus.errors import BadInput
@@ -77,6 +79,57 @@ def test_a_switch_is_0_or_1_with_empty_cells_and_without(tmp_path):
         on = read_sheet(written(tmp_path, ["t,on"], row)).numbers("on")
         assert_array_equal(np.isnan(on), (np.arange(FEW) == 9) & empty)
         assert_array_equal(on[~np.isnan(on)], (np.arange(FEW) % 3 == 0)[~np.isnan(on)])
+
+
+# --- thousands
+
+
+@pytest.mark.parametrize(("separator", "sign"), [("\t", ","), (";", "."), (";", ","), ("\t", ".")])
+def test_thousands_are_not_taken_for_decimals(tmp_path, separator, sign):
+    row = lambda i: f"{10 * i}{separator}{f'{990 + i:,}'.replace(',', sign)}"  # noqa: E731
+    file = written(tmp_path, [f"t{separator}n"], row)
+    refused(
+        lambda: read_sheet(file), f"line 12: column 'n' holds '1{sign}000'", f'thousands = "{sign}"',
+        f'decimal = "{sign}"',
+    )  # fmt: skip
+    n = read_sheet(file, options={"thousands": sign}).numbers("n")
+    assert_array_equal(n, 990 + np.arange(FEW))
+    assert read_sheet(file, options={"decimal": sign}).numbers("n")[10:12].tolist() == [1.0, 1.001]
+
+
+@pytest.mark.parametrize(
+    ("first", "other", "right"),
+    [
+        ("999 999 1.003 1.004", "0 10 20 30", False),  # thousands, by their neighbours
+        ("0 0 1.500 1.500", "0 10 20 30", False),  # no writer of decimals leaves out those of 0 alone
+        ("0 0 1.500 1.500", "0.00 0.01 0.02 0.03", True),  # another column has decimals
+        ("0 5 1.500 0.500", "0 10 20 30", True),
+        ("1 1.125 1.375 2", "0 10 20 30", True),  # as %g writes them
+        ("1.000 1.125 1.500 2.250", "0 10 20 30", True),  # as %.3f writes them
+        ("12.125 12 11.875 12.375", "0 10 20 30", True),
+        ("1200 1300 1.500 1.600", "0 10 20 30", True),  # a thousand stands there without a sign
+    ],
+)
+@pytest.mark.parametrize("sign", [".", ","])
+def test_a_sign_that_some_numbers_have_is_judged_by_how_numbers_are_written(
+    tmp_path, first, other, right, sign
+):
+    rows = [";".join(cells).replace(".", sign) for cells in zip(other.split(), first.split(), strict=True)]
+    file = written(tmp_path, ["t;n"], rows.__getitem__, len(rows))
+    if right:
+        assert_array_equal(read_sheet(file).numbers("n"), [float(x) for x in first.split()])
+    else:
+        refused(lambda: read_sheet(file), "may group thousands or begin decimals")
+
+
+@given(st.lists(st.integers(1000, 31_000), min_size=2, max_size=30), st.sampled_from([".", ","]))
+def test_decimals_as_a_printf_writes_them_are_read(tmp_path_factory, thousandths, sign):
+    """With %g some have no sign and none ends with a zero; with %.3f all have one."""
+    for form in ("{:g}", "{:.3f}"):
+        x = [n / 1000 for n in thousandths]
+        rows = [f"{10 * i};{form.format(value).replace('.', sign)}" for i, value in enumerate(x)]
+        file = written(tmp_path_factory.mktemp("printf"), ["t;n"], rows.__getitem__, len(rows))
+        assert_array_equal(read_sheet(file).numbers("n"), x)
 
 
 # --- heads

@@ -18,6 +18,7 @@ from scenarios.experiment.readers.layout import Layout, layout_of, no_text
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.records import BLANKS, WINDOWS, opened
 from scenarios.experiment.readers.sheet import Sheet
+from scenarios.experiment.readers.thousands import check_decimal
 
 WIDER = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # as pandas says it, lines from 1
 UNCLOSED = re.compile(r"EOF inside string starting at row (\d+)")  # likewise, rows from 0
@@ -64,6 +65,10 @@ def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
         ) from error
     except UnicodeDecodeError as error:
         raise no_text(file, layout.encoding) from error
+    floats = [str(name) for name in table if table[name].dtype.kind == "f"]
+    if layout.doubtful and floats:
+        as_text = {**options, "dtype": str, "usecols": floats, "parse_dates": False}
+        check_decimal(file, layout, _table(file, layout, as_text))
     filled = np.flatnonzero(table.notna().any(axis=1))
     if not filled.size:
         raise BadInput(f"{file}: has no data below line {layout.first - 1}; record some")
