@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from fmus.errors import BadInput
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import is_line_of_units, is_value
+from scenarios.experiment.readers.units import StatedUnits
+from scenarios.preparing.survey import survey
 
 FEW = 40  # rows
 MANY = 1400  # rows, more than are looked at for the layout
@@ -168,6 +170,37 @@ def test_the_head_of_numpy_is_names(tmp_path):
 def test_names_that_no_separator_divides_are_refused(tmp_path):
     file = written(tmp_path, ["time [s] speed [rpm]"], lambda i: f"{i} {i}", name="log.txt")
     refused(lambda: read_sheet(file), "4 and 2 by blanks", "1 and 1 by commas", "in [data] sep", "skiprows")
+
+
+# --- times
+
+
+def seconds(file, **options):
+    return StatedUnits(read_sheet(file, options=options)).seconds("time", "time")
+
+
+def test_dates_of_other_forms_are_refused_with_the_options_that_read_them(tmp_path):
+    file = written(tmp_path, ["time;n"], lambda i: f"01.02.2026 12:00:{i:02d};{comma(i % 7)}")
+    words = ("line 2: time column 'time' holds '01.02.2026 12:00:00'", 'parse_dates = ["time"]', "dayfirst")
+    refused(lambda: seconds(file), *words)
+    refused(lambda: survey(file), *words)
+    assert_array_equal(seconds(file, parse_dates=["time"], dayfirst=True), np.arange(FEW))
+    file = written(tmp_path, ["time;n"], lambda i: f"{'?' if i == 5 else f'2026-01-01 00:00:{i:02d}'};1")
+    refused(lambda: seconds(file), "line 7: time column 'time' holds '?'")
+
+
+def test_a_comma_may_stand_before_fractions_of_a_second(tmp_path):
+    file = written(tmp_path, ["time;n"], lambda i: f"2026-02-01 12:00:{i:02d},{i:03d};{comma(i)}")
+    assert_allclose(seconds(file), 1.001 * np.arange(FEW), atol=1e-9)
+
+
+def test_offsets_of_summer_and_winter_are_one_time(tmp_path):
+    zones = lambda i: ("01", "+01:00") if i < 20 else ("03", "+02:00")  # noqa: E731
+    hour = lambda i: f"2026-03-29T{zones(i)[0]}:{(40 + i) % 60:02d}:00{zones(i)[1]}"  # noqa: E731
+    file = written(tmp_path, ["time,n"], lambda i: f"{hour(i)},{i}")
+    assert_array_equal(seconds(file), 60.0 * np.arange(FEW))
+    file = written(tmp_path, ["time,n"], lambda i: f"{hour(i) if i else '2026-03-29T01:40:00'},{i}")
+    refused(lambda: seconds(file), "only some dates of column 'time' have a time zone")
 
 
 # --- options of pandas
