@@ -1,5 +1,7 @@
 """Text files as loggers and spreadsheets write them: each comes back as it was written, or is refused."""
 
+from math import isclose
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from fmus.errors import BadInput
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import is_line_of_units, is_value
 from scenarios.experiment.readers.units import StatedUnits
+from scenarios.preparing.lines_above import lines_above
 from scenarios.preparing.survey import survey
 
 FEW = 40  # rows
@@ -137,6 +140,22 @@ def test_decimals_as_a_printf_writes_them_are_read(tmp_path_factory, thousandths
 # --- heads
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("above", [[], ["Logger 5", ""]])
+def test_names_of_several_lines_are_names(tmp_path, end, separator, above):
+    head = [*above, f'"Time{end}[ms]"{separator}"n{end}[rpm]"']
+    file = written(tmp_path, head, lambda i: f"{10 * i}{separator}{i % 7}")
+    assert lines_above(file) == len(above)
+    sheet = read_sheet(file, options={"skiprows": len(above)})
+    assert sheet.known == ("Time [ms]", "n [rpm]")
+    assert dict(sheet.units) == {"Time [ms]": "ms", "n [rpm]": "rpm"}
+    assert_array_equal(sheet.numbers("n [rpm]"), np.arange(FEW) % 7)
+    assert sheet.first == 4 + len(above)
+    [raster] = survey(file)
+    assert raster.t[-1] == pytest.approx(0.01 * (FEW - 1))
+
+
 def test_lines_are_counted_as_an_editor_does(tmp_path):
     """A quotation mark above the names opens nothing, and one in a name adds a line."""
     head = ['Rig 5" wheel', '"open', '"t\n[s]",n']
@@ -145,6 +164,23 @@ def test_lines_are_counted_as_an_editor_does(tmp_path):
     refused(lambda: sheet.numbers("n"), "line 14: column 'n' holds 'off'")
     bad = written(tmp_path, head, lambda i: "1,2,3" if i == 9 else f"{i},{i}")
     refused(lambda: read_sheet(bad, options={"skiprows": 2}), "line 14: has 3 cells")
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        (["Zeit;U;I"], lambda i: f"2026-01-01T00:00:{i:02d};{comma(i)};0,70;"),
+        (["Zeit;U;I"], lambda i: f"2026-01-01T00:00:{i:02d},5;{comma(i)};1"),
+        (["time;v;w"], lambda i: f"2026-01-01T00:00:{i:02d};{'-;-' if i < 1 else '1,5;2,5'}"),
+    ],
+    ids=["a separator at the end", "a comma in a date", "dashes"],
+)
+def test_the_first_row_of_data_is_data(tmp_path, head, row):
+    file = written(tmp_path, head, row)
+    assert lines_above(file) == 0
+    [raster] = survey(file)
+    assert raster.time == head[0].split(";")[0]
+    assert raster.t.size == FEW
 
 
 @pytest.mark.parametrize("line", [["-", "-"], ["2026-01-01", "V"], ["12:00:00", "V"], ["1.000,5", "V"], []])
@@ -157,6 +193,48 @@ def test_no_line_of_units(line):
 def test_what_is_measured_is_no_name(cell):
     assert is_value(cell)
     assert not any(map(is_value, ["n", "1/min", "q[1]", "2.1 Speed", "1st", "", "-"]))
+
+
+TABLES = {
+    "padded": (["Messung;;", "Datum;01.02.2026;", "Zeit [s];n [rpm];I [A]"], ";", "utf-8", 2),
+    "sep=": (["sep=;", "Zeit [s];n [rpm]"], ";", "utf-8", 1),
+    "UTF-16": (["Logger XY\r", "Serial 1\r", "\r", "time;v\r"], ";", "utf-16", 3),
+    "blanks": (["Logger XY", "Serial 12", "", "time speed", "s rpm"], " ", "utf-8", 3),
+    "key and value": (["Operator;Smith", "Serial;1234", "time;speed"], ";", "cp1252", 2),
+    "another table": (["Kanal;Sensor;Art", "1;PT100;x", "2;PT100;x", "", "time;v;w"], ";", "utf-8", 4),
+    "unknown units": (["time;n;k", "s;Upm;Umdr"], ";", "utf-8", 0),
+    "an empty unit": (["Logger", "time;n;k", "s;;rpm", ""], ";", "utf-8", 1),
+    "numbers as names": (["time;1;2"], ";", "utf-8", 0),
+}
+
+
+@pytest.mark.parametrize("head", TABLES)
+def test_lines_above_are_found(tmp_path, head):
+    lines, separator, encoding, above = TABLES[head]
+    width = len([line for line in lines if line.strip()][-1].split(separator))
+    row = lambda i: separator.join([comma(0.01 * i), *[str(i % 7)] * (width - 1)])  # noqa: E731
+    assert lines_above(written(tmp_path, lines, row, encoding=encoding, name="log.txt")) == above
+
+
+def test_a_head_that_is_repeated_is_not_looked_for_below(tmp_path):
+    """As of a logger that was started anew: the rows before it belong to the record."""
+    row = lambda i: "time;n" if i == 10 else f"{i};{i}"  # noqa: E731
+    file = written(tmp_path, ["time;n"], row)
+    assert lines_above(file) == 0
+    refused(lambda: survey(file), "line 12: column 'time' holds 'time'")
+
+
+@pytest.mark.parametrize(
+    ("names", "bad", "words"),
+    [
+        ("Time,n,n", "0.2,1,2", "column 'n' occurs twice in line 3; rename one"),
+        ("Time,n,m", "1,2,3,4", "line 24: has 4 cells, and the lines above it have 3; mend it"),
+    ],
+)
+def test_below_other_lines_the_true_error_is_told(tmp_path, names, bad, words):
+    file = written(tmp_path, ["Logger", "Serial 12", names], lambda i: bad if i == 20 else f"{i / 100},0.5,3")
+    assert lines_above(file) == 2
+    refused(lambda: survey(file), words)
 
 
 def test_the_head_of_numpy_is_names(tmp_path):
@@ -222,3 +300,57 @@ def test_comments_are_no_names(tmp_path):
     assert sheet.known == ("time", "n")
     refused(lambda: sheet.numbers("n"), "line 13: column 'n' holds 'off'")
     refused(lambda: read_sheet(sheet.file, options={"header": 2}), "say skiprows")
+
+
+# --- all of it together
+
+SIGNS = [(",", "."), (";", "."), (";", ","), ("\t", ","), ("\t", "."), (" ", "."), (" ", ",")]
+ABOVE = st.lists(st.sampled_from(["Logger 7", "Serial;1234", "", "rate,100 Hz", '"a, b"']), max_size=4)
+FORMS = {
+    "shortest": lambda x: f"{x:g}",
+    "fixed": lambda x: f"{x:.3f}",
+    "grouped": lambda x: f"{round(x):,}",
+    "grouped, decimals": lambda x: f"{x:,.2f}",
+}
+
+
+@given(
+    st.sampled_from(SIGNS),
+    ABOVE,
+    st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252"]),
+    st.sampled_from([*FORMS]),
+    st.sampled_from(["time", "whole", "date"]),
+    st.booleans(),
+    st.booleans(),
+    st.lists(st.floats(-30, 30), min_size=12, max_size=30),
+    st.floats(950, 1050),
+)
+def test_a_table_comes_back_as_it_was_written_or_is_refused(
+    tmp_path_factory, how, above, encoding, form, times, stated, padded, steps, start
+):
+    """Numbers go up and down around a thousand, where each way to write them shows."""
+    separator, decimal = how
+    x = [float(f"{value:g}") for value in start + np.cumsum(steps)]
+    swap = str.maketrans({".": ",", ",": "."}) if decimal == "," else {}
+    time = {
+        "time": lambda i: f"{0.1 * i:.2f}".translate(swap),
+        "whole": lambda i: str(10 * i),
+        "date": lambda i: f"2026-01-01T00:00:{i:02d}",
+    }[times]
+    tail = separator if padded and separator != " " else ""
+    rows = [f"{time(i)}{separator}{FORMS[form](value).translate(swap)}{tail}" for i, value in enumerate(x)]
+    head = [*above, f"time{separator}Weg_ä{tail}", *([f"s{separator}rpm{tail}"] if stated else [])]
+    file = written(tmp_path_factory.mktemp("table"), head, rows.__getitem__, len(rows), encoding, "log.txt")
+    said, found = "", np.empty(0)
+    try:
+        sheet = read_sheet(file, options={"skiprows": lines_above(file)})
+        found = sheet.numbers("Weg_ä" if "Weg_ä" in sheet.known else sheet.known[1])
+    except BadInput as error:
+        said = str(error)
+    if said:
+        assert "\n" not in said
+        assert "grouped" in form or separator == " "
+        return
+    assert len(found) == len(x)
+    places = {"shortest": 1e-12, "fixed": 6e-4, "grouped": 0.5, "grouped, decimals": 6e-3}[form]
+    assert all(isclose(a, b, abs_tol=places) for a, b in zip(found, x, strict=True))
