@@ -20,8 +20,8 @@ def lines_above(file: Path) -> int:
     """How many lines stand above the names in a text file of columns; 0 where none are seen.
 
     The numbers begin with the first line that has as many cells as most lines, and values where these have
-    some. The names stand right above, perhaps with a line of units between: each cell is filled, and none is
-    a value. Files of other formats have none.
+    some. The names stand right above, perhaps with a line of units between: none of the cells is a value, and
+    each is filled, but perhaps the first, above an index. Files of other formats have none.
     """
     if not file.name.lower().endswith(Csv.suffixes) or not file.is_file():
         return 0
@@ -43,7 +43,8 @@ def _names(rows: Sequence[Row]) -> int | None:
     kinds = [_kind(row) for row in rows]
     found = Counter(kind for kind in kinds if kind)
     usual = max(found, key=lambda kind: found[kind], default=())
-    if len(usual) < 2 or 2 * found[usual] <= found.total():
+    alike = sum(often for kind, often in found.items() if len(kind) == len(usual))
+    if len(usual) < 2 or 2 * alike <= found.total():
         return None
     end = kinds.index(usual)
     while end and any(map(is_value, rows[end - 1])):  # the first samples may hold words, too
@@ -52,7 +53,7 @@ def _names(rows: Sequence[Row]) -> int | None:
         end -= 1
     narrow = max(len(filled(row)) for row, kind in zip(rows, kinds, strict=True) if kind == usual)
     begin = end
-    while begin and narrow <= len(filled(rows[begin - 1])) <= len(usual) and _is_all_words(rows[begin - 1]):
+    while begin and narrow <= len(filled(rows[begin - 1])) <= len(usual) and _may_be_names(rows[begin - 1]):
         begin -= 1
     # a line with units that are not known states some all the same
     named = [i for i in range(begin, end) if not any(map(states_unit, rows[i]))]
@@ -64,5 +65,5 @@ def _kind(row: Row) -> tuple[bool, ...]:
     return tuple(is_value(cell) or not cell.strip() for cell in row) if filled(row) else ()
 
 
-def _is_all_words(row: Row) -> bool:
-    return not any(is_value(cell) or not cell.strip() for cell in filled(row))
+def _may_be_names(row: Row) -> bool:
+    return not any(map(is_value, row)) and all(cell.strip() for cell in filled(row)[1:])

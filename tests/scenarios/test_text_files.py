@@ -78,6 +78,18 @@ def test_the_decimal_sign_is_found_below_whole_numbers(tmp_path):
     assert_array_equal(n[1200:], 1.5 * np.arange(1200, MANY))
 
 
+@pytest.mark.parametrize(("cell", "right"), [("{},50", 0.5), ("{},500", None), ("1,00{}", None)])
+def test_commas_in_quotes_between_commas(tmp_path, cell, right):
+    """Decimals as in a German table with commas between its columns, thousands as in an English one."""
+    sheet = read_sheet(written(tmp_path, ["t,n"], lambda i: f'{i},"{cell.format(i % 7 + 1 if i else 1)}"'))
+    if right is None:
+        refused(lambda: sheet.numbers("n"), "line 2: column 'n' holds '1,")
+    else:
+        assert_array_equal(
+            sheet.numbers("n"), np.where(np.arange(FEW) > 0, np.arange(FEW) % 7 + 1, 1) + right
+        )
+
+
 def test_a_switch_is_0_or_1_with_empty_cells_and_without(tmp_path):
     for empty in (False, True):
         row = lambda i, e=empty: f"{i},{'' if e and i == 9 else i % 3 == 0}"  # noqa: E731
@@ -204,6 +216,7 @@ TABLES = {
     "another table": (["Kanal;Sensor;Art", "1;PT100;x", "2;PT100;x", "", "time;v;w"], ";", "utf-8", 4),
     "unknown units": (["time;n;k", "s;Upm;Umdr"], ";", "utf-8", 0),
     "an empty unit": (["Logger", "time;n;k", "s;;rpm", ""], ";", "utf-8", 1),
+    "an index without a name": (["Logger", ";time;v"], ";", "utf-8", 1),
     "numbers as names": (["time;1;2"], ";", "utf-8", 0),
 }
 

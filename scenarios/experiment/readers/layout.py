@@ -152,8 +152,9 @@ def _unmarked(names: list[str], separator: str, data: Sequence[str]) -> list[str
 def _decimal(separator: str, rows: Iterable[Sequence[str]]) -> tuple[str, bool]:
     """The decimal sign, and whether it may be that of thousands.
 
-    As many rows are looked at as it takes to see a number with a sign, LOOKED_AT of them at least. A comma is
-    the sign in a file whose columns it does not separate, if no number has a point that must be one.
+    As many rows are looked at as it takes to see a number with a sign, LOOKED_AT at least. A comma is
+    the sign if numbers have one and none has a point that must be one. Where commas separate the columns,
+    too, and those of numbers stand in quotes, they must be decimal ones: others group thousands there.
     """
     seen: set[str] = set()
     certain: set[str] = set()
@@ -165,7 +166,5 @@ def _decimal(separator: str, rows: Iterable[Sequence[str]]) -> tuple[str, bool]:
             if sign and is_number(cell):
                 seen.add(sign[0])
                 certain |= set() if THOUSANDS.fullmatch(cell.strip()) else {sign[0]}
-    if separator == ",":
-        return ".", "." not in certain
-    found = certain or seen
-    return "," if "," in found and "." not in found else ".", not certain
+    found = certain or seen - {separator}
+    return "," if found == {","} else ".", not certain

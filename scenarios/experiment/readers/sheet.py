@@ -37,7 +37,10 @@ class Sheet:
     signs: tuple[str, str] | None = None
 
     def numbers(self, column: str) -> Array:
-        """The numbers of a column (N,), nan for a blank cell; raises BadInput for any other content."""
+        """The numbers of a column (N,), nan for a blank cell; raises BadInput for any other content.
+
+        Logical values are 0 and 1.
+        """
         cells: pd.Series[Any] = self.cells[column]
         if cells.dtype == bool:
             return cells.to_numpy(dtype=np.float64)

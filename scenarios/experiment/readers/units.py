@@ -100,7 +100,7 @@ class StatedUnits:
 
     def _no_time(self, column: str, cells: "pd.Series[Any]") -> str:
         """Why text is no time: its first cell that is no date, or that some dates have a time zone."""
-        words = (_iso(cells, "coerce", utc=True).isna() & cells.notna()).to_numpy()
+        words = (iso_dates(cells, "coerce", utc=True).isna() & cells.notna()).to_numpy()
         if not words.any():
             return f"{self._file}: only some dates of column '{column}' have a time zone; write all alike"
         i = int(words.argmax())
@@ -149,19 +149,24 @@ def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
     if not pd.api.types.is_string_dtype(cells) or is_number(_first(cells)):
         return cells
     try:
-        return _iso(cells, "raise", utc=False)
+        return iso_dates(cells, "raise", utc=False)
     except (ValueError, TypeError):
         zoned = cells.dropna().str.contains(OFFSET).all()
     try:
-        return _iso(cells, "raise", utc=True) if zoned else cells
+        return iso_dates(cells, "raise", utc=True) if zoned else cells
     except (ValueError, TypeError):
         return cells
 
 
-def _iso(cells: "pd.Series[Any]", errors: Literal["raise", "coerce"], utc: bool) -> "pd.Series[Any]":
-    """Text as dates of ISO 8601, which allows a comma before the fractions of a second."""
-    text = cells.str.replace(FRACTION, r"\1.\2", regex=True)
-    return pd.to_datetime(text, errors=errors, format="ISO8601", utc=utc)
+def iso_dates(cells: "pd.Series[Any]", errors: Literal["raise", "coerce"], utc: bool) -> "pd.Series[Any]":
+    """Text as dates of ISO 8601, which allows a comma before the fractions of a second.
+
+    errors: whether text that is no date is a ValueError, or no time; utc: whether all dates are put in UTC,
+    without which different offsets are a ValueError, too.
+    """
+    if cells.str.contains(",", regex=False).any():
+        cells = cells.str.replace(FRACTION, r"\1.\2", regex=True)
+    return pd.to_datetime(cells, errors=errors, format="ISO8601", utc=utc)
 
 
 def _first(cells: "pd.Series[Any]") -> str:
