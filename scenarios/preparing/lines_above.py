@@ -44,7 +44,7 @@ def _names(rows: Sequence[Row]) -> int | None:
     found = Counter(kind for kind in kinds if kind)
     usual = max(found, key=lambda kind: found[kind], default=())
     alike = sum(often for kind, often in found.items() if len(kind) == len(usual))
-    if len(usual) < 2 or 2 * alike <= found.total():
+    if len(usual) < 2 or not any(usual) or 2 * alike <= found.total():
         return None
     end = kinds.index(usual)
     while end and any(map(is_value, rows[end - 1])):  # the first samples may hold words, too

@@ -4,13 +4,14 @@ from math import isclose
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fmus.errors import BadInput
 from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import is_line_of_units, is_value
+from scenarios.experiment.readers.thousands import WHOLE
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.preparing.lines_above import lines_above
 from scenarios.preparing.survey import survey
@@ -117,7 +118,9 @@ def test_thousands_are_not_taken_for_decimals(tmp_path, separator, sign):
 @pytest.mark.parametrize(
     ("first", "other", "right"),
     [
-        ("999 999 1.003 1.004", "0 10 20 30", False),  # thousands, by their neighbours
+        ("999 999 1.003 1.004", "0 10 20 30", False),  # thousands, by their sizes
+        ("16 14 2.636 34 4.974 25", "0 10 20 30 40 50", False),  # so many whole ones, and no half among them
+        ("16 14 2.5 34 4.974 25", "0 10 20 30 40 50", True),
         ("0 0 1.500 1.500", "0 10 20 30", False),  # no writer of decimals leaves out those of 0 alone
         ("0 0 1.500 1.500", "0.00 0.01 0.02 0.03", True),  # another column has decimals
         ("0 5 1.500 0.500", "0 10 20 30", True),
@@ -139,14 +142,25 @@ def test_a_sign_that_some_numbers_have_is_judged_by_how_numbers_are_written(
         refused(lambda: read_sheet(file), "may group thousands or begin decimals")
 
 
+def test_decimals_that_may_be_thousands_throughout_are_told(tmp_path):
+    [raster] = survey(written(tmp_path, ["t;n"], lambda i: f"{10 * i};{1500 + 9 * i:,}".replace(",", ".")))
+    assert raster.channels[0].x[0] == 1.5
+    said = "column 'n' has three digits behind each '.', as in 1.500; they are read as decimals"
+    assert any(said in remark for remark in raster.remarks)
+
+
 @given(st.lists(st.integers(1000, 31_000), min_size=2, max_size=30), st.sampled_from([".", ","]))
 def test_decimals_as_a_printf_writes_them_are_read(tmp_path_factory, thousandths, sign):
-    """With %g some have no sign and none ends with a zero; with %.3f all have one."""
+    """With %g some have no sign and none ends with a zero; with %.3f all have one, which is remarked on."""
+    short = any(n % 1000 and n % 10 == 0 for n in thousandths)
+    assume(short or len({n for n in thousandths if n % 1000 == 0}) < WHOLE)
     for form in ("{:g}", "{:.3f}"):
         x = [n / 1000 for n in thousandths]
         rows = [f"{10 * i};{form.format(value).replace('.', sign)}" for i, value in enumerate(x)]
         file = written(tmp_path_factory.mktemp("printf"), ["t;n"], rows.__getitem__, len(rows))
-        assert_array_equal(read_sheet(file).numbers("n"), x)
+        sheet = read_sheet(file)
+        assert_array_equal(sheet.numbers("n"), x)
+        assert sheet.remarks or form == "{:g}"
 
 
 # --- heads

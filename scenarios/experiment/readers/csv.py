@@ -18,7 +18,7 @@ from scenarios.experiment.readers.layout import Layout, layout_of, no_text
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.records import BLANKS, WINDOWS, opened
 from scenarios.experiment.readers.sheet import Sheet
-from scenarios.experiment.readers.thousands import check_decimal
+from scenarios.experiment.readers.thousands import remarks_on_thousands
 
 WIDER = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # as pandas says it, lines from 1
 UNCLOSED = re.compile(r"EOF inside string starting at row (\d+)")  # likewise, rows from 0
@@ -49,6 +49,10 @@ class Csv(Reader):
             f"{file.name}: is not UTF-8; its names and units are read as {WINDOWS}, as Windows writes them"
         )
         remarks = (taken,) if layout.encoding == WINDOWS and "encoding" not in options else ()
+        floats = [str(name) for name in cells if cells[name].dtype.kind == "f"]
+        if layout.doubtful and floats:
+            as_text = {**options, "dtype": str, "usecols": floats, "parse_dates": False}
+            remarks += remarks_on_thousands(file, layout, _table(file, layout, as_text))
         signs = (layout.decimal, str(options.get("thousands") or ""))
         return Sheet(file, cells, layout.names, units, {}, "line", layout.first, remarks, signs)
 
@@ -65,10 +69,6 @@ def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
         ) from error
     except UnicodeDecodeError as error:
         raise no_text(file, layout.encoding) from error
-    floats = [str(name) for name in table if table[name].dtype.kind == "f"]
-    if layout.doubtful and floats:
-        as_text = {**options, "dtype": str, "usecols": floats, "parse_dates": False}
-        check_decimal(file, layout, _table(file, layout, as_text))
     filled = np.flatnonzero(table.notna().any(axis=1))
     if not filled.size:
         raise BadInput(f"{file}: has no data below line {layout.first - 1}; record some")

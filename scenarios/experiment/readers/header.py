@@ -17,7 +17,7 @@ SPELLINGS = MappingProxyType(
 )  # fmt: skip
 BRACKETS = re.compile(r".*\S\s*(\[[^\]]+\]|\([^)]+\))")
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
-GROUPED = re.compile(r"[+-]?\d{1,3}([.,' ]\d{3})+([.,]\d+)?")  # thousands apart
+GROUPED = re.compile(r"[+-]?\d{1,3}([.,']\d{3})+([.,]\d+)?")  # thousands apart
 DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T ]+\d.*)?|\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?")
 
 

@@ -1,52 +1,58 @@
 """Numbers whose sign may group thousands: 1.000 is one, or a thousand."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from fmus.errors import BadInput
 from scenarios.experiment.readers.layout import THOUSANDS, Layout
 
-FAR = 1000**0.5  # times: a whole number larger than its neighbour by more is nearer to that in thousands
+WHOLE = 4  # different whole numbers; each has a chance of 1/4 not to be a half or quarter, by steps of 0.125
+FAR = 1000**0.5  # times: whole numbers larger than the others by more are nearer to these in thousands
 
 
-def check_decimal(file: Path, layout: Layout, columns: pd.DataFrame) -> None:
-    """Raise BadInput if the decimal sign of a file may be that of thousands; columns: numbers as text.
+def remarks_on_thousands(file: Path, layout: Layout, columns: pd.DataFrame) -> tuple[str, ...]:
+    """Remarks on columns whose decimals may be thousands; columns: of numbers, as text.
 
     Numbers of one column are written in one way: each with the same decimals, or none with a zero at its end.
-    Where some have no sign, and all others look like grouped thousands, it is neither if one of these ends
-    with a zero. If none does, neighbours tell: after 999, 1.003 is rather a thousand and three. One number
-    in the file with a sign that must be that of decimals settles it.
+    Columns of three decimals throughout are remarked on. Raises BadInput for a column in which some numbers
+    have no sign and all others look like grouped thousands, if one of these ends with a zero, if many are
+    whole and none is a half or quarter, or if the whole ones are so large that the others go on from them as
+    thousands. One number in the file with a sign that must be that of decimals settles it.
     """
-    found = None
-    for name in columns:
-        cells = columns[name].str.strip()
-        signed = cells.str.contains(layout.decimal, regex=False, na=False)
-        grouped = cells.str.fullmatch(THOUSANDS, na=False)
-        if (signed & ~grouped).any():
-            return
-        if found is None and _may_be_thousands(cells, signed):
-            found = str(name), int(signed.to_numpy().argmax())
-    if found is not None:
-        name, row = found
-        held, sign = columns[name].iloc[row].strip(), layout.decimal
-        raise BadInput(
-            f"{file} line {layout.first + row}: column '{name}' holds '{held}' and numbers without '{sign}', "
-            "which may group thousands or begin decimals; say which in [data], "
-            f'thousands = "{sign}" or decimal = "{sign}"'
-        )
+    text = {str(name): columns[name].dropna().str.strip() for name in columns}
+    signed = {name: cells.str.contains(layout.decimal, regex=False) for name, cells in text.items()}
+    if any((signed[name] & ~text[name].str.fullmatch(THOUSANDS)).any() for name in text):
+        return ()
+    return tuple(_remarks(file, layout, text, signed))
 
 
-def _may_be_thousands(cells: "pd.Series[str]", signed: "pd.Series[bool]") -> bool:
-    """Whether numbers with a sign, all like grouped thousands, go on those without one."""
-    whole = cells[~signed].dropna()
-    if not signed.any() or whole.empty or not whole.str.fullmatch(r"[+-]?\d{1,3}").all():
+def _remarks(
+    file: Path, layout: Layout, text: dict[str, "pd.Series[str]"], signed: dict[str, "pd.Series[bool]"]
+) -> Iterator[str]:
+    sign = layout.decimal
+    for name, cells in text.items():
+        with_sign, whole = cells[signed[name]], cells[~signed[name]]
+        if with_sign.empty:
+            continue
+        if whole.empty:
+            held = f"column '{name}' has three digits behind each '{sign}', as in {with_sign.iloc[0]}"
+            yield f'{file.name}: {held}; they are read as decimals, but with [data] thousands = "{sign}"'
+        elif _may_go_on(whole, with_sign):
+            line = layout.first + int(with_sign.index[0])
+            raise BadInput(
+                f"{file} line {line}: column '{name}' holds '{with_sign.iloc[0]}' and numbers without "
+                f"'{sign}', which may group thousands or begin decimals; say which in [data], "
+                f'thousands = "{sign}" or decimal = "{sign}"'
+            )
+
+
+def _may_go_on(whole: "pd.Series[str]", with_sign: "pd.Series[str]") -> bool:
+    """Whether numbers with a sign, all like grouped thousands, may go on whole ones of the same column."""
+    if not whole.str.fullmatch(r"[+-]?\d{1,3}").all():
         return False
-    if cells[signed].str.endswith("0").any():
+    if with_sign.str.endswith("0").any() or whole.nunique() >= WHOLE:
         return True
-    number = pd.to_numeric(cells.str.replace(",", ".")).abs().to_numpy()
-    one, other = number[:-1], number[1:]
-    after, before = (signed.to_numpy()[i] for i in (slice(1, None), slice(None, -1)))
-    edges = [*(one / other)[after & ~before], *(other / one)[before & ~after]]  # of whole to signed ones
-    return bool(edges) and bool(np.nanmedian(edges) > FAR)
+    usual, other = (pd.to_numeric(x.str.replace(",", ".")).abs().median() for x in (whole, with_sign))
+    return bool(usual > FAR * other)
