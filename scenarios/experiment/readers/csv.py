@@ -48,7 +48,9 @@ class Csv(Reader):
         taken = (
             f"{file.name}: is not UTF-8; its names and units are read as {WINDOWS}, as Windows writes them"
         )
-        remarks = (taken,) if layout.encoding == WINDOWS and "encoding" not in options else ()
+        remarks: tuple[str, ...] = (
+            (taken,) if layout.encoding == WINDOWS and "encoding" not in options else ()
+        )
         floats = [str(name) for name in cells if cells[name].dtype.kind == "f"]
         if layout.doubtful and floats:
             as_text = {**options, "dtype": str, "usecols": floats, "parse_dates": False}

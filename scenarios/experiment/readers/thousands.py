@@ -16,10 +16,10 @@ def remarks_on_thousands(file: Path, layout: Layout, columns: pd.DataFrame) -> t
     """Remarks on columns whose decimals may be thousands; columns: of numbers, as text.
 
     Numbers of one column are written in one way: each with the same decimals, or none with a zero at its end.
-    Raises BadInput for a column in which some numbers have no sign and all others look like grouped thousands,
-    if one of these ends with a zero, if many are whole and none is a half or quarter, or if the whole ones are
-    so large that the others go on from them as thousands. What is left is read as decimals, with a remark. One
-    number in the file with a sign that must be that of decimals settles it.
+    Raises BadInput for a column in which some numbers have no sign and all others look like grouped
+    thousands, if one of these ends with a zero, if many are whole and none is a half or quarter, or if the
+    whole ones are so large that the others go on from them as thousands. What is left is read as decimals,
+    with a remark. One number in the file with a sign that must be that of decimals settles it.
     """
     text = {str(name): columns[name].dropna().str.strip() for name in columns}
     signed = {name: cells.str.contains(layout.decimal, regex=False) for name, cells in text.items()}
