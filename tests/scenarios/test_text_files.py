@@ -286,12 +286,12 @@ def seconds(file, **options):
 
 def test_dates_of_other_forms_are_refused_with_the_options_that_read_them(tmp_path):
     file = written(tmp_path, ["time;n"], lambda i: f"01.02.2026 12:00:{i:02d};{comma(i % 7)}")
-    words = ("line 2: time column 'time' holds '01.02.2026 12:00:00'", 'parse_dates = ["time"]', "dayfirst")
+    words = ("line 2: column 'time' holds '01.02.2026 12:00:00'", 'parse_dates = ["time"]', "dayfirst")
     refused(lambda: seconds(file), *words)
     refused(lambda: survey(file), *words)
     assert_array_equal(seconds(file, parse_dates=["time"], dayfirst=True), np.arange(FEW))
     file = written(tmp_path, ["time;n"], lambda i: f"{'?' if i == 5 else f'2026-01-01 00:00:{i:02d}'};1")
-    refused(lambda: seconds(file), "line 7: time column 'time' holds '?'")
+    refused(lambda: seconds(file), "line 7: column 'time' holds '?'")
 
 
 def test_a_comma_may_stand_before_fractions_of_a_second(tmp_path):

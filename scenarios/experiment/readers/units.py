@@ -105,7 +105,7 @@ class StatedUnits:
             return f"{self._file}: only some dates of column '{column}' have a time zone; write all alike"
         i = int(words.argmax())
         return (
-            f"{self._file} {self._sheet.row} {i + self._sheet.first}: time column '{column}' holds "
+            f"{self._file} {self._sheet.row} {i + self._sheet.first}: column '{column}' holds "
             f"'{str(cells.iloc[i])[:40]}', neither a number nor a date of ISO 8601, such as "
             f'2026-02-01T12:00:00.5; write these, or say parse_dates = ["{column}"] in [data], and '
             "dayfirst = true where the day comes first"
