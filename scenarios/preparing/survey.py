@@ -14,7 +14,7 @@ from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
 from scenarios.experiment.advice import check_no_colons, read_with_advice
 from scenarios.experiment.checks import GAP, check_time, output_notes, time_notes
-from scenarios.experiment.readers.header import is_number, is_unit, spelled
+from scenarios.experiment.readers.header import is_unit, is_value, spelled
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.preparing.lines_above import lines_above
@@ -101,7 +101,7 @@ def survey(file: Path, time: str | None = None) -> list[Raster]:
         try:
             sheet = read_with_advice(file, options=options)
         except BadInput:  # several rasters, or a file that cannot be read at all
-            found = [*_rasters(file)]
+            found = [*_rasters(file, options)]
             if not found:
                 raise
             return sorted(found, key=lambda r: -len(r.channels))
@@ -111,14 +111,14 @@ def survey(file: Path, time: str | None = None) -> list[Raster]:
     return [_raster(_with_time(file, time, options), time, options)]
 
 
-def _rasters(file: Path) -> Iterator[Raster]:
+def _rasters(file: Path, options: Mapping[str, Any]) -> Iterator[Raster]:
     """The rasters of a file with several, each once."""
     seen = set()
-    for name in read_with_advice(file, "", ()).known:
+    for name in read_with_advice(file, "", (), options).known:
         if not TIME.search(name):
             continue
         try:
-            raster = _raster(_with_time(file, name, {}), name, {})
+            raster = _raster(_with_time(file, name, options), name, options)
         except BadInput:  # the name alone is that of several times; with its group it comes too
             continue
         key = (raster.t.size, *raster.t[[0, -1]], *(c.name for c in raster.channels))
@@ -136,7 +136,7 @@ def _with_time(file: Path, time: str, options: Mapping[str, Any]) -> Sheet:
 
 def _check_names(sheet: Sheet) -> None:
     """Raise BadInput if numbers stand where the names of the columns belong."""
-    if sheet.known and all(map(is_number, sheet.known)):
+    if sheet.known and all(map(is_value, sheet.known)):
         raise BadInput(
             f"{sheet.file}: the line of the column names holds numbers ({', '.join(sheet.known[:3])}); write "
             "names above them, such as time,speed"

@@ -17,7 +17,7 @@ from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.reader import NO_OPTIONS
 from scenarios.experiment.readers.sheet import Sheet
-from scenarios.experiment.readers.units import StatedUnits, overruled
+from scenarios.experiment.readers.units import StatedUnits, iso_dates, overruled
 from scenarios.experiment.record import LARGEST
 
 
@@ -166,7 +166,7 @@ def _seconds(sheet: Sheet, e: Experiment) -> Array:
     cells = sheet.cells[e.time]
     dates = cells
     if pd.api.types.is_string_dtype(cells):
-        dates = pd.to_datetime(cells, errors="coerce", format="ISO8601")
+        dates = iso_dates(cells, "coerce", utc=True)
         if dates.isna().all():
             dates = cells
     if dates.dtype.kind == "M":

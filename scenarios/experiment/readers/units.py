@@ -2,7 +2,7 @@
 
 from math import isclose
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -15,6 +15,8 @@ from scenarios.experiment.readers.sheet import Sheet
 
 SAME = (1.0, 0.0)  # factor and offset
 ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
+FRACTION = r"(:\d{2}),(\d+)"  # of a second
+OFFSET = r":\d{2}(?:[.,]\d+)? *(?:Z|[+-]\d{2}(?::?\d{2})?)\s*$"  # from UTC, behind a time of day
 
 
 class StatedUnits:
@@ -89,6 +91,8 @@ class StatedUnits:
             said = f"{self._file.name}: column '{column}' holds dates; 0 s is {cells.min()}"
             self.notes.append(Note("unit", column, said))
             cells = cells - cells.min()
+        if pd.api.types.is_string_dtype(cells) and not is_number(_first(cells)):
+            raise BadInput(self._no_time(column, cells))
         if cells.dtype.kind == "m":
             return np.asarray(cells.dt.total_seconds(), dtype=np.float64)
         if unit is None:
@@ -97,6 +101,19 @@ class StatedUnits:
             self.check(column, 0, unit, where)
             factor, offset = conversion(unit, "s", where)
         return self._sheet.numbers(column) * factor + offset
+
+    def _no_time(self, column: str, cells: "pd.Series[Any]") -> str:
+        """Why text is no time: its first cell that is no date, or that some dates have a time zone."""
+        words = (iso_dates(cells, "coerce", utc=True).isna() & cells.notna()).to_numpy()
+        if not words.any():
+            return f"{self._file}: only some dates of column '{column}' have a time zone; write all alike"
+        i = int(words.argmax())
+        return (
+            f"{self._file} {self._sheet.row} {i + self._sheet.first}: column '{column}' holds "
+            f"'{str(cells.iloc[i])[:40]}', neither a number nor a date of ISO 8601, such as "
+            f'2026-02-01T12:00:00.5; write these, or say parse_dates = ["{column}"] in [data], and '
+            "dayfirst = true where the day comes first"
+        )
 
     def stated(self, column: str, where: str, derived: int = 0) -> str | None:
         """The unit stated in the file, in railfmi's spelling, None if there is none; BadInput if unknown.
@@ -155,10 +172,30 @@ def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> flo
 
 
 def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
-    """Dates that a file holds as text, as dates; all else unchanged."""
-    if not pd.api.types.is_string_dtype(cells) or is_number(str(cells.iloc[0])):
+    """Dates that a file holds as text, as dates, in UTC if their offsets differ; all else unchanged."""
+    if not pd.api.types.is_string_dtype(cells) or is_number(_first(cells)):
         return cells
     try:
-        return pd.to_datetime(cells, errors="raise", format="ISO8601")
+        return iso_dates(cells, "raise", utc=False)
+    except (ValueError, TypeError):
+        zoned = cells.dropna().str.contains(OFFSET).all()
+    try:
+        return iso_dates(cells, "raise", utc=True) if zoned else cells
     except (ValueError, TypeError):
         return cells
+
+
+def iso_dates(cells: "pd.Series[Any]", errors: Literal["raise", "coerce"], utc: bool) -> "pd.Series[Any]":
+    """Text as dates of ISO 8601, which allows a comma before the fractions of a second.
+
+    errors: whether text that is no date is a ValueError, or no time; utc: whether all dates are put in UTC,
+    without which different offsets are a ValueError, too.
+    """
+    if cells.str.contains(",", regex=False).any():
+        cells = cells.str.replace(FRACTION, r"\1.\2", regex=True)
+    return pd.to_datetime(cells, errors=errors, format="ISO8601", utc=utc)
+
+
+def _first(cells: "pd.Series[Any]") -> str:
+    """The first cell with anything in it; empty if there is none."""
+    return str(next(iter(cells.dropna()), ""))
