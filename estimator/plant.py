@@ -17,6 +17,7 @@ from fmus.host.fmu import Fmu
 
 PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
 TOGETHER = 1 << 28  # bytes of results that are simulated at once: those of eight rows of an hour do not fit
+REFINED = 1 << 25  # bytes of refined inputs that are kept; one set of them always is
 EVEN = 1e-6  # of a sample, by which the times of a run may be unevenly spaced if a step joins several of them
 
 
@@ -51,7 +52,7 @@ class Plant:
         self.fmu, self.inputs, self.outputs = fmu, tuple(inputs), tuple(outputs)
         self.states = tuple(fmu.description.states)
         self._kept = Kept(0) if kept is None else kept
-        self._fine: tuple[Run, Array, dict[str, Array], int] | None = None  # refined inputs of the last run
+        self._fine: OrderedDict[Hashable, tuple[Array, dict[str, Array]]] = OrderedDict()  # refined inputs
         self._seen: tuple[Run, bytes] | None = None  # the last run and its digest
 
     def simulate(
@@ -77,8 +78,8 @@ class Plant:
             for name, samples in push.items():
                 inputs[name] = inputs.get(name, 0.0) + np.interp(t, run.t, samples)
         # half the time of a loop over steps
-        alone = self.fmu.simulate_rows(t, inputs, names, [start], steps.joined)
-        y = (self.fmu.simulate(t, inputs, names, start) if alone is None else alone[0])[::pieces]
+        alone = self.fmu.simulate_rows(t, inputs, names, [start], steps.joined, pieces)
+        y = self.fmu.simulate(t, inputs, names, start)[::pieces] if alone is None else alone[0]
         if key is not None:
             self._kept.put(key, names, y)
         return y
@@ -97,10 +98,11 @@ class Plant:
         if not (new := [start for start, y in zip(starts, kept, strict=True) if y is None]):
             return [y for y in kept if y is not None]
         t, inputs, pieces = self._given(run, steps)
-        if (rows := self.fmu.simulate_rows(t, inputs, names, self._alike(new), steps.joined)) is None:
+        rows = self.fmu.simulate_rows(t, inputs, names, self._alike(new), steps.joined, pieces)
+        if rows is None:
             return None
         made = iter(rows)
-        found = [next(made)[::pieces] if y is None else y for y in kept]
+        found = [next(made) if y is None else y for y in kept]
         for key, y in zip(keys, found, strict=True):
             if key is not None:
                 self._kept.put(key, names, y)
@@ -151,7 +153,7 @@ class Plant:
 
         more: number of variables that are read beside the outputs.
         """
-        size = 8 * len(run.t) * self._pieces(run.t) * (len(self.outputs) + more)
+        size = 8 * len(run.t) * (len(self.outputs) + more)
         return max(1, min(self.fmu.at_once, TOGETHER // size))
 
     def _key(
@@ -160,9 +162,13 @@ class Plant:
         """All that variables of a simulation depend on; None if these, by name, are too long to be kept."""
         if not self._kept.room_for(8 * len(run.t) * len(names)):
             return None
+        return self, self._digest(run), steps, bits(start)
+
+    def _digest(self, run: Run) -> bytes:
+        """The digest of a run, kept for the last one."""
         if self._seen is None or self._seen[0] is not run:
             self._seen = run, digest(run)
-        return self, self._seen[1], steps, bits(start)
+        return self._seen[1]
 
     def joins(self, runs: Sequence[Run]) -> bool:
         """Whether a step may go over several samples of these runs."""
@@ -170,13 +176,17 @@ class Plant:
         return self.fmu.joins and all(len(s) > 0 and np.ptp(s) < EVEN * s[0] for s in steps)
 
     def _given(self, run: Run, steps: Steps) -> tuple[Array, dict[str, Array], int]:
-        """Times and inputs of a run as set in the FMU, and the pieces of a step; cached for the run."""
-        pieces = self._pieces(run.t) * steps.parts
-        if self._fine is None or self._fine[0] is not run or self._fine[3] != pieces:
-            inputs = {name: run.u[:, j] for j, name in enumerate(self.inputs)}
-            fine = (run.t, inputs) if pieces == 1 else between(run.t, inputs, pieces)
-            self._fine = run, *fine, pieces
-        return self._fine[1:]
+        """Times and inputs of a run as set in the FMU, and the pieces of a step; refined ones are kept."""
+        pieces, inputs = self._pieces(run.t) * steps.parts, dict(zip(self.inputs, run.u.T, strict=True))
+        if pieces == 1:
+            return run.t, inputs, 1
+        key = self._digest(run), pieces
+        if key not in self._fine:
+            while len(self._fine) >= max(1, REFINED // (8 * len(run.t) * pieces * (1 + len(inputs)))):
+                self._fine.popitem(last=False)
+            self._fine[key] = between(run.t, inputs, pieces)
+        self._fine.move_to_end(key)
+        return *self._fine[key], pieces
 
     def _pieces(self, t: Array) -> int:
         """Number of pieces of a step, more than one for inputs with rates, whose means would lose detail."""

@@ -4,6 +4,7 @@ The radian counts as a dimension of its own, so that turns and angles cannot be 
 """
 
 import re
+import unicodedata
 from functools import cache
 from tokenize import TokenError
 from types import MappingProxyType
@@ -20,13 +21,32 @@ COMMON = (
     "1 % rad deg rad/s rpm 1/min Hz s m mm m/s km/h m/s2 g_0 kg kg.m2 N kN N.s/m N.m N.m.s/rad V A Ohm degC"
 )
 
-# pint knows far more names ('Nm' is a yarn, 'rads' a dose), and works out any power: only these may stand
-_NAME = (
-    "[nuµmcdkMG]?(?:m|s|g|A|K|mol|cd|rad|Hz|N|Pa|J|W|V|F|Ohm|Ω|S|Wb|T|H|bar)"
-    "|%|deg|°|turn|rpm|min|h|t|degC|g_0|L|in|ft|mph|lb|lbf|psi|degF"
-)
-_POWER = r"(?:\*\*|\^)-?[0-9]|[²³]"
+# usual in measured files, but not in the grammar of units
+SPELLINGS = MappingProxyType(
+    {
+        "-": "1", "Nm": "N.m", "kNm": "kN.m", "°C": "degC", "U/min": "rpm", "1/min": "rpm", "min-1": "rpm",
+        "RPM": "rpm", "r/min": "rpm", "rev/min": "rpm", "sec": "s", "msec": "ms", "Volt": "V", "Ampere": "A",
+        "Sekunden": "s", "seconds": "s", "millis": "ms", "milliseconds": "ms", "usec": "us", "Grad": "deg",
+        "Grad/s": "deg/s", "degrees": "deg", "dps": "deg/s", "kmh": "km/h", "kph": "km/h", "mps": "m/s",
+    }
+)  # fmt: skip
+
+# Units, and the prefixes with which they are in use. pint would take any prefix before any unit, and read the
+# German 'Grad' as a gigaradian; it knows far more names, too ('Nm' is a yarn), and works out any power.
+_IN_USE = MappingProxyType(
+    {
+        "% deg ° turn rpm min h t degC g_0 in ft mph lb lbf psi degF": "",
+        "m": "n u μ m c d k", "s rad T H": "n u μ m", "g": "n u μ m k M", "A mol": "n u μ m k",
+        "K Wb": "u μ m", "cd": "m", "Hz": "m k M G", "N": "n u μ m c d da k M G", "Pa": "u μ m h k M G",
+        "J W": "n u μ m k M G", "V S": "n u μ m k M", "Ohm Ω": "u μ m k M G", "F": "p n u μ m",
+        "bar": "u μ m d k", "L l": "u μ m c d h",
+    }
+)  # fmt: skip
+UNITS = tuple(p + u for units, some in _IN_USE.items() for p in ("", *some.split()) for u in units.split())
+_NAME = "|".join(map(re.escape, UNITS))
+_POWER = r"(?:\*\*|\^)-?[0-9]"
 _GRAMMAR = re.compile(rf"(?:[()*/]|(?<!\w)(?:1|(?:{_NAME})(?:{_POWER})?)(?!\w))+")
+_SIGNS = str.maketrans({"·": ".", "⋅": ".", "−": "-", "∕": "/"})  # that look alike
 
 # pint's base units by the attribute that FMI gives them in <BaseUnit>
 _FMI_BASE = MappingProxyType(
@@ -63,8 +83,13 @@ def _registry() -> pint.UnitRegistry[float]:
 
 def _pint_text(unit: str) -> str:
     """The unit in pint's grammar: 'kg.m2' -> 'kg*m**2', 's-1' -> 's**-1'."""
-    text = re.sub(r"\s*([./*^·])\s*", r"\1", unit.strip())
-    return re.sub(r"([^\W\d_])(-?[0-9]+)", r"\1**\2", re.sub("[.·]", "*", text))
+    text = re.sub(r"\s*([./*^])\s*", r"\1", plain(unit))
+    return re.sub(r"([^\W\d_])(-?[0-9]+)", r"\1**\2", text.replace(".", "*"))
+
+
+def plain(unit: str) -> str:
+    """The unit with one character for those that look alike: digits, signs of micro, dots, minuses."""
+    return unicodedata.normalize("NFKC", unit.strip()).translate(_SIGNS)
 
 
 def base_exponents(unit: str) -> BaseUnit:
@@ -80,7 +105,8 @@ def base_exponents(unit: str) -> BaseUnit:
         zero, one = (registry.Quantity(v, parsed).to_base_units() for v in (0.0, 1.0))
         exponents = {_FMI_BASE[name]: int(power.real) for name, power in one.unit_items() if power}
     except (*_NOT_PARSED, KeyError) as error:
-        raise BadInput(f"unit '{unit}' is not known; {did_you_mean(unit, COMMON.split())}") from error
+        meant = did_you_mean(SPELLINGS.get(unit, unit), {*COMMON.split(), *SPELLINGS.values()})
+        raise BadInput(f"unit '{unit}' is not known; {meant}") from error
     offset = float(zero.magnitude)
     return BaseUnit(exponents, float(one.magnitude) - offset, offset)
 
@@ -108,6 +134,14 @@ def conversion(unit: str, target_unit: str, where: str) -> tuple[float, float]:
     if clash:
         raise BadInput(f"{where}: unit '{unit}' does not fit '{target_unit}'; {clash}")
     return source.factor / target.factor, (source.offset - target.offset) / target.factor
+
+
+def another_kind(unit: str, other: str) -> bool:
+    """Whether two units are known and measure different things; a radian, often left out, does not count."""
+    try:
+        return _kind(base_exponents(unit)) != _kind(base_exponents(other))
+    except BadInput:
+        return False
 
 
 def model_unit(stated: str | None, declared: str | None, variable: str, where: str) -> str | None:
@@ -158,11 +192,14 @@ def to_si(values: ArrayLike, unit: str, target_unit: str, where: str) -> NDArray
     return np.asarray(values, dtype=np.float64) * factor + offset
 
 
+def _kind(base: BaseUnit) -> dict[str, int]:
+    return {name: power for name, power in base.exponents.items() if name != "rad"}
+
+
 def _clash(unit: str, source: BaseUnit, target_unit: str, target: BaseUnit) -> str:
     """Why the two cannot be converted, with the way out; empty if they can."""
     rads = [b.exponents.get("rad", 0) for b in (source, target)]
-    rest = [{k: v for k, v in b.exponents.items() if k != "rad"} for b in (source, target)]
-    if rest[0] != rest[1]:
+    if _kind(source) != _kind(target):
         hint = "; an acceleration in g is 'g_0'" if unit == "g" else ""
         return f"give the column in a unit of the same kind{hint}"
     if rads[0] == rads[1]:

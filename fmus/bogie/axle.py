@@ -211,15 +211,14 @@ def summed(
         F_y += cs.sum1(lateral)
         M_z += cs.sum1(R_x * lateral - R_y * forward + c.M_z * plane.cos)
         M_y -= cs.sum1(r * c.F_x + SIGN * c.M_z * cs.sin(patch.delta))
-    total = sum(forces)
     deltas = [patch.delta for patch in touch.patches]
-    delta = sum(N * d for N, d in zip(forces, deltas, strict=True)) / total
-    steepest = deltas[0]
+    delta = steepest = deltas[0]
+    if len(deltas) > 1:
+        delta = sum(N * d for N, d in zip(forces, deltas, strict=True)) / sum(forces)
     for N, d in zip(forces[1:], deltas[1:], strict=True):
         steepest = cs.fmax(steepest, cs.if_else(N > LEAST_LOAD, d, 0.0))
     worn = [c.dissipated for c in found]
     at_flange = [cs.if_else(d > FLANGE_ANGLE, T, 0.0) for T, d in zip(worn, deltas, strict=True)]
-    delta = deltas[0] if len(deltas) == 1 else delta
     return Contact(Y, Q, delta, steepest, sum(worn), sum(at_flange), F_y, M_z, M_y)
 
 

@@ -178,8 +178,11 @@ class Fmu:
         outputs: Sequence[str],
         starts: Sequence[Mapping[str, float]],
         joined: bool = False,
+        every: int = 1,
     ) -> Array | None:
         """As `simulate` for each of k starts with the same names: outputs (k, N, n_y).
+
+        every: of how many samples after the first one is read, a divisor of N - 1.
 
         joined: whether a step goes over four samples, see fmus/integrators/joined.py. The times must be
         evenly spaced then, and the inputs samples (N,) of continuous signals.
@@ -194,11 +197,11 @@ class Fmu:
         names = [name for name in starts[0] if name not in first]
         put, get, driven = (np.array(self.references(n), dtype=np.uint32) for n in (names, outputs, inputs))
         rows = np.array([[start[name] for name in names] for start in starts], dtype=float)
-        found = np.empty((len(starts), len(t), len(outputs)))
+        found = np.empty((len(starts), (len(t) - 1) // every + 1, len(outputs)))
         call = Rows(self._instance.library, base_of(self.description, first), put, get)
         last = None if ends is None else np.ascontiguousarray(ends)
         held = Inputs(driven, np.ascontiguousarray(acting), last, joined)
-        refused = call.run(rows, np.ascontiguousarray(t, dtype=float), found, held) >= 0
+        refused = call.run(rows, np.ascontiguousarray(t, dtype=float), found, held, every) >= 0
         return None if refused else found
 
     def save(self) -> Any:

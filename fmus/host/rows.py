@@ -16,7 +16,8 @@ from fmus.host.description import FmuDescription
 from fmus.host.instance import Instance
 from fmus.host.loop import Array
 
-NAME = "railfmi_rows"
+NAME = "railfmi_rows_2"  # the second version of the structure; FMUs with the first one are not asked
+AT_ONCE = "railfmi_rows_at_once"
 JOINS = "railfmi_joins"
 FOUR = 4  # rows at once of an FMU that does not say how many
 ALIKE = 1e-12  # of a value, by which a row may differ from an instance alone: vectors round otherwise
@@ -31,7 +32,7 @@ class _Asked(Structure):
         ("put", c_void_p), ("rows", c_void_p), ("n_samples", c_size_t), ("t", c_void_p),
         ("n_inputs", c_size_t), ("inputs", c_void_p), ("during", c_void_p), ("after", c_void_p),
         ("n_get", c_size_t), ("get", c_void_p), ("first", c_int), ("found", c_void_p), ("processor", c_int),
-        ("joined", c_int),
+        ("joined", c_int), ("every", c_size_t),
     )  # fmt: skip
 
 
@@ -62,18 +63,19 @@ class Rows:
         self._t = np.empty(0)
         self._inputs: Inputs | None = None
 
-    def run(self, rows: Array, t: Array, found: Array, inputs: Inputs | None = None) -> int:
+    def run(self, rows: Array, t: Array, found: Array, inputs: Inputs | None = None, every: int = 1) -> int:
         """Fill `found` (k, N - 1 or N, n_get) from rows (k, n_put) at times t (N,), s; all C-contiguous.
 
-        With N results for each row the first is that before the first step. Returns -1, or a row of a group
-        of which one cannot be set or advanced; then instances have to be asked why, and for the other rows.
+        With N results for each row the first is that before the first step. every: of how many samples after
+        the first one is read, a divisor of N - 1; there are fewer results then. Returns -1, or a row of a
+        group of which one cannot be set or advanced; instances have to be asked why, and for the other rows.
         """
         asked = self._asked
         asked.n_rows, asked.rows, asked.found = len(rows), _at(rows), _at(found)
         if t is not self._t:
             self._t = t
             asked.n_samples, asked.t = len(t), _at(t)
-        asked.first = int(found.shape[1] == len(t))
+        asked.first, asked.every = int(found.shape[1] > (len(t) - 1) // every), every
         if inputs is not self._inputs:
             self._inputs = inputs
             self._set_inputs(inputs)
@@ -99,7 +101,7 @@ def rows_at_once(instance: Instance) -> int:
     """Number of rows that take the time of little more than one; 1 if the FMU's library lacks the call."""
     if not offers_rows(instance):
         return 1
-    asked = getattr(instance.library, f"{NAME}_at_once", None)
+    asked = getattr(instance.library, AT_ONCE, None)
     return int(asked()) if asked else FOUR
 
 

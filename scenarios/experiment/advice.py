@@ -8,15 +8,12 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from fmus.errors import BadInput
 from scenarios.experiment.readers import read_sheet
+from scenarios.experiment.readers.csv import UnlikeLines
 from scenarios.experiment.readers.reader import NO_OPTIONS
 from scenarios.experiment.readers.sheet import Sheet
 
-WIDER = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # as pandas says it
-UNCLOSED = re.compile(r"EOF inside string starting at row (\d+)")  # likewise, rows from 0
 WITH_COLONS = re.compile(r"\d+:\d{2}(:\d{2})?([.,]\d+)?(\s*[ap]\.?m\.?)?", re.IGNORECASE)
 LOOKED_AT = 200  # rows in which the line of the names is looked for
 
@@ -36,31 +33,13 @@ def read_with_advice(
         raise BadInput(f"{file}: is a folder; give the path of the data file in it")
     try:
         return read_sheet(file, time, columns, options)
-    except BadInput as error:
-        said = _unlike_lines(error, file, table)
-        if said:
-            raise BadInput(said) from error
-        raise
-
-
-def _unlike_lines(error: BadInput, file: Path, table: str | None) -> str:
-    """What to do about a text file whose lines do not make up a table; empty for any other refusal."""
-    cause, above = error.__cause__, ""
-    if table:
-        above = (
-            f"; if other lines stand above the names, write how many as skiprows in {table} "
+    except UnlikeLines as error:
+        if table is None:
+            raise
+        raise BadInput(
+            f"{error}; if other lines stand above the names, write how many as skiprows in {table} "
             "('railfmi inspect' counts them)"
-        )
-    if isinstance(cause, pd.errors.ParserWarning):
-        return f"{error}{above}"
-    said = str(cause) if isinstance(cause, pd.errors.ParserError) else ""
-    if wider := WIDER.search(said):
-        few, line, many = wider.groups()
-        return f"{file} line {line}: has {many} cells, and the lines above it have {few}; mend it{above}"
-    if unclosed := UNCLOSED.search(said):
-        row = int(unclosed[1])
-        return f"{file} line {row + 1}: a quotation mark is opened there and never closed; close it"
-    return ""
+        ) from error
 
 
 def named_below(sheet: Sheet, column: str, table: str) -> str:

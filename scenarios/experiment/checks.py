@@ -32,9 +32,12 @@ def check_time(file: str, column: str, t: Array, lines: Lines, row: str = "line"
     back = np.diff(t) <= 0
     if back.any():
         i = int(back.argmax())
+        way = "write them with more digits, or drop the rows that repeat one"
+        if t[i + 1] < t[i]:
+            way = "drop the rows that go back, or cut the file there"
         raise BadInput(
             f"{file} {row} {lines[i + 1]}: time column '{column}' goes from {t[i]:.9g} to {t[i + 1]:.9g} s; "
-            "times must increase from row to row"
+            f"times must increase from row to row: {way}"
         )
 
 

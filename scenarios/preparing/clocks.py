@@ -13,7 +13,6 @@ from fmus.host.apart.isolation import FmuEnded, Isolation
 from fmus.host.description import FmuVariable
 from fmus.host.fmu import Fmu, FmuError
 from fmus.units import column_conversion
-from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.units import dates_apart
 from scenarios.experiment.sampling import at_times, step_of
 from scenarios.preparing.draft import Clock, Draft, Signal
@@ -134,7 +133,7 @@ def _shared(one: Raster, other: Raster) -> tuple[Lag, str] | None:
 
 def _same(one: Channel, other: Channel) -> bool:
     """Whether two channels can be measurements of the same quantity, by their units and names."""
-    units = [spelled(c.unit or "") for c in (one, other)]
+    units = [c.unit or "" for c in (one, other)]
     if not (all(map(known, units)) and alike(*units)):
         return False
     both = quantities_of(one.name), quantities_of(other.name)

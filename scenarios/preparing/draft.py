@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from fmus.host.description import FmuDescription, FmuVariable
-from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.units import dates_apart
 from scenarios.experiment.sampling import SAME
 from scenarios.preparing.matching import SURE, Match, matches
-from scenarios.preparing.quantities import alike, known, likely_unit, quantities_of, words_of
+from scenarios.preparing.quantities import alike, known, likely_unit, quantities_of, unit_in_name, words_of
 from scenarios.preparing.survey import Channel, Raster
 
 ONE_MORE = 0.65  # likeness of a further column that makes it worth another file; a mere guess has less
@@ -26,7 +25,10 @@ MOTION = {"force": ("velocity", "displacement"), "torque": ("speed of rotation",
 
 @dataclass(frozen=True)
 class Signal:
-    """An input or output of the FMU with its column, the unit of each, and how sure all that is."""
+    """An input or output of the FMU with its column, the unit of each, and how sure all that is.
+
+    by_name: whether the unit of the column is a guess by its name, since the record states none.
+    """
 
     variable: FmuVariable
     raster: Raster
@@ -34,6 +36,7 @@ class Signal:
     unit: str | None
     model_unit: str | None
     likeness: float
+    by_name: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,11 +172,19 @@ def _drafted(fmu: Path, description: FmuDescription, rasters: Sequence[Raster]) 
 
 
 def _signal(m: Match, raster: Raster) -> Signal:
-    unit = spelled(m.channel.unit) if known(spelled(m.channel.unit or "")) and m.channel.unit else None
-    if m.variable.unit:
-        return Signal(m.variable, raster, m.channel, unit, None, m.likeness)
-    guess = likely_unit(m.variable.name, m.variable.description, unit)
-    return Signal(m.variable, raster, m.channel, unit, guess, m.likeness)
+    v, stated = m.variable, m.channel.unit if known(m.channel.unit) else None
+    named = None if stated else _unit_by_name(v, m.channel.name)
+    unit = stated or named
+    guess = None if v.unit else likely_unit(v.name, v.description, unit)
+    return Signal(v, raster, m.channel, unit, guess, m.likeness, named is not None)
+
+
+def _unit_by_name(v: FmuVariable, column: str) -> str | None:
+    """The unit at the end of a column's name, unless the variable's name ends likewise."""
+    if words_of(column)[-1:] == words_of(v.name)[-1:]:
+        return None
+    fitting = [v.unit] if v.unit else [q.unit for q in quantities_of(v.name, v.description)]
+    return unit_in_name(column, fitting)
 
 
 def with_column(made: Draft, variable: str, column: str | None) -> Draft:

@@ -104,7 +104,9 @@ def _by_name(r: Raster) -> str:
 def _stated(s: Signal) -> str:
     """The unit of a column as its file states it, and whether it is known."""
     stated = s.channel.unit
-    return s.unit or (f"{stated} (not known)" if stated else "not stated")
+    if s.unit:
+        return f"{s.unit} (guess)" if s.by_name else s.unit
+    return f"{stated} (not known)" if stated else "not stated"
 
 
 def init(

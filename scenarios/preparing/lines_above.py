@@ -1,52 +1,69 @@
 """Lines that a logger writes above the names of the columns of a text file."""
 
 import csv
-import gzip
 import zlib
 from collections import Counter
+from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
-from typing import TextIO
 
 from scenarios.experiment.readers.csv import Csv
-from scenarios.experiment.readers.header import is_line_of_units, is_number
+from scenarios.experiment.readers.header import is_line_of_units, is_value, states_unit
+from scenarios.experiment.readers.layout import LOOKED_AT
+from scenarios.experiment.readers.reader import NO_OPTIONS
+from scenarios.experiment.readers.records import encoding_of, filled, opened, records, separators_of
 
-LOOKED_AT = 200  # lines, of which more than half have to belong to the table
-BEGINS = 1 << 20  # characters in which they are looked for
-SEPARATORS = (",", ";", "\t")
+Row = list[str]
 
 
 def lines_above(file: Path) -> int:
     """How many lines stand above the names in a text file of columns; 0 where none are seen.
 
-    A table has the same number of cells in most lines. The first line with that many cells is the one of the
-    names, if none of its cells is a number and it is no line of units. Files of other formats have none.
+    The numbers begin with the first line that has as many cells as most lines, and values where these have
+    some. The names stand right above, perhaps with a line of units between: none of the cells is a value, and
+    each is filled, but perhaps the first, above an index. Files of other formats have none.
     """
     if not file.name.lower().endswith(Csv.suffixes) or not file.is_file():
         return 0
     try:
-        with _text(file) as stream:
-            lines = stream.read(BEGINS).split("\n")[:-1][:LOOKED_AT]  # the last one may be cut
-        found = [_first(lines, separator) for separator in SEPARATORS]
-    except (OSError, EOFError, csv.Error, zlib.error):  # the reader of the file says what is wrong with it
-        return 0
-    width, first = max(found)
-    return first if width > 1 else 0
+        with opened(file, encoding_of(file), NO_OPTIONS) as stream:
+            lines = list(islice(stream, LOOKED_AT))
+        for separator in separators_of(file):
+            rows = list(records(lines, separator))
+            names = _names([row for _, row in rows])
+            if names is not None:
+                return rows[names - 1][0] if names else 0
+    except (OSError, EOFError, UnicodeError, csv.Error, zlib.error):  # its reader says what is wrong with it
+        pass
+    return 0
 
 
-def _text(file: Path) -> TextIO:
-    """The text in any encoding in which separators are what they are in ASCII."""
-    if file.suffix.lower() == ".gz":
-        return gzip.open(file, "rt", encoding="latin-1")
-    return file.open(encoding="latin-1")
+def _names(rows: Sequence[Row]) -> int | None:
+    """The place of the names among the records, from 0; None where they are not the records of a table."""
+    kinds = [_kind(row) for row in rows]
+    found = Counter(kind for kind in kinds if kind)
+    usual = max(found, key=lambda kind: found[kind], default=())
+    alike = sum(often for kind, often in found.items() if len(kind) == len(usual))
+    if len(usual) < 2 or not any(usual) or 2 * alike <= found.total():
+        return None
+    end = kinds.index(usual)
+    while end and any(map(is_value, rows[end - 1])):  # the first samples may hold words, too
+        end -= 1
+    while end and (not kinds[end - 1] or is_line_of_units(rows[end - 1])):
+        end -= 1
+    narrow = max(len(filled(row)) for row, kind in zip(rows, kinds, strict=True) if kind == usual)
+    begin = end
+    while begin and narrow <= len(filled(rows[begin - 1])) <= len(usual) and _may_be_names(rows[begin - 1]):
+        begin -= 1
+    # a line with units that are not known states some all the same
+    named = [i for i in range(begin, end) if not any(map(states_unit, rows[i]))]
+    return named[-1] if named else begin if begin < end else None
 
 
-def _first(lines: list[str], separator: str) -> tuple[int, int]:
-    """The number of cells of the table, and its first line, from 0; cells 0 where there is no such table."""
-    rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for line in lines]
-    widths = Counter(map(len, rows))
-    if not widths:
-        return 0, 0
-    width, often = widths.most_common(1)[0]
-    first = next(i for i, row in enumerate(rows) if len(row) == width)
-    named = not any(map(is_number, rows[first])) and not is_line_of_units(rows[first])
-    return (width, first) if named and 2 * often > len(lines) else (0, 0)
+def _kind(row: Row) -> tuple[bool, ...]:
+    """For each cell whether it holds a value or nothing; empty for a blank line."""
+    return tuple(is_value(cell) or not cell.strip() for cell in row) if filled(row) else ()
+
+
+def _may_be_names(row: Row) -> bool:
+    return not any(map(is_value, row)) and all(cell.strip() for cell in filled(row)[1:])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from fmus.errors import BadInput
 from fmus.units import base_exponents, conversion
+from scenarios.experiment.readers.header import spelled
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ QUANTITIES = (
     Quantity("pressure", "Pa", ("p", "pressure", "druck")),
 )  # fmt: skip
 _BRACKET = re.compile(r"[\[(].*?[\])]")
+_SEPARATED = re.compile(r"[\W_]+")
+_CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _SPLIT = re.compile(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])")
 
 
@@ -54,6 +57,19 @@ def alike(unit: str, other: str) -> bool:
     except BadInput:
         return False
     return True
+
+
+def unit_in_name(name: str, fitting: Sequence[str]) -> str | None:
+    """The unit that ends a name, as in v_kmh or speedRpm, if it can be converted into one of these units.
+
+    Capitals that make no unit are read as small letters, as in SPEED_KMH. The word 'in' at the end means that
+    something goes in, and no inches.
+    """
+    last = [word for word in _SEPARATED.split(_BRACKET.sub(" ", name)) if word][-1:]
+    ends = [word[i:] for word in last for i in (0, *(m.start() for m in _CAPITAL.finditer(word)))]
+    units = [spelled(word) for end in ends for word in (end, end[:1].lower() + end[1:], end.lower())]
+    found = (u for u in units if not u.isdigit() and u != "in" and any(alike(u, other) for other in fitting))
+    return next(found, None)
 
 
 def known(unit: str | None) -> bool:

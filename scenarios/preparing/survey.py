@@ -14,20 +14,22 @@ from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
 from scenarios.experiment.advice import check_no_colons, read_with_advice
 from scenarios.experiment.checks import GAP, check_time, output_notes, time_notes
-from scenarios.experiment.readers.header import is_number, is_unit, spelled
+from scenarios.experiment.readers.header import is_unit, is_value, spelled
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.preparing.lines_above import lines_above
-from scenarios.preparing.quantities import words_of
+from scenarios.preparing.quantities import alike, unit_in_name
 
-TIME = re.compile(r"(^|[^a-z])(t|time|times|timestamp|zeit|temps|clock)([^a-z]|$)", re.IGNORECASE)
-TIME_UNITS = {"ms": "ms", "msec": "ms", "millis": "ms", "milliseconds": "ms", "us": "us", "usec": "us"}
+TIME = re.compile(  # a capital T is a torque or a temperature as often
+    r"(?<![A-Za-z])(t|(?i:(date|uhr|mess)?(time|zeit)(s|stamp|stempel)?|temps|clock))(?![A-Za-z])"
+)
+TIME_GUESSED = "a guess: it increases, and no column is called time"
 FEWEST = 4  # numbers that a channel needs to be one
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A channel of a record: samples x (N,), nan where there is none, and the unit that the file states."""
+    """A channel of a record: samples x (N,), nan where there is none; its unit as railfmi spells it."""
 
     name: str
     unit: str | None
@@ -49,7 +51,8 @@ class Channel:
 class Raster:
     """Channels of a file that share their times t (N,), s; begin: the date of 0 s, if the times are dates.
 
-    time_unit: of the time column, if its name tells it and the file states none; options: of the reader, with
+    time_unit: of the time column, if its name tells it and the file states none; time_guessed: whether no
+    column is called the time, so that this one was taken because it increases; options: of the reader, with
     which the file was read; left_out: a sentence for each column that holds no numbers.
     """
 
@@ -60,6 +63,7 @@ class Raster:
     remarks: tuple[str, ...]
     begin: pd.Timestamp | None = None
     time_unit: str | None = None
+    time_guessed: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
@@ -71,9 +75,10 @@ class Raster:
     @property
     def span(self) -> str:
         """Its rows, times and rate in words."""
+        guess = f", {TIME_GUESSED}" * self.time_guessed
         return (
             f"{self.file.name}: {self.t.size} rows from {self.t[0]:.9g} to {self.t[-1]:.9g} s, "
-            f"{1 / self.step:.6g} Hz, time in column '{self.time}'"
+            f"{1 / self.step:.6g} Hz, time in column '{self.time}'{guess}"
         )
 
     def longest(self) -> tuple[float, float]:
@@ -96,23 +101,24 @@ def survey(file: Path, time: str | None = None) -> list[Raster]:
         try:
             sheet = read_with_advice(file, options=options)
         except BadInput:  # several rasters, or a file that cannot be read at all
-            found = [*_rasters(file)]
+            found = [*_rasters(file, options)]
             if not found:
                 raise
             return sorted(found, key=lambda r: -len(r.channels))
         _check_names(sheet)
-        return [_raster(sheet, time_of(sheet), options)]
+        column = time_of(sheet)
+        return [_raster(sheet, column, options, column not in _called_time(sheet))]
     return [_raster(_with_time(file, time, options), time, options)]
 
 
-def _rasters(file: Path) -> Iterator[Raster]:
+def _rasters(file: Path, options: Mapping[str, Any]) -> Iterator[Raster]:
     """The rasters of a file with several, each once."""
     seen = set()
-    for name in read_with_advice(file, "", ()).known:
+    for name in read_with_advice(file, "", (), options).known:
         if not TIME.search(name):
             continue
         try:
-            raster = _raster(_with_time(file, name, {}), name, {})
+            raster = _raster(_with_time(file, name, options), name, options)
         except BadInput:  # the name alone is that of several times; with its group it comes too
             continue
         key = (raster.t.size, *raster.t[[0, -1]], *(c.name for c in raster.channels))
@@ -130,7 +136,7 @@ def _with_time(file: Path, time: str, options: Mapping[str, Any]) -> Sheet:
 
 def _check_names(sheet: Sheet) -> None:
     """Raise BadInput if numbers stand where the names of the columns belong."""
-    if sheet.known and all(map(is_number, sheet.known)):
+    if sheet.known and all(map(is_value, sheet.known)):
         raise BadInput(
             f"{sheet.file}: the line of the column names holds numbers ({', '.join(sheet.known[:3])}); write "
             "names above them, such as time,speed"
@@ -138,50 +144,54 @@ def _check_names(sheet: Sheet) -> None:
 
 
 def time_of(sheet: Sheet) -> str:
-    """The column that is the time: it increases from row to row, and its name or its unit says so."""
-    rising = [str(name) for name in sheet.cells if _rises(sheet, str(name))]
-    if not rising:
-        raise BadInput(f"{_why_no_time(sheet)}; or name another column with --time: {', '.join(sheet.known)}")
-    named = [name for name in rising if TIME.search(name)]
-    in_seconds = [n for n in rising if spelled(sheet.units.get(n, "")) in ("s", "ms", "us", "min", "h")]
-    return next(iter([*named, *in_seconds, *rising]))
+    """The column that is the time: it increases from row to row, and its name or its unit says so.
+
+    Another column that increases, a counter of rows or a distance, is taken only where none is called so.
+    Raises BadInput if there is none.
+    """
+    called = _called_time(sheet)
+    candidates = called or list(map(str, sheet.cells))
+    found = next((name for name in candidates if not _why_not_time(sheet, name)), None)
+    if found is None:
+        why = f"{sheet.file}: no column increases from row to row, so none is the time; add one"
+        why = _why_not_time(sheet, called[0]) if called else why
+        raise BadInput(f"{why}; or name another column with --time: {', '.join(sheet.known)}")
+    return found
 
 
-def _why_no_time(sheet: Sheet) -> str:
-    """Why no column is the time: what is wrong with the one that is called so, or that none increases."""
-    for column in (str(name) for name in sheet.cells if TIME.search(str(name))):
-        try:
-            check_no_colons(sheet, column)
-            t = _plain(sheet).seconds(column, "")
-            check_time(str(sheet.file), column, t, np.arange(t.size) + sheet.first, sheet.row)
-        except BadInput as error:
-            return str(error)
-    return f"{sheet.file}: no column increases from row to row, so none is the time; add one"
+def _called_time(sheet: Sheet) -> list[str]:
+    """The columns whose name says that they are the time, then those whose unit does."""
+    names = [str(name) for name in sheet.cells]
+    in_seconds = [name for name in names if alike(spelled(sheet.units.get(name, "")), "s")]
+    return list(dict.fromkeys([*filter(TIME.search, names), *in_seconds]))
 
 
-def _plain(sheet: Sheet) -> StatedUnits:
-    """The columns of a sheet without the units that it states."""
-    return StatedUnits(Sheet(sheet.file, sheet.cells, sheet.known, row=sheet.row, first=sheet.first))
-
-
-def _rises(sheet: Sheet, column: str) -> bool:
+def _why_not_time(sheet: Sheet, column: str) -> str:
+    """Why a column is not the time: it does not increase, or is in no unit of time; empty if it can be."""
     try:
-        x = _plain(sheet).seconds(column, "")
-    except BadInput:
-        return False
-    return x.size > 1 and bool(np.isfinite(x).all()) and bool(np.all(np.diff(x) > 0))
+        _seconds(StatedUnits(sheet), sheet, column)
+    except BadInput as error:
+        return str(error)
+    return ""
 
 
-def _raster(sheet: Sheet, time: str, options: Mapping[str, Any]) -> Raster:
-    check_no_colons(sheet, time)
+def _seconds(stated: StatedUnits, sheet: Sheet, column: str) -> tuple[Array, str | None]:
+    """The times (N,) s that a column holds, and their unit if only its name tells it.
+
+    Raises BadInput, with the line, where they do not increase.
+    """
+    check_no_colons(sheet, column)
+    unit = None if column in sheet.units or stated.begin(column) is not None else unit_in_name(column, ["s"])
+    t = stated.seconds(column, f"{sheet.file}: time", unit)
+    check_time(str(sheet.file), column, t, np.arange(t.size) + sheet.first, sheet.row)
+    if t.size < 2:
+        raise BadInput(f"{sheet.file}: has only {t.size} row; a record needs more")
+    return t, unit
+
+
+def _raster(sheet: Sheet, time: str, options: Mapping[str, Any], guessed: bool = False) -> Raster:
     stated = StatedUnits(sheet)
-    named = next((TIME_UNITS[w] for w in words_of(time) if w in TIME_UNITS), None)
-    unit = None if time in sheet.units or stated.begin(time) is not None else named
-    t = stated.seconds(time, f"{sheet.file}: time", unit)
-    if not (t.size > 1 and np.all(np.diff(t) > 0)):
-        raise BadInput(
-            f"{sheet.file}: column '{time}' does not increase from row to row; name another --time"
-        )
+    t, unit = _seconds(stated, sheet, time)
     found = [_channel(sheet, name) for name in map(str, sheet.cells) if name != time]
     notes = [note.sentence for note in (*stated.notes, *time_notes(sheet.file.name, t))]
     gaps = np.flatnonzero(np.diff(t) > GAP * np.median(np.diff(t)))
@@ -192,9 +202,8 @@ def _raster(sheet: Sheet, time: str, options: Mapping[str, Any]) -> Raster:
         notes.append(f"{options['skiprows']} lines above the names are left out")
     channels = tuple(c for c in found if isinstance(c, Channel))
     left_out = tuple(c for c in found if isinstance(c, str) and c)
-    return Raster(
-        sheet.file, time, t, channels, tuple(notes), stated.begin(time), unit, dict(options), left_out
-    )
+    begin = stated.begin(time)
+    return Raster(sheet.file, time, t, channels, tuple(notes), begin, unit, guessed, dict(options), left_out)
 
 
 def _channel(sheet: Sheet, name: str) -> Channel | str:
@@ -207,7 +216,7 @@ def _channel(sheet: Sheet, name: str) -> Channel | str:
         return f"not used: {error}"
     many = int(np.isfinite(x).sum())
     if many >= FEWEST:
-        return Channel(name, sheet.units.get(name), x, tuple(_remarks(sheet, name, x)))
+        return Channel(name, spelled(sheet.units.get(name, "")) or None, x, tuple(_remarks(sheet, name, x)))
     return f"not used: column '{name}' holds fewer than {FEWEST} numbers" if many else ""
 
 

@@ -7,8 +7,9 @@ from math import sqrt
 from pathlib import Path
 
 from scenarios.preparing.draft import AROUND, IDENTIFY, Draft, Signal, bounds_of, is_factor, sure, uncertain
-from scenarios.preparing.survey import Raster
+from scenarios.preparing.survey import TIME_GUESSED, Raster
 
+BY_NAME = "a guess, by the name of the column"
 CALIBRATED = 6  # parameters; with more the user has to choose
 
 
@@ -27,8 +28,7 @@ def _head(made: Draft, folder: Path) -> Iterator[str]:
     yield f"fmu = {_text(_path(made.fmu, folder))}"
     if not r.options:
         yield f"data = {_text(_path(r.file, folder))}"
-    yield f"time = {_text(r.time)}"
-    yield from _time_unit(r)
+    yield from _time(r)
     yield ""
     if r.options:
         yield "[data]"
@@ -44,9 +44,10 @@ def _head(made: Draft, folder: Path) -> Iterator[str]:
     yield f"test = [{middle!r}, {end!r}]  # the rest: errors are reported on it"
 
 
-def _time_unit(r: Raster) -> Iterator[str]:
+def _time(r: Raster) -> Iterator[str]:
+    yield f"time = {_text(r.time)}" + f"  # {TIME_GUESSED}" * r.time_guessed
     if r.time_unit:
-        yield f"time_unit = {_text(r.time_unit)}  # a guess, by the name of the column"
+        yield f"time_unit = {_text(r.time_unit)}  # {BY_NAME}"
 
 
 def _options(r: Raster) -> Iterator[str]:
@@ -62,8 +63,7 @@ def _clocks(made: Draft, folder: Path) -> Iterator[str]:
         yield f"[files.{_key(made.name(raster))}]  # {rates}"
         if raster.file != made.raster.file:
             yield f"file = {_text(_path(raster.file, folder))}"
-        yield f"time = {_text(raster.time)}"
-        yield from _time_unit(raster)
+        yield from _time(raster)
         yield from _options(raster)
         clock = made.clock(raster)
         said = (
@@ -101,11 +101,12 @@ def _signals(made: Draft) -> Iterator[str]:
         yield ""
         yield "[inputs]"
     for s in made.inputs:
-        units = [f"unit = {_text(s.unit)}"] if s.unit else []
-        units += [f"model_unit = {_text(s.model_unit)}"] if s.model_unit and s.unit else []
+        unit, guess = _unit(s)
+        units = [f"unit = {_text(unit)}"] if unit else []
+        units += [f"model_unit = {_text(s.model_unit)}"] if s.model_unit else []
         units += [f"file = {_text(made.name(s.raster))}"] if s.raster is not made.raster else []
         table = ", ".join([f"column = {_text(s.channel.name)}", *units])
-        yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}"
+        yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}" + (f"; unit is {guess}" if guess else "")
     for v in made.free_inputs:
         yield f"{_key(v.name)} = {v.start or 0.0!r}  # no column looks like it: constant at its start value"
     for s in made.outputs:
@@ -114,8 +115,9 @@ def _signals(made: Draft) -> Iterator[str]:
         yield f"column = {_text(s.channel.name)}"
         if s.raster is not made.raster:
             yield f"file = {_text(made.name(s.raster))}"
-        unit = s.unit or s.variable.unit or s.model_unit or "1"
-        yield f"unit = {_text(unit)}" + ("" if s.unit else f"  # a guess: the record states {_other(s)}")
+        found, guess = _unit(s)
+        unit = found or "1"
+        yield f"unit = {_text(unit)}" + (f"  # {guess}" if guess else "")
         if not s.variable.unit:
             yield f"model_unit = {_text(s.model_unit or unit)}  # a guess: the FMU states no unit"
         thinned = sqrt(min(1.0, s.raster.step / made.raster.step))  # what a filter leaves of white noise
@@ -125,8 +127,12 @@ def _signals(made: Draft) -> Iterator[str]:
         yield f"# columns that are not used: {', '.join(made.unused)}"
 
 
-def _other(s: Signal) -> str:
-    return f"{_text(s.channel.unit)}, which is not known" if s.channel.unit else "none"
+def _unit(s: Signal) -> tuple[str | None, str]:
+    """The unit that the numbers of a column are taken in, and how it was guessed, empty if it is stated."""
+    if s.unit:
+        return s.unit, BY_NAME * s.by_name
+    other = f"{_text(s.channel.unit)}, which is not known" if s.channel.unit else "none"
+    return s.variable.unit or s.model_unit, f"a guess: the record states {other}"
 
 
 def _why(s: Signal) -> str:

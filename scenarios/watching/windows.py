@@ -17,7 +17,7 @@ from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.reader import NO_OPTIONS
 from scenarios.experiment.readers.sheet import Sheet
-from scenarios.experiment.readers.units import StatedUnits
+from scenarios.experiment.readers.units import StatedUnits, iso_dates, overruled
 from scenarios.experiment.record import LARGEST
 
 
@@ -123,9 +123,11 @@ class Reading:
 
     def _check_units(self, sheet: Sheet) -> None:
         """Raise BadInput if a window states another unit than the record that the filter was set up with."""
-        for c in self._conversions.values():
+        inputs = self._e.input_columns
+        for name, c in self._conversions.items():
             stated = spelled(sheet.units.get(c.column, ""))
-            if not stated or stated == c.unit:
+            declared = name not in inputs or inputs[name].unit is not None
+            if not stated or stated == c.unit or (declared and overruled(c.column, stated, str(c.unit))):
                 continue
             where = f"{sheet.file}: column '{c.column}'"
             if c.unit is None:
@@ -164,7 +166,7 @@ def _seconds(sheet: Sheet, e: Experiment) -> Array:
     cells = sheet.cells[e.time]
     dates = cells
     if pd.api.types.is_string_dtype(cells):
-        dates = pd.to_datetime(cells, errors="coerce", format="ISO8601")
+        dates = iso_dates(cells, "coerce", utc=True)
         if dates.isna().all():
             dates = cells
     if dates.dtype.kind == "M":

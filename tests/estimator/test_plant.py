@@ -32,10 +32,10 @@ class Counted(Fmu):
 
     made = 0
 
-    def simulate_rows(self, t, inputs, outputs, starts, joined=False):
+    def simulate_rows(self, t, inputs, outputs, starts, joined=False, every=1):
         """See Fmu."""
         self.made += len(starts)
-        return super().simulate_rows(t, inputs, outputs, starts, joined)
+        return super().simulate_rows(t, inputs, outputs, starts, joined, every)
 
 
 class OneByOne(Counted):
@@ -43,7 +43,7 @@ class OneByOne(Counted):
 
     at_once = 1
 
-    def simulate_rows(self, t, inputs, outputs, starts, joined=False):
+    def simulate_rows(self, t, inputs, outputs, starts, joined=False, every=1):
         """See Fmu."""
         return
 

@@ -107,6 +107,15 @@ def test_a_row_does_not_depend_on_its_neighbours(driven, seed, k, n):
         assert_array_equal(run(driven, n, [start], True, ("x", "q", "x_rate"))[1][0], y)
 
 
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 20), every=st.integers(1, 9))
+def test_of_every_so_many_samples_one_is_read_with_the_same_bits(driven, seed, n, every):
+    decays = 10 ** np.random.default_rng(seed).uniform(0, 4, 3)
+    t, outputs = SAMPLE * np.arange(n * every + 1), ("x", "q", "x_rate")
+    asked = t, {"u": np.sin(OMEGA * t)}, outputs, [{"decay": float(d)} for d in decays], True
+    assert_array_equal(driven.simulate_rows(*asked, every=every), driven.simulate_rows(*asked)[:, ::every])
+
+
 def test_an_fmu_to_be_handed_over_makes_the_steps_that_it_is_asked_for():
     with Fmu(native("vehicle7dof")) as fmu:
         assert not fmu.joins

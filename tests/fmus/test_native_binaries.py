@@ -18,7 +18,7 @@ from fmus.export.builders.native.compilers import PLATFORMS, chosen, host
 from fmus.export.builders.native.universal import universal
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
-from fmus.host.rows import NAME
+from fmus.host.rows import AT_ONCE, NAME
 from fmus.models import MODELS
 from fmus.variables import (
     Input,
@@ -81,7 +81,7 @@ def needs_only_libc_of_old(path):
 
 def shows_only_the_interface(path, fmi):
     symbols = re.findall(r"(?:GLOBAL|WEAK)\s+DEFAULT\s+\d+ (\w+)$", readelf("--dyn-syms", path), re.MULTILINE)
-    assert set(symbols) == {*functions(fmi), NAME, f"{NAME}_at_once"}
+    assert set(symbols) == {*functions(fmi), NAME, AT_ONCE}
 
 
 @ELF
@@ -349,7 +349,7 @@ def test_one_machine_builds_for_all_platforms(fmi, tmp_path):
             assert {s.name.decode() for s in read.DIRECTORY_ENTRY_EXPORT.symbols} == {
                 *functions(fmi),
                 NAME,
-                f"{NAME}_at_once",
+                AT_ONCE,
             }
             needed = {entry.dll.decode().lower() for entry in read.DIRECTORY_ENTRY_IMPORT}
             assert all(n == "kernel32.dll" or n.startswith("api-ms-win-crt-") for n in needed), needed

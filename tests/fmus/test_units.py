@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +12,9 @@ from numpy.testing import assert_allclose
 from fmus.errors import BadInput
 from fmus.units import (
     COMMON,
+    SPELLINGS,
+    UNITS,
+    another_kind,
     base_exponents,
     conversion,
     to_si,
@@ -53,6 +57,80 @@ def test_contract_units_in_si(unit, exponents, factor):
     assert base.exponents == exponents
     assert_allclose(base.factor, factor, rtol=1e-14)
     assert base.offset == 0
+
+
+# factors to SI, and prefixes, by BIPM, The International System of Units, and NIST SP 811 (customary units)
+SI = {
+    "m": 1, "s": 1, "g": 1e-3, "A": 1, "K": 1, "mol": 1, "cd": 1, "rad": 1, "Hz": 1, "N": 1, "Pa": 1, "J": 1,
+    "W": 1, "V": 1, "F": 1, "Ohm": 1, "Ω": 1, "S": 1, "Wb": 1, "T": 1, "H": 1, "bar": 1e5, "L": 1e-3,
+    "l": 1e-3, "%": 1e-2, "deg": math.pi / 180, "°": math.pi / 180, "turn": 2 * math.pi, "rpm": math.pi / 30,
+    "min": 60, "h": 3600, "t": 1e3, "degC": 1, "g_0": 9.80665, "in": 0.0254, "ft": 0.3048, "mph": 0.44704,
+    "lb": 0.45359237, "lbf": 4.4482216152605, "psi": 6894.757293168, "degF": 5 / 9,
+}  # fmt: skip
+PREFIXES = {
+    "p": 1e-12, "n": 1e-9, "u": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "da": 1e1, "h": 1e2,
+    "k": 1e3, "M": 1e6, "G": 1e9,
+}  # fmt: skip
+IN_USE = (
+    "kN MN daN mN mm km µm cm nm kg mg t GPa MPa kPa hPa mbar bar kW MW mW mV kV µV mA kA kHz MHz GHz ms µs "
+    "ns mrad µrad mmol kmol kOhm MOhm mOhm mT µT µF nF pF mH µH mS kJ MJ mK l L ml mL"
+)
+
+
+PINT = pint.UnitRegistry()
+WORDS = "Grad Gs Gm Mm Ms Ks ks MA GT Gg cs ds cg dg MRad Mrad krad MT kt mt mh mmin cN/s.Grad"
+
+
+@given(st.sampled_from(UNITS))
+def test_every_unit_has_the_factor_of_the_tables_and_of_pint(unit):
+    whole = (f * SI[unit.removeprefix(p)] for p, f in PREFIXES.items() if unit.removeprefix(p) in SI)
+    found = base_exponents(unit).factor
+    assert_allclose(found, SI.get(unit) or next(whole), rtol=1e-12)
+    zero, one = PINT.Quantity(np.array([0.0, 1.0]), unit.replace("Ohm", "ohm")).to_base_units().magnitude
+    assert_allclose(found, one - zero, rtol=1e-12)
+
+
+@pytest.mark.parametrize("unit", IN_USE.split())
+def test_what_engineers_write_is_known(unit):
+    assert base_exponents(unit).factor > 0
+
+
+@pytest.mark.parametrize("word", WORDS.split())
+def test_no_prefix_makes_a_unit_of_a_word(word):
+    """A prefix that nobody writes before a unit is a letter of a word, such as the German 'Grad'."""
+    with pytest.raises(BadInput, match="is not known"):
+        base_exponents(word)
+
+
+@pytest.mark.parametrize(
+    ("unit", "plain"),
+    [
+        ("µm", "um"), ("μm", "um"), ("N⋅m", "N.m"), ("N·m", "N.m"), ("m·s⁻¹", "m/s"), ("min⁻¹", "1/min"),
+        ("rad/s²", "rad/s2"), ("kΩ", "kOhm"), ("k\u2126", "kOhm"), ("㎜", "mm"), ("㎨", "m/s2"),
+        ("s\u22121", "1/s"), ("l/min", "L/min"),
+    ],
+)  # fmt: skip
+def test_characters_that_look_alike_are_alike(unit, plain):
+    assert conversion(unit, plain, "here") == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "word", sorted({*SPELLINGS} - {"1/min", "min-1"})
+)  # that are known but count no turns
+def test_a_usual_word_is_offered_what_it_means(word):
+    with pytest.raises(BadInput, match=f"did you mean '{SPELLINGS[word]}'"):
+        base_exponents(word)
+    assert base_exponents(SPELLINGS[word]).factor > 0
+
+
+def test_kinds_are_apart_whatever_the_radian_does():
+    assert another_kind("g", "m/s2")
+    assert another_kind("min", "rpm")
+    assert another_kind("1", "m")
+    assert not another_kind("kN", "N")
+    assert not another_kind("Hz", "rad/s")
+    assert not another_kind("Kästchen", "m")
+    assert not another_kind("m", "Kästchen")
 
 
 def test_temperature_has_an_offset():

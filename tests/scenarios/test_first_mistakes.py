@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from estimator.kept import Kept
 from fmus.errors import BadInput
 from scenarios.cli.app import run_safely
+from scenarios.experiment.checks import check_time
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.readers import read_sheet
 from scenarios.preparing.draft import draft
@@ -123,6 +124,60 @@ def test_a_time_that_does_not_increase_is_shown_where(tmp_path, change, words):
     with pytest.raises(BadInput, match=r"or name another column with --time: time, voltage") as raised:
         survey(edited(tmp_path, change))
     assert all(word in str(raised.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    ("names", "cells", "words"),
+    [
+        ("Nr,Zeit,v", "{i},noon {i},{x}", "line 2: column 'Zeit' holds 'noon 0'"),
+        ("sample,time,v", "{i},{half},{x}", "line 3: time column 'time' goes from 0 to 0 s"),
+        ("Weg,Uhrzeit,v", "{i},12:00:{i:02},{x}", "line 2: time column 'Uhrzeit' holds '12:00:00', a time"),
+        ("Nr,lap [s],v", "{i},{x},{x}", "line 9: time column 'lap [s]' goes from"),
+        ("time [S],n,v", "{i},{i},{x}", "unit 'S' does not fit 's'"),
+        ("Weg [m],t [degC],v", "{i},{i},{x}", "unit 'degC' does not fit 's'"),
+    ],
+)
+def test_no_other_column_stands_in_for_one_that_is_called_time(tmp_path, names, cells, words):
+    file = tmp_path / "log.csv"
+    rows = [cells.format(i=i, half=i // 2, x=i % 7) for i in range(40)]
+    file.write_text("\n".join([names, *rows]) + "\n")
+    with pytest.raises(BadInput, match="; or name another column with --time: ") as raised:
+        survey(file)
+    assert words in str(raised.value)
+
+
+def test_a_column_that_no_one_calls_time_is_a_guess_and_has_no_other_unit(tmp_path):
+    file = log(
+        tmp_path, "", names="voltage,T_load,speed,current", t=np.sin(T), u=np.cos(T), n=np.arange(T.size)
+    )
+    lines, text, e = told(tmp_path, file)
+    assert lines[0].endswith("time in column 'speed', a guess: it increases, and no column is called time")
+    assert 'time = "speed"  # a guess: it increases, and no column is called time\n' in text
+    assert e.time == "speed"
+    [named] = survey(file, "speed")
+    assert not named.time_guessed
+    [called] = survey(log(tmp_path))
+    assert not called.time_guessed
+    with pytest.raises(BadInput, match="no column increases"):
+        survey(log(tmp_path, "V,N.m,rpm,A", names="a,b,c,d", t=np.sin(T), u=np.cos(T), n=np.arange(T.size)))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("TIME_MS", "ms"), ("t_min", "min"), ("timeUs", "us"), ("Zeit_h", "h"), ("t", None), ("t_0", None)],
+)
+def test_the_unit_at_the_end_of_the_name_of_the_time(tmp_path, name, unit):
+    [raster] = survey(log(tmp_path, "", names=f"{name},voltage,speed,current"))
+    assert (raster.time, raster.time_unit) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("t", "way"),
+    [([0.0, 0.1, 0.1], "write them with more digits, or drop"), ([0.0, 0.1, 0.0], "cut the file")],
+)
+def test_times_that_do_not_increase_are_refused_with_the_way_out(t, way):
+    with pytest.raises(BadInput, match=rf"a\.csv line 4: .* must increase from row to row: .*{way}"):
+        check_time("a.csv", "time", np.array(t), np.arange(2, 5))
 
 
 # --- columns, units and names

@@ -11,15 +11,17 @@ from hypothesis import strategies as st
 from estimator.record import Record, Run
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription, FmuVariable
+from fmus.units import UNITS
 from scenarios.cli.app import run_safely
 from scenarios.cli.console import interrupted, say_notices, will_write
 from scenarios.experiment.experiment import load_experiment
 from scenarios.output import WRITING, replaced
 from scenarios.preparing.draft import draft, with_column
-from scenarios.preparing.initialising import init
+from scenarios.preparing.initialising import Initialised, init
 from scenarios.preparing.inspecting import bandwidth, inspect
 from scenarios.preparing.matching import SURE, likeness, matches
 from scenarios.preparing.ports import port_remarks
+from scenarios.preparing.quantities import unit_in_name
 from scenarios.preparing.survey import Channel, survey
 from scenarios.preparing.text import toml_of
 from scenarios.preparing.trial import Trial, dry_run, duration, factor_of
@@ -83,12 +85,21 @@ def test_a_survey_finds_time_rate_units_and_gaps(tmp_path):
     assert raster.longest() == pytest.approx((1234.5, 1239.47))
 
 
+def test_units_are_spelled_alike_whatever_the_format(tmp_path):
+    table = pd.DataFrame({"time": T, "n": np.sin(T), "phi": np.cos(T)})
+    file = tmp_path / "a.csv"
+    table.to_csv(file, index=False)
+    (tmp_path / "a.csv.units.json").write_text('{"n": "U/min", "phi": "[Grad]"}')
+    [raster] = survey(file)
+    assert [c.unit for c in raster.channels] == ["rpm", "deg"]
+
+
 def test_without_a_time_a_survey_says_so(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text("a,b\n1,2\n0,3\n2,1\n")
     with pytest.raises(BadInput, match=r"no column increases from row to row.*--time"):
         survey(file)
-    with pytest.raises(BadInput, match="column 'a' does not increase"):
+    with pytest.raises(BadInput, match="line 3: time column 'a' goes from 1 to 0 s"):
         survey(file, "a")
     with pytest.raises(BadInput, match="has no time column 'c'"):
         survey(file, "c")
@@ -165,6 +176,74 @@ def test_a_draft_guesses_units_ports_split_and_bounds(tmp_path):
     assert e.calibrate == {"R": (0.96, 1.3), "k": (-0.06, -0.04)}  # within the FMU's limits; not around 0
     assert e.split.identify == pytest.approx((1234.5, 1240.99), abs=0.01)
     assert e.split.test[1] <= 1234.5 + T[-1] + 1e-9
+
+
+UNITS_IN_NAMES = [
+    ("v_kmh", "m/s", "km/h"),
+    ("omega_rpm", "rad/s", "rpm"),
+    ("speedRpm", "rad/s", "rpm"),
+    ("SPEED_KMH", "m/s", "km/h"),
+    ("phi deg", "rad", "deg"),
+    ("Phi_Grad", "rad", "deg"),
+    ("i_mA", "A", "mA"),
+    ("force_KN", "N", "kN"),
+    ("x_µm", "m", "µm"),
+    ("p/mbar", "Pa", "mbar"),
+    ("rpm", "rad/s", "rpm"),
+    ("temp_degC", "K", "degC"),
+    ("v_s", "m/s", None),  # of another kind
+    ("phi_1", "rad", None),
+    ("x_in", "m", None),  # what goes in
+    ("x", "m", None),
+    ("speed", "m/s", None),
+    ("[mm]", "m", None),
+    ("", "m", None),
+]
+
+
+@pytest.mark.parametrize(("name", "of", "unit"), UNITS_IN_NAMES)
+def test_the_unit_at_the_end_of_a_name(name, of, unit):
+    assert unit_in_name(name, [of]) == unit
+
+
+@given(st.sampled_from([u for u in UNITS if u.isalnum() and u != "in"]), st.sampled_from(["x_", "x ", "F/"]))
+def test_every_unit_may_end_a_name(unit, before):
+    assert unit_in_name(before + unit, [unit]) == unit
+
+
+def test_a_unit_in_the_name_of_a_column_is_a_guess(tmp_path):
+    """What the record states counts more, and so does a name that the FMU's variable has itself."""
+    motor = fmu(
+        variable("v", "input", "m/s", 0.0), variable("omega", unit="rad/s"), variable("x_km", unit="m")
+    )
+    made = drafted(tmp_path, motor, text_of_units="", names="time,v_kmh,omega_rpm,x_km")
+    assert {s.variable.name: s.unit for s in made.signals} == {"v": "km/h", "omega": "rpm", "x_km": None}
+    text = toml_of(made, tmp_path)
+    assert 'v = {column = "v_kmh", unit = "km/h"}' in text
+    assert text.count("a guess, by the name of the column") == 2
+    (tmp_path / "experiment.toml").write_text(text)
+    e = load_experiment(tmp_path / "experiment.toml")
+    assert (e.input_columns["v"].unit, e.outputs["omega"].unit) == ("km/h", "rpm")
+    assert any("km/h (guess)" in line for line in Initialised(tmp_path, made).lines())
+    stated = drafted(tmp_path, motor, text_of_units="s,m/s,rad/s,m", names="time,v_kmh,omega_rpm,x_km")
+    assert {s.variable.name: s.unit for s in stated.signals} == {"v": "m/s", "omega": "rad/s", "x_km": "m"}
+
+
+def test_a_unit_in_a_name_tells_what_an_fmu_without_units_may_have(tmp_path):
+    made = drafted(tmp_path, text_of_units="", names="time,voltage_mV,speed_rpm,current_A")
+    assert {s.variable.name: (s.unit, s.model_unit) for s in made.signals} == {
+        "u": ("mV", "V"), "omega": ("rpm", "rad/s"), "i": ("A", "A"),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("units", "said"), [("", "none"), ("s,furlong,furlong,mA", '"furlong", which is not known')]
+)
+def test_a_column_without_a_unit_is_told_what_it_is_taken_in(tmp_path, units, said):
+    motor = fmu(variable("v", "input", "m/s", 0.0), variable("omega", unit="rad/s"))
+    text = toml_of(drafted(tmp_path, motor, text_of_units=units, names="time,v,omega,i"), tmp_path)
+    assert 'v = {column = "v", unit = "m/s"}  # sure (100%); FMU variable in m/s; unit is a guess' in text
+    assert text.count(f"a guess: the record states {said}") == 2
 
 
 def test_a_port_takes_the_displacement_that_the_fmu_gives(tmp_path):

@@ -3,6 +3,7 @@
 import gzip
 import inspect
 import json
+import re
 import sys
 from dataclasses import replace
 from functools import partial
@@ -21,11 +22,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from estimator.record import Record
 from fmus.errors import BadInput
 from fmus.host.master.recording import Recording
+from fmus.units import base_exponents
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.readers import READERS, read_sheet
+from scenarios.experiment.readers.header import units_of
 from scenarios.experiment.readers.layout import layout_of
 from scenarios.experiment.readers.mat import Mat
 from scenarios.experiment.readers.sheet import Sheet
+from scenarios.experiment.readers.units import StatedUnits
 from scenarios.experiment.record import load_record
 from tests.helpers.experiment_files import (
     GOOD,
@@ -174,6 +178,10 @@ WRITERS = {
     "mdf 4": (write_mdf, "data.mf4"),
     "mdf 3": (write_mdf3, "data.mdf"),
 }
+BEHIND = (  # a name in brackets, as people write it
+    "Grad Gs Mm MA Ms Gm Max Min max min Soll Ist soll ist links rechts L R l r ges abs rel raw roh cal MW "
+    "mean Mittel std Std St kn KN Mg mg Masse Mol Gas Tag Tage Jahr day h t T in out ft Mess Dach Pass Mast"
+)
 BLANKS = "txt, mark"  # blanks between the columns, so that each needs a unit in the line of units
 WITH_UNITS = [kind for kind in WRITERS if not kind.startswith("mat") and kind != BLANKS]
 every_kind = pytest.mark.parametrize("kind", WRITERS)
@@ -249,7 +257,7 @@ def test_a_time_in_milliseconds_is_converted(tmp_path, kind):
     ("column", "unit", "words"),
     [
         ("n_wheel", "rad/s", '[outputs.omega_w] unit = "rpm", but'),
-        ("n_wheel", "m", "write unit = \"m\", or correct the file"),
+        ("n_wheel", "Hz", "write unit = \"Hz\", or correct the file"),
         ("omega", "deg/s", "states '(deg/s)/s' for it"),
         ("torque", "m", "unit 'm' does not fit 'N.m'"),
     ],
@@ -259,6 +267,61 @@ def test_units_that_contradict_are_refused(tmp_path, kind, column, unit, words):
     with pytest.raises(BadInput) as refused:
         load(file)
     assert_one_clear_line(refused, file, words)
+
+
+@pytest.mark.parametrize(
+    ("column", "word", "declared", "said"),
+    [
+        ("n (min)", "min", "rpm", ["'min', which is of another kind; it is taken as rpm, as declared"]),
+        ("n", "Kästchen", "rpm", ["'Kästchen', which is not known; it is taken as rpm, as declared"]),
+        ("acc", "g", "g_0", []),
+        ("time", "S", "s", []),
+    ],
+)
+def test_a_word_that_need_not_be_the_unit_does_not_outdo_the_declared_one(column, word, declared, said):
+    """A minimum, an acceleration in g, seconds: who declares the unit knows what the word means."""
+    stated = StatedUnits(Sheet(Path("a.csv"), pd.DataFrame({column: [0.0]}), (column,), {column: word}))
+    stated.check(column, 0, declared, "[outputs.y]")
+    assert [n.sentence.partition("unit ")[2] for n in stated.notes] == said
+
+
+@pytest.mark.parametrize(
+    ("word", "declared", "way"),
+    [
+        ("m", "rpm", "states 'm' for it; name another column than 'x'"),
+        ("kN", "N", 'write unit = "kN"'),
+        ("g", "m/s2", 'write unit = "g_0"'),
+    ],
+)
+def test_a_unit_of_the_file_that_contradicts_is_refused_with_a_way_out_that_works(word, declared, way):
+    stated = StatedUnits(Sheet(Path("a.csv"), pd.DataFrame({"x": [0.0]}), ("x",), {"x": word}))
+    with pytest.raises(BadInput, match=re.escape(way)):
+        stated.check("x", 0, declared, "[outputs.y]")
+
+
+def test_the_time_may_be_declared_in_seconds_that_the_file_writes_as_siemens(tmp_path):
+    file = experiment(tmp_path, "csv", units={"time": "S"})
+    with pytest.raises(BadInput, match=r"unit 'S' does not fit 's'; .*declare it: .*time_unit"):
+        load(file)
+    file.write_text('time_unit = "s"\n' + file.read_text())
+    assert load(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("q[1]", None), ("q(12)", None), ("q [1]", "1"), ("phi [Grad]", "deg"), ("w (Grad/s)", "deg/s"),
+        ("x [μm]", "μm"), ("Q [l/min]", "l/min"), ("n (mean)", None), ("v [Gs]", None), ("a[m/s2]", "m/s2"),
+    ],
+)  # fmt: skip
+def test_what_stands_in_brackets(name, unit):
+    assert units_of([name]) == ({name: unit} if unit else {})
+
+
+@given(st.sampled_from(BEHIND.split()), st.sampled_from(["x [{}]", "x ({})", "x({})"]))
+def test_no_word_in_brackets_is_a_huge_unit(word, name):
+    for unit in units_of([name.format(word)]).values():
+        assert base_exponents(unit).factor <= 1e6  # MW, which is a German mean, too
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet", "mdf 4"])

@@ -7,8 +7,10 @@ import sys
 import tomllib
 import zipfile
 from importlib.metadata import distributions
+from shutil import which
 
 import numpy as np
+import pandas as pd
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd, read_ssv
@@ -335,6 +337,18 @@ def test_libcosim_runs_it_with_the_step_that_it_names(ride, tmp_path):
     agree(told("ssp_libcosim.py", tmp_path / "unpacked", 500, *MOTION), ours(ride, tmp_path)[1:])
 
 
+def test_omsimulator_runs_it(ride, tmp_path):
+    """Its rows begin at time 0; its clock and ours differ in the last bits."""
+    program = which("OMSimulator") or pytest.skip("OMSimulator is not on the path; its authors publish it")
+    options = ["--stopTime=0.5", "--intervals=500", "--resultFile=found.csv", "--stripRoot=true"]
+    done = subprocess.run(
+        [program, *options, ride], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout[-2000:]
+    found = pd.read_csv(tmp_path / "found.csv").drop_duplicates("time", keep="last")
+    agree(found[MOTION].to_numpy(), ours(ride, tmp_path))
+
+
 def test_fmpy_runs_it(tmp_path):
     """FMPy's first step knows no connection, so the rail rises later; its rows are a step early."""
     text = re.sub(
@@ -360,7 +374,7 @@ def test_other_tools_start_from_the_scenario_even_where_they_read_no_values(loop
 def test_the_source_alone_drives_it_too(ride, tmp_path):
     """Without our notes a package is FMUs and connections alone; these run as in any other tool."""
     bare = repacked(ride, tmp_path / "bare.ssp", lambda n, d: None if n.startswith("extra/") else (n, d))
-    notes = r"<ssd:Annotations>\s*<ssc:Annotation type=\"org.railfmi\">.*?</ssd:Annotations>"
+    notes = r"<ssc:Annotation type=\"org.railfmi\">.*?</ssc:Annotation>"
     bare = edited(bare, tmp_path / "barer.ssp", notes, "")
     file = import_ssp(bare, tmp_path / "back")
     table = tomllib.loads(file.read_text(encoding="utf-8"))

@@ -333,8 +333,18 @@ def test_a_window_in_another_unit_is_refused(rig, tmp_path):
         Reading(rig.e, rig.record.conversions, ()).read("w", file)
 
 
-def test_dates_count_from_1970_so_that_windows_follow_one_another(rig, tmp_path):
+def test_a_word_of_the_files_of_a_stream_does_not_outdo_the_declared_unit(rig, tmp_path):
+    file = tmp_path / "w.csv"
+    rig.data.iloc[:50].to_csv(file, index=False)
+    plain = Reading(rig.e, rig.record.conversions, ()).read("w", file)
+    (tmp_path / "w.csv.units.json").write_text('{"omega_w": "Kästchen"}')
+    assert_array_equal(Reading(rig.e, rig.record.conversions, ()).read("w", file).rows.y, plain.rows.y)
+
+
+@pytest.mark.parametrize("sign", [".", ","])
+def test_dates_count_from_1970_so_that_windows_follow_one_another(rig, tmp_path, sign):
     dates = pd.to_datetime("2026-01-02T03:04:05") + pd.to_timedelta(rig.data["time"], unit="s")
+    dates = dates.dt.strftime("%Y-%m-%dT%H:%M:%S.%f").str.replace(".", sign)
     found = [
         Reading(rig.e, rig.record.conversions, ()).read(f.name, f)
         for f in write_windows(tmp_path, rig.data.assign(time=dates), [800])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
@@ -31,6 +32,9 @@ LITTLE = 1e-4  # relative reduction with new derivatives, below which the secant
 
 
 PIECE = 4000  # samples that are decomposed at once
+
+
+DEPENDENT = 1e-4  # length of a column beyond those before it, below which products lose half of its digits
 
 
 SLIGHT = 0.1  # standard errors: smaller shifts are ignored
@@ -74,8 +78,10 @@ def _alone(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -
 
 def _limited(problem: Problem, residual: Array, weighting: Weighting) -> Array:
     found = weighting.of(residual, problem.record.stretches("fit")).ravel()
-    np.clip(found, -REFUSED, REFUSED, out=found)
-    return set_aside(np.nan_to_num(found, copy=False, nan=REFUSED))
+    if not (found.max(initial=0.0) <= REFUSED and found.min(initial=0.0) >= -REFUSED):  # also where it is nan
+        np.clip(found, -REFUSED, REFUSED, out=found)
+        np.nan_to_num(found, copy=False, nan=REFUSED)
+    return set_aside(found)
 
 
 def fit(
@@ -173,15 +179,30 @@ def compressed(residual: Function, jacobian: Function, x: Array) -> tuple[Functi
         return np.append(np.linalg.norm(residual(at)), np.zeros(len(x)))
 
     def turned(at: Array) -> Array:
-        r, j = residual(at), jacobian(at)
-        R = np.zeros((len(x) + 1,) * 2)
-        for piece in (
-            slice(i, i + PIECE) for i in range(0, len(r), PIECE)
-        ):  # each fits into the processor's cache
-            R = np.asarray(np.linalg.qr(np.vstack([R, np.column_stack([r[piece], j[piece]])]), mode="r"))
-        return np.asarray(np.copysign(1.0, R[0, 0]) * R[:, 1:])
+        return triangle(residual(at), jacobian(at))[:, 1:]
 
     return length, x, turned
+
+
+def triangle(r: Array, j: Array) -> Array:
+    """The triangular factor R (n + 1, n + 1) of a residual (m,) and its Jacobian (m, n), R[0, 0] >= 0.
+
+    It comes from their products with each other, in a fifth of the time of a decomposition of all samples.
+    The products lose the digits of columns that nearly depend on each other; then the samples are decomposed.
+    """
+    pieces = [slice(i, i + PIECE) for i in range(0, len(r), PIECE)]  # each fits into the processor's cache
+    some = (np.column_stack([r[piece], j[piece]]) for piece in pieces)
+    gram = sum((a.T @ a for a in some), np.zeros((j.shape[1] + 1,) * 2))
+    size = np.sqrt(np.diag(gram))
+    if size.all():
+        with suppress(np.linalg.LinAlgError):
+            root = np.linalg.cholesky(gram / np.outer(size, size))
+            if np.diag(root).min() > DEPENDENT:
+                return np.asarray(root.T * size)
+    R = np.zeros(gram.shape)
+    for piece in pieces:
+        R = np.asarray(np.linalg.qr(np.vstack([R, np.column_stack([r[piece], j[piece]])]), mode="r"))
+    return np.asarray(np.copysign(1.0, R[0, 0]) * R)
 
 
 def _middle(x: Array, jacobian: Array, scale: Array, low: Array, high: Array) -> Array:

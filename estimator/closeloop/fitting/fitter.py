@@ -63,17 +63,24 @@ class Fitter:
         found = started.fitted(promises, BRIEF, others, base.columns if known else None)
         return [replace(h, fit=h.fit.extended(base, states)) for h in found]
 
-    def to_the_end(self, brief: Sequence[Hypothesis], finalists: int | None = None) -> list[Hypothesis]:
-        """Full fits of the finalists among brief fits, and all other brief fits unchanged; best first."""
+    def to_the_end(
+        self, brief: Sequence[Hypothesis], finalists: int | None = None, least: float = np.inf
+    ) -> list[Hypothesis]:
+        """Full fits of the finalists among brief fits, and all other brief fits unchanged; best first.
+
+        least: the least sum of squares of hypotheses that were fitted before. What is no rival of these, or
+        of the first finalists, is not continued.
+        """
         limits, base = self.baseline.policy.search, self.baseline.hypothesis
         limit = min([limits.worth_a_fit * cost(base), *(limits.hopeless * cost(h) for h in brief)])
         hopeful = [h for h in brief if cost(h) < limit][: finalists or limits.finalists]
         done: list[Hypothesis] = []
         for part in (hopeful[: limits.first_finalists], hopeful[limits.first_finalists :]):
+            least = min([least, *map(cost, done)])
             again = [
                 Promise(h.candidates, 0.0, {**base.fit.theta, **h.fit.theta})
                 for h in part
-                if not done or cost(h) < limits.rival * cost(done[0])
+                if cost(h) < limits.rival * least
             ]
             done = best_by_label([*done, *self.finished(again, guess=base.fit.columns)])
         keys = {h.key for h in done}

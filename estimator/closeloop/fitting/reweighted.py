@@ -72,11 +72,12 @@ def _calibrated_again(problem: Problem, base: Hypothesis, weighting: Weighting) 
 
 
 def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Weighting) -> list[Hypothesis]:
-    """All hypotheses in the fitter's units, sorted by sum of squares; the leading ones are fitted again."""
-    baseline = fitter.baseline
+    """All hypotheses in the fitter's units, sorted by sum of squares; the best and its rivals refitted."""
+    baseline, limits = fitter.baseline, fitter.baseline.policy.search
     stretches = baseline.problem.record.stretches("fit")
     moved = best_by_label(rescaled(found, before, baseline.noise.weighting, stretches))
-    leading = [h for h in moved if h.candidates][: fitter.baseline.policy.search.reweighted]
+    leading = [h for h in moved if h.candidates][: limits.reweighted]
+    leading = [h for h in leading if cost(h) < limits.rival * cost(leading[0])]
     if not leading:
         return moved
     return best_by_label([*moved, *fitter.finished(from_there(leading), leading[0].others)])

@@ -83,16 +83,12 @@ class Fit:
             self.converged,
         )
 
-    @property
+    @cached_property
     def inflation(self) -> Array:
         """Variance of each value over its variance for white residuals, (n,), at least 1."""
         scale, jacobian = np.array([u.scale for u in self.unknowns]), self.jacobian
         width = np.array([u.high - u.low for u in self.unknowns])
-        white, as_they_are = (
-            np.diag(sandwich(r, jacobian, scale, width))
-            for r in (np.zeros_like(self.residual), self.residual)
-        )
-        return np.asarray(np.maximum(as_they_are / np.maximum(white, 1e-300), 1.0))
+        return _inflation(self.residual, jacobian, scale, _inverse(jacobian, scale, width)[0])
 
     @property
     def std(self) -> dict[str, float]:
@@ -149,10 +145,15 @@ def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Ar
     WIDE scales, so that an unknown without influence gets a large standard error.
     """
     inverse, _ = _inverse(jacobian, scale, width)
-    pieces = zip(*(np.array_split(v, BLOCKS) for v in (residual, jacobian)), strict=True)
-    scores = np.array([(j * scale).T @ r for r, j in pieces])
-    whole = scores.sum(axis=0)
-    robust = inverse @ (scores.T @ scores + np.outer(whole, whole)) @ inverse
-    grown = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(inverse), 1e-300), 1.0))
+    grown = np.sqrt(_inflation(residual, jacobian, scale, inverse))
     covariance: Array = inverse * np.outer(grown, grown) * np.outer(scale, scale)
     return covariance
+
+
+def _inflation(residual: Array, jacobian: Array, scale: Array, inverse: Array) -> Array:
+    """Variance of each value over that for white residuals, (n,), at least 1; see `sandwich`."""
+    pieces = zip(*(np.array_split(v, BLOCKS) for v in (residual, jacobian)), strict=True)
+    scores = np.array([j.T @ r for r, j in pieces]) * scale
+    whole = scores.sum(axis=0)
+    robust = inverse @ (scores.T @ scores + np.outer(whole, whole)) @ inverse
+    return np.asarray(np.maximum(np.diag(robust) / np.maximum(np.diag(inverse), 1e-300), 1.0))

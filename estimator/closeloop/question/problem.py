@@ -140,7 +140,7 @@ class Problem:
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs on the part to identify, (m, n_y)."""
-        return np.concatenate([self._residual(run, theta)[run.fit] for run in self._identified])
+        return _one([_fitted(run, self._residual(run, theta)) for run in self._identified])
 
     def identify_residuals(self, thetas: Sequence[Mapping[str, float]]) -> list[Array] | None:
         """As `identify_residual` for several unknowns with the same names; None if not all at once."""
@@ -150,8 +150,8 @@ class Problem:
             if rows is None:
                 return None
             for parts, y in zip(found, rows, strict=True):
-                parts.append(_missed(run, y)[run.fit])
-        return [np.concatenate(parts) for parts in found]
+                parts.append(_fitted(run, _missed(run, y)))
+        return [_one(parts) for parts in found]
 
     @cached_property
     def _identified(self) -> tuple[Run, ...]:
@@ -249,6 +249,15 @@ def smooth_start(t: Array, y: Array, limits: StartPolicy) -> tuple[float, float]
 def _missed(run: Run, y: Array) -> Array:
     """Measured minus simulated outputs y (N, n_y), in their place if they are no part of other samples."""
     return np.subtract(run.y, y, out=y) if y.flags.c_contiguous else run.y - y
+
+
+def _fitted(run: Run, x: Array) -> Array:
+    """Those of the rows of x (N, n) that are fitted; x itself if all are."""
+    return x if run.fit.all() else x[run.fit]
+
+
+def _one(parts: Sequence[Array]) -> Array:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _cut(runs: Sequence[Run], share: float) -> Iterator[Run]:

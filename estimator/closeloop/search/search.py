@@ -7,7 +7,7 @@ from functools import cached_property
 from estimator.closeloop.decision.model_form import ModelForm, form_of
 from estimator.closeloop.fitting.fitter import BRIEF, Fitter
 from estimator.closeloop.fitting.refined import evenly, from_declared
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_onsets
@@ -58,9 +58,9 @@ class Search:
         """See `instead`; the best one and its nearest rivals are refined, before and after."""
         s, fitter = self.screened, self.fitter
         found = evenly(fitter, self._form.ranked(singles))
-        again = fitter.fitted(from_its_values(found, s.problem.policy.search), BRIEF)
         similar = over_the_same(s.screening, Calibration.of(s.fit), found[0], s.change)
-        again = [*fitter.to_the_end(again), *fitter.finished(similar)]
+        hopes, least = (from_its_values(found, s.problem.policy.search), similar), min(map(cost, found))
+        again = [h for some in hopes for h in fitter.to_the_end(fitter.fitted(some, BRIEF), least=least)]
         return evenly(fitter, self._form.ranked(best_by_label([*again, *found])))
 
     @property

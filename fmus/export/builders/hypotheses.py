@@ -78,7 +78,7 @@ class ModelBuilder:
         return _once(
             self.folder,
             effects,
-            lambda path: build_working(self._model(effects, probes=True), path),
+            lambda path: build_working(self._model(effects, probes=True), path, in_rows=True),
             lambda path: build_python(self._model(effects, probes=True), path),
         )
 

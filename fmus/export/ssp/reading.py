@@ -79,7 +79,7 @@ def _component(name: str, node: Any, outer: STARTS, files: dict[str, bytes]) -> 
         raise BadInput(f"component '{name}' is of type {kind}; only FMUs can be run here, export it as one")
     if source not in files:
         raise BadInput(f"component '{name}' has its FMU at '{source}', which is not in the package; add it")
-    feeding = one(node, f"{note(VENDOR)}/railfmi:SignalSource")
+    feeding = _feeding(node)
     return Component(
         name=name,
         source=source,
@@ -89,6 +89,12 @@ def _component(name: str, node: Any, outer: STARTS, files: dict[str, bytes]) -> 
         feeds=None if feeding is None else feeding.get("feeds"),
         data=None if feeding is None else feeding.get("data"),
     )
+
+
+def _feeding(node: Any) -> Any:
+    """What the system around a component notes about it as a source of signals, or None."""
+    noted = every(node.getparent().getparent(), f"{note(VENDOR)}/railfmi:SignalSource")
+    return next((n for n in noted if n.get("component") == node.get("name")), None)
 
 
 def _connectors(node: Any) -> Iterator[Connector]:

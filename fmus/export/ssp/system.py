@@ -9,6 +9,7 @@ RESOURCES = "resources"
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 VENDOR = "org.railfmi"  # type of our annotations
 OSP = "com.opensimulationplatform"  # of those that say steps, which libcosim and ecos read
+OMS = "org.openmodelica"  # of those that say how a system is simulated, without which OMSimulator reads none
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
@@ -17,6 +18,7 @@ NAMESPACES = {
     "stc": "http://ssp-standard.org/SSPTraceability1/SSPTraceabilityCommon",
     "srmd": "http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData",
     "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
     "railfmi": "https://railfmi.org/ssp",  # a name, not an address
 }
 Kind = Literal["input", "output", "parameter", "calculatedParameter", "inout"]

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 from fmus.errors import BadInput
 from fmus.export.ssp.system import (
     NAMESPACES,
+    OMS,
     OSP,
     RESOURCES,
     STRUCTURE,
@@ -71,6 +72,7 @@ def _structure(system: System) -> Element:
         connections = element(whole, "ssd:Connections")
         for link in system.links:
             _connection(connections, link)
+    _notes(whole, system)
     _units(root, (c.unit for component in system.components for c in component.connectors))
     times = {"startTime": system.start, "stopTime": system.stop}
     given = {name: repr(time) for name, time in times.items() if time is not None}
@@ -81,6 +83,25 @@ def _structure(system: System) -> Element:
     return root
 
 
+def _notes(whole: Element, system: System) -> None:
+    """How OMSimulator simulates the system, which it reads from the first note only, and what feeds it.
+
+    OMSimulator refuses notes within a component.
+    """
+    sources = [(c.name, c.feeds, c.data) for c in system.components if c.feeds and c.data]
+    if system.step is None and not sources:
+        return
+    notes = element(whole, "ssd:Annotations")
+    if system.step is not None:
+        told = element(element(notes, "ssc:Annotation", type=OMS), "oms:Annotations")
+        kind = element(told, "oms:SimulationInformation")
+        element(kind, "oms:FixedStepMaster", description="oms-ma", stepSize=repr(system.step))
+    if sources:
+        note = element(notes, "ssc:Annotation", type=VENDOR)
+        for name, feeds, data in sources:
+            element(note, "railfmi:SignalSource", component=name, feeds=feeds, data=data)
+
+
 def _component(elements: Element, c: Component) -> None:
     node = element(elements, "ssd:Component", name=c.name, source=c.source)
     if c.connectors:
@@ -89,13 +110,8 @@ def _component(elements: Element, c: Component) -> None:
             _connector(connectors, connector, c.types.get(connector.name, REAL))
     if c.start:
         element(element(node, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=_values_of(c))
-    if c.step is not None or c.feeds is not None:
-        notes = element(node, "ssd:Annotations")
-        if c.step is not None:
-            element(element(notes, "ssc:Annotation", type=OSP), "osp:StepSizeHint", value=repr(c.step))
-        if c.feeds is not None and c.data is not None:
-            note = element(notes, "ssc:Annotation", type=VENDOR)
-            element(note, "railfmi:SignalSource", feeds=c.feeds, data=c.data)
+    if c.step is not None:
+        element(_annotation(node, OSP), "osp:StepSizeHint", value=repr(c.step))
 
 
 def _connector(connectors: Element, c: Connector, kind: str) -> None:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
@@ -58,7 +57,7 @@ def sheet_of(
             rows = f"{named[name][0].rows} rows of its own, '{axis.full_name}' has {axis.rows}"
             apart[name] = f"is not sampled at the times named ({rows}); resample it to them"
     check_record(file, NUMBER * axis.rows * len(found))
-    cells = pd.DataFrame({name: _cells(c.load()) for name, c in found.items()})
+    cells = pd.DataFrame({name: c.load() for name, c in found.items()})
     return Sheet(file, cells, tuple(named), {name: c.unit for name, c in found.items() if c.unit}, apart)
 
 
@@ -99,8 +98,3 @@ def _ambiguous(file: Path, what: str, name: str, found: Sequence[Channel]) -> st
         return f"{file}: {what} '{name}' stands {len(found)} times in one group with different rows; keep one"
     listed = ", ".join(f"'{place}'" for place in places[:6]) + (", ..." if len(places) > 6 else "")
     return f"{file}: {what} '{name}' may be {listed}; give the full name"
-
-
-def _cells(values: NDArray[Any]) -> NDArray[Any]:
-    """Logical values as 0 and 1, all other values unchanged."""
-    return values.astype(np.float64) if values.dtype == np.bool_ else values

@@ -1,8 +1,10 @@
 """Text files of columns, as loggers and spreadsheets write them."""
 
 import json
+import re
 import warnings
 from collections.abc import Collection
+from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,9 +14,18 @@ import pandas as pd
 from fmus.errors import BadInput
 from fmus.taken import check_gzip, check_text
 from scenarios.experiment.readers.header import units_of
-from scenarios.experiment.readers.layout import BLANKS, WINDOWS, Layout, layout_of
+from scenarios.experiment.readers.layout import Layout, layout_of, no_text
 from scenarios.experiment.readers.reader import Reader
+from scenarios.experiment.readers.records import BLANKS, WINDOWS, opened
 from scenarios.experiment.readers.sheet import Sheet
+from scenarios.experiment.readers.thousands import remarks_on_thousands
+
+WIDER = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # as pandas says it, lines from 1
+UNCLOSED = re.compile(r"EOF inside string starting at row (\d+)")  # likewise, rows from 0
+
+
+class UnlikeLines(BadInput):
+    """The lines of a text file do not make up a table, as where others stand above the names."""
 
 
 class Csv(Reader):
@@ -37,43 +48,29 @@ class Csv(Reader):
         taken = (
             f"{file.name}: is not UTF-8; its names and units are read as {WINDOWS}, as Windows writes them"
         )
-        remarks = (taken,) if layout.encoding == WINDOWS and "encoding" not in options else ()
-        return Sheet(file, cells, layout.names, units, row="line", first=layout.first, remarks=remarks)
+        remarks: tuple[str, ...] = (
+            (taken,) if layout.encoding == WINDOWS and "encoding" not in options else ()
+        )
+        floats = [str(name) for name in cells if cells[name].dtype.kind == "f"]
+        if layout.doubtful and floats:
+            as_text = {**options, "dtype": str, "usecols": floats, "parse_dates": False}
+            remarks += remarks_on_thousands(file, layout, _table(file, layout, as_text))
+        signs = (layout.decimal, str(options.get("thousands") or ""))
+        return Sheet(file, cells, layout.names, units, {}, "line", layout.first, remarks, signs)
 
 
 def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
     """The cells of the file, without blank rows at its end."""
-    ours: dict[str, Any] = {
-        "names": list(layout.names),
-        "header": 0,
-        "index_col": False,
-        "skip_blank_lines": False,
-        "skipinitialspace": True,
-        "low_memory": False,
-    }
-    found: dict[str, Any] = {
-        "skiprows": layout.skipped,
-        "sep": layout.separator,
-        "decimal": layout.decimal,
-        "encoding": layout.encoding,
-    }
-    theirs = {key: value for key, value in options.items() if key != "delimiter"}
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            table: pd.DataFrame = pd.read_csv(file, **{**ours, **theirs, **found})
+        table = _table(file, layout, options)
     except pd.errors.ParserError as error:
-        raise BadInput(f"{file}: is not a sound CSV file: {' '.join(str(error).split())}") from error
+        raise _unsound(file, layout, " ".join(str(error).split())) from error
     except pd.errors.ParserWarning as error:
-        raise BadInput(
-            f"{file}: line {layout.first} has more cells than line {layout.above + 1} has names; "
-            "name each column"
+        raise UnlikeLines(
+            f"{file}: line {layout.first} has more cells than line {layout.line} has names; name each column"
         ) from error
     except UnicodeDecodeError as error:
-        raise BadInput(
-            f"{file}: is not text in the encoding {layout.encoding}; "
-            'say which it is, such as [data] encoding = "latin-1", or save it as UTF-8'
-        ) from error
+        raise no_text(file, layout.encoding) from error
     filled = np.flatnonzero(table.notna().any(axis=1))
     if not filled.size:
         raise BadInput(f"{file}: has no data below line {layout.first - 1}; record some")
@@ -85,6 +82,43 @@ def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
             "between columns that are separated by blanks no cell can be empty, use commas"
         )
     return table
+
+
+def _table(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
+    """What pandas makes of the lines below the names and units, which are not left to it."""
+    engine = options.get("engine") or ("python" if options.get("skipfooter") else "c")
+    ours: dict[str, Any] = {
+        "names": list(layout.names),
+        "index_col": False,
+        "skip_blank_lines": False,
+        "skipinitialspace": True,
+        "engine": engine,
+    }
+    if engine == "c":
+        ours["low_memory"] = False
+    found: dict[str, Any] = {"header": None, "sep": layout.separator, "decimal": layout.decimal}
+    looked_for = ("delimiter", "skiprows", "encoding", "encoding_errors")
+    theirs = {key: value for key, value in options.items() if key not in looked_for}
+    with opened(file, layout.encoding, options) as stream, warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        for _ in islice(stream, layout.first - 1):
+            pass
+        table: pd.DataFrame = pd.read_csv(stream, **{**ours, **theirs, **found})
+    return table
+
+
+def _unsound(file: Path, layout: Layout, said: str) -> BadInput:
+    """What pandas says of lines that it cannot read, with their numbers in the file."""
+    if wider := WIDER.search(said):
+        few, line, many = map(int, wider.groups())
+        return UnlikeLines(
+            f"{file} line {layout.first - 1 + line}: has {many} cells, and the lines above it have {few}; "
+            "mend it"
+        )
+    if unclosed := UNCLOSED.search(said):
+        line = layout.first + int(unclosed[1])
+        return BadInput(f"{file} line {line}: a quotation mark is opened there and never closed; close it")
+    return BadInput(f"{file}: is not a sound CSV file: {said}")
 
 
 def _units(file: Path) -> dict[str, str]:

@@ -2,21 +2,15 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 
 from fmus.errors import BadInput
-from fmus.units import base_exponents
+from fmus.units import SPELLINGS, base_exponents, plain
 
-# usual in measured files, but not in the grammar of units
-SPELLINGS = MappingProxyType(
-    {
-        "-": "1", "Nm": "N.m", "kNm": "kN.m", "°C": "degC", "U/min": "rpm", "1/min": "rpm", "min-1": "rpm",
-        "RPM": "rpm", "r/min": "rpm", "rev/min": "rpm", "sec": "s", "msec": "ms", "Volt": "V", "Ampere": "A",
-        "Sekunden": "s", "seconds": "s",
-    }
-)  # fmt: skip
-BRACKETS = re.compile(r".*\S\s*(\[[^\]]+\]|\([^)]+\))")
+# a unit behind a name; digits alone in brackets directly at it are an index, as in q[1]
+BRACKETS = re.compile(r".*\S(?![\[(]\d+[\])])\s*(\[[^\]]+\]|\([^)]+\))")
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
+GROUPED = re.compile(r"[+-]?\d{1,3}([.,']\d{3})+([.,]\d+)?")  # thousands apart
+DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T ]+\d.*)?|\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?")
 
 
 def spelled(unit: str) -> str:
@@ -24,7 +18,7 @@ def spelled(unit: str) -> str:
     bare = unit.strip()
     if _in_brackets(bare):
         bare = bare[1:-1].strip()
-    return SPELLINGS.get(bare, bare)
+    return SPELLINGS.get(plain(bare), bare)
 
 
 def is_unit(text: str) -> bool:
@@ -41,15 +35,27 @@ def is_number(text: str) -> bool:
     return NUMBER.fullmatch(text.strip()) is not None
 
 
+def is_value(text: str) -> bool:
+    """Whether a cell holds what is measured: a number, thousands apart or not, a date, or a time of day."""
+    cell = text.strip()
+    return any(pattern.fullmatch(cell) for pattern in (NUMBER, GROUPED, DATE))
+
+
+def states_unit(cell: str) -> bool:
+    """Whether a cell is a known unit or stands in brackets."""
+    return _in_brackets(cell.strip()) or is_unit(cell)
+
+
 def is_line_of_units(cells: Sequence[str]) -> bool:
     """Whether a line of cells states units.
 
-    None is a number, and most of those filled are known units or stand in brackets.
+    None is a value, and most of those filled are known units or stand in brackets, not all of them a dash:
+    that is how loggers write that there is no value, too.
     """
     filled = [cell.strip() for cell in cells if cell.strip()]
-    if not filled or any(is_number(cell) for cell in filled):
+    if any(map(is_value, filled)) or set(filled) <= {"-"}:
         return False
-    return 2 * sum(_in_brackets(cell) or is_unit(cell) for cell in filled) >= len(filled)
+    return 2 * sum(map(states_unit, filled)) >= len(filled)
 
 
 def _in_brackets(cell: str) -> bool:

@@ -29,8 +29,7 @@ class Parquet(Reader):
             wanted = [name for name in schema.names if columns is None or name in columns]
             check_record(file, NUMBER * source.metadata.num_rows * len(wanted))
             cells = source.read(columns=wanted).to_pandas(ignore_metadata=True)
-        switches = {name: "float64" for name in cells.columns if cells[name].dtype == bool}
         units = {
             f.name: f.metadata[key].decode() for f in schema for key in UNIT_KEYS if key in (f.metadata or {})
         }
-        return Sheet(file, cells.astype(switches), tuple(schema.names), units)
+        return Sheet(file, cells, tuple(schema.names), units)

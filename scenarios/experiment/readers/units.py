@@ -1,18 +1,22 @@
 """Compare the units that a file states for its columns with the units declared for them."""
 
 from math import isclose
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput
-from fmus.units import base_exponents, column_conversion, conversion
-from scenarios.experiment.readers.header import is_number, spelled
+from fmus.units import another_kind, base_exponents, column_conversion, conversion
+from scenarios.experiment.readers.header import is_number, is_unit, spelled
 from scenarios.experiment.readers.sheet import Sheet
 
 SAME = (1.0, 0.0)  # factor and offset
+ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
+FRACTION = r"(:\d{2}),(\d+)"  # of a second
+OFFSET = r":\d{2}(?:[.,]\d+)? *(?:Z|[+-]\d{2}(?::?\d{2})?)\s*$"  # from UTC, behind a time of day
 
 
 class StatedUnits:
@@ -24,35 +28,29 @@ class StatedUnits:
         self.notes = [Note("file", "", remark) for remark in sheet.remarks]
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
-        """Raise BadInput if the file contradicts the unit declared at `where` for a measured output.
+        """Raise BadInput if the file states another unit than the one declared at `where`.
 
-        derived: how many times the column is differentiated to become the output.
+        derived: how many times the column is differentiated to become what has the declared unit. A word of
+        the file that need not be its unit is noted only: who declares one knows better.
         """
-        if not derived and self._sheet.units.get(column) == declared:
+        said = self._sheet.units.get(column, "")
+        if not spelled(said) or (not derived and said == declared):
             return
-        try:
-            stated = self.stated(column, where)
-        except BadInput:  # who declares a unit knows better than a file that writes it in its own way
-            said = (
-                f"{self._file.name}: column '{column}' has the unit '{self._sheet.units[column]}', which is"
-            )
-            self.notes.append(
-                Note("unit", column, f"{said} not known; it is taken as {declared}, as declared")
-            )
+        stated = meant(spelled(said), derived, declared)
+        why = overruled(column, stated, declared)
+        if why:
+            told = f"{self._file.name}: column '{column}' has the unit '{said}', which {why}"
+            self.notes.append(Note("unit", column, f"{told}; it is taken as {declared}, as declared"))
             return
-        if stated is None:
-            return
-        for _ in range(derived):
-            stated = f"({stated})/s"
         try:
             found = conversion(stated, declared, where)
         except BadInput:
             found = None
         if found is None or not (isclose(found[0], 1.0, rel_tol=1e-9) and found[1] == 0):
-            raise BadInput(
-                f"{where} unit = \"{declared}\", but {self._file} states '{stated}' for it; "
-                f'write unit = "{stated}", or correct the file'
-            )
+            way = f'write unit = "{stated}", or correct the file'
+            if another_kind(stated, declared):
+                way = f"name another column than '{column}', or correct the word in the file"
+            raise BadInput(f"{where} unit = \"{declared}\", but {self._file} states '{stated}' for it; {way}")
 
     def to(self, column: str, target: str | None, where: str, derived: int = 0) -> tuple[float, float]:
         """Factor and offset from the file's unit to another; identity if the file states no unit.
@@ -64,7 +62,15 @@ class StatedUnits:
         if stated is None:
             return SAME
         place = f"{where}: column '{column}' of {self._file}"
-        found = column_conversion(stated, target, "the input", place)
+        try:
+            found = column_conversion(stated, target, "the input", place)
+        except BadInput as error:
+            if target and another_kind(stated, target):
+                way = (
+                    'if the file means another one, declare it: unit = "...", time_unit = "..." for the time'
+                )
+                raise BadInput(f"{error}; {way}") from error
+            raise
         if found != SAME:
             said = f"{self._file.name}: column '{column}' is converted from {stated}, as the file states"
             self.notes.append(Note("unit", column, f"{said}, to {target}"))
@@ -85,6 +91,8 @@ class StatedUnits:
             said = f"{self._file.name}: column '{column}' holds dates; 0 s is {cells.min()}"
             self.notes.append(Note("unit", column, said))
             cells = cells - cells.min()
+        if pd.api.types.is_string_dtype(cells) and not is_number(_first(cells)):
+            raise BadInput(self._no_time(column, cells))
         if cells.dtype.kind == "m":
             return np.asarray(cells.dt.total_seconds(), dtype=np.float64)
         if unit is None:
@@ -93,6 +101,19 @@ class StatedUnits:
             self.check(column, 0, unit, where)
             factor, offset = conversion(unit, "s", where)
         return self._sheet.numbers(column) * factor + offset
+
+    def _no_time(self, column: str, cells: "pd.Series[Any]") -> str:
+        """Why text is no time: its first cell that is no date, or that some dates have a time zone."""
+        words = (iso_dates(cells, "coerce", utc=True).isna() & cells.notna()).to_numpy()
+        if not words.any():
+            return f"{self._file}: only some dates of column '{column}' have a time zone; write all alike"
+        i = int(words.argmax())
+        return (
+            f"{self._file} {self._sheet.row} {i + self._sheet.first}: column '{column}' holds "
+            f"'{str(cells.iloc[i])[:40]}', neither a number nor a date of ISO 8601, such as "
+            f'2026-02-01T12:00:00.5; write these, or say parse_dates = ["{column}"] in [data], and '
+            "dayfirst = true where the day comes first"
+        )
 
     def stated(self, column: str, where: str, derived: int = 0) -> str | None:
         """The unit stated in the file, in railfmi's spelling, None if there is none; BadInput if unknown.
@@ -109,9 +130,32 @@ class StatedUnits:
                 f"{where}: column '{column}' of {self._file} has the unit '{unit}', which is not known; "
                 'declare one that is, unit = "..." for a channel, time_unit = "..." for the time'
             ) from error
-        for _ in range(derived):
-            unit = f"({unit})/s"
-        return unit
+        return differentiated(unit, derived)
+
+
+def differentiated(unit: str, times: int) -> str:
+    """The unit of the derivative with respect to time of a quantity in a unit, taken several times."""
+    return unit if times == 0 else f"({differentiated(unit, times - 1)})/s"
+
+
+def meant(word: str, derived: int, declared: str) -> str:
+    """The unit of a column's derivative by a word of the file, in the light of the unit declared for it."""
+    also = ALSO.get(word)
+    if also and not another_kind(differentiated(also, derived), declared):
+        word = also
+    return differentiated(word, derived)
+
+
+def overruled(column: str, stated: str, declared: str) -> str:
+    """Why a declared unit holds whatever a file states; empty if the file contradicts it.
+
+    A word in round brackets behind a name may be a remark, as in n (min), the least speed.
+    """
+    if not is_unit(stated):
+        return "is not known"
+    if column.rstrip().endswith(")") and another_kind(stated, declared):
+        return "is of another kind"
+    return ""
 
 
 def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> float:
@@ -128,10 +172,30 @@ def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> flo
 
 
 def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
-    """Dates that a file holds as text, as dates; all else unchanged."""
-    if not pd.api.types.is_string_dtype(cells) or is_number(str(cells.iloc[0])):
+    """Dates that a file holds as text, as dates, in UTC if their offsets differ; all else unchanged."""
+    if not pd.api.types.is_string_dtype(cells) or is_number(_first(cells)):
         return cells
     try:
-        return pd.to_datetime(cells, errors="raise", format="ISO8601")
+        return iso_dates(cells, "raise", utc=False)
+    except (ValueError, TypeError):
+        zoned = cells.dropna().str.contains(OFFSET).all()
+    try:
+        return iso_dates(cells, "raise", utc=True) if zoned else cells
     except (ValueError, TypeError):
         return cells
+
+
+def iso_dates(cells: "pd.Series[Any]", errors: Literal["raise", "coerce"], utc: bool) -> "pd.Series[Any]":
+    """Text as dates of ISO 8601, which allows a comma before the fractions of a second.
+
+    errors: whether text that is no date is a ValueError, or no time; utc: whether all dates are put in UTC,
+    without which different offsets are a ValueError, too.
+    """
+    if cells.str.contains(",", regex=False).any():
+        cells = cells.str.replace(FRACTION, r"\1.\2", regex=True)
+    return pd.to_datetime(cells, errors=errors, format="ISO8601", utc=utc)
+
+
+def _first(cells: "pd.Series[Any]") -> str:
+    """The first cell with anything in it; empty if there is none."""
+    return str(next(iter(cells.dropna()), ""))

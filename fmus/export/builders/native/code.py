@@ -9,7 +9,7 @@ import fmpy
 from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.builders.native.dependencies import stacked
-from fmus.export.builders.native.lanes import lanes_of, widest
+from fmus.export.builders.native.lanes import has_vectors, lanes_of, widest
 from fmus.export.builders.native.table import Table
 from fmus.model import Equations
 from fmus.variables import Expr
@@ -42,13 +42,15 @@ def sources(
     fmi: int,
     token: str,
     working: bool = False,
+    in_rows: bool = False,
     joined: cs.Function | None = None,
 ) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others.
 
     working: for this machine and FMI 2.0 only, without derivatives, whose calls are refused; what the
-    equations for several rows call is a unit of its own, `lanes_object.c`. joined: its step over several
-    samples, see fmus/integrators/joined.py.
+    equations for several rows call is a unit of its own, `lanes_object.c`. in_rows: whether it is simulated
+    in rows, so that the equations of one instance are compiled without optimisation. joined: its step over
+    several samples, see fmus/integrators/joined.py.
     """
     code, work = _equations(table.name, made, derivatives=not working)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
@@ -62,7 +64,14 @@ def sources(
     lanes = lanes_of((made.f, made.h, made.step, *([joined] if joined else ())))
     rows = {"lanes_equations.c": lanes.functions, "lanes_called.c": lanes.called} if lanes else {}
     header = _header(
-        table, work, fmi, token, lanes=bool(lanes), working=working, joins=bool(lanes and joined)
+        table,
+        work,
+        fmi,
+        token,
+        lanes=bool(lanes),
+        working=working,
+        joins=bool(lanes and joined),
+        in_rows=bool(lanes) and in_rows and has_vectors(),
     )
     return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}
 

@@ -68,18 +68,28 @@ ONE_BY_ONE = {  # functions of C's library, lane after lane
 
 
 CPU = Path("/proc/cpuinfo")
-EIGHT = {"avx512f", "avx512dq", "avx512vl"}  # what a processor must have for eight lanes
+FOUR = "avx2"  # what a processor must have for four lanes
+EIGHT = {"avx512f", "avx512dq", "avx512vl"}  # and for eight
+
+
+def widest() -> int:
+    """Number of lanes for this machine: 8 where Linux says that its processors have AVX-512, else 4."""
+    return 8 if features() >= EIGHT else 4
+
+
+def has_vectors() -> bool:
+    """Whether Linux says that the processors of this machine have what four lanes need."""
+    return FOUR in features()
 
 
 @cache
-def widest() -> int:
-    """Number of lanes for this machine: 8 where Linux says that its processors have AVX-512, else 4."""
+def features() -> set[str]:
+    """What the processors can do, by Linux's names; empty where it does not say."""
     try:
         lines = CPU.read_text(encoding="utf-8").splitlines()
-        flags = next(line for line in lines if line.startswith("flags"))
+        return set(next(line for line in lines if line.startswith("flags")).split())
     except (OSError, StopIteration):
-        return 4
-    return 8 if set(flags.split()) >= EIGHT else 4
+        return set()
 
 
 class Lanes(NamedTuple):

@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -12,7 +13,7 @@ from platformdirs import user_cache_path
 from fmus.export.builders.native.compilers import DEFINED, command, compile_library, host
 from fmus.files import write_at_once
 
-KEPT = 300  # libraries on disk, of about 100 kB each
+KEPT = 1000  # libraries on disk, of about 100 kB each
 DIGEST = sha256().digest_size
 OTHERS_MAY_WRITE = 0o022  # bits of a file's mode
 
@@ -72,6 +73,8 @@ def _load(key: str) -> bytes | None:
         data = file.read_bytes()
     except OSError:
         return None
+    with suppress(OSError):
+        file.touch()  # those that were not used for the longest time are dropped
     digest, kept = data[:DIGEST], data[DIGEST:]
     return kept if digest == _sealed(key, kept) else None
 
@@ -89,7 +92,7 @@ def _sealed(key: str, made: bytes) -> bytes:
 
 
 def _save(key: str, made: bytes) -> None:
-    """Keep a library with its checksum before it, and drop the oldest where there are too many."""
+    """Keep a library with its checksum before it; of too many, those not used for longest are dropped."""
     try:
         folder().mkdir(mode=0o700, parents=True, exist_ok=True)
         write_at_once(folder() / key, _sealed(key, made) + made)

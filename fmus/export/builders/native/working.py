@@ -15,8 +15,11 @@ from fmus.model import Model, equations, joined
 CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes.h", "quick.c")
 
 
-def build_working(model: Model, out: Path) -> Path:
+def build_working(model: Model, out: Path, in_rows: bool = False) -> Path:
     """Write the file `out`, an FMI 2.0 FMU of a model for this machine, and return its path.
+
+    in_rows: whether it will be simulated in rows (see Fmu.simulate_rows); an instance of its own takes longer
+    then, and the library is compiled sooner.
 
     It computes the same numbers as the FMU of build_native, to the last bit. Directional derivatives,
     sources, page and record of provenance are left out, and nothing is compressed. Its library is taken
@@ -24,7 +27,7 @@ def build_working(model: Model, out: Path) -> Path:
     """
     made = equations(model)
     about = table(model, made)
-    code = sources(about, made, 2, NO_TOKEN, working=True, joined=joined(model, made))
+    code = sources(about, made, 2, NO_TOKEN, working=True, in_rows=in_rows, joined=joined(model, made))
     files = identified(
         description2(about, NO_TOKEN, complete=False) | {n: text.encode() for n, text in code.items()}
     )

@@ -40,9 +40,10 @@ typedef struct {
     size_t n_get;
     const unsigned *get;
     int first;          /* whether values before the first step are read too */
-    double *found;      /* (n_rows, n_samples - 1 + first, n_get) */
+    double *found;      /* (n_rows, (n_samples - 1) / every + first, n_get) */
     int processor;      /* 0 at first; then what is known, for the question takes longer than a step */
     int joined;         /* whether a step goes over four samples: `during` has all samples (n_samples, n_inputs) then */
+    size_t every;       /* of how many samples after the first one is read, a divisor of n_samples - 1 */
 } Rows;
 
 enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
@@ -81,10 +82,10 @@ enum { WITHOUT_VECTORS = 1, WITH_VECTORS };
 LANES_EXPORTED int LANES_NAMED(railfmi_rows_at_once)(void) { return WIDTH; }
 
 /* -1, or the first row that cannot be set or advanced; an instance of its own tells why. */
-LANES_EXPORTED long long LANES_NAMED(railfmi_rows)(Rows *asked) {
+LANES_EXPORTED long long LANES_NAMED(railfmi_rows_2)(Rows *asked) {
     if (!asked->processor) asked->processor = has_vectors() ? WITH_VECTORS : WITHOUT_VECTORS;
     if (asked->processor == WITHOUT_VECTORS) return 0;
-    if (asked->n_base != N_SET || asked->n_samples == 0) return 0;
+    if (asked->n_base != N_SET || asked->n_samples == 0 || asked->every == 0) return 0;
     for (size_t k = 0; k < N_SET; k++)
         if (!within((unsigned)k, asked->base[k])) return 0;
     for (size_t k = 0; k < asked->n_put; k++)

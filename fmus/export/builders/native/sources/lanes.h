@@ -78,26 +78,42 @@ VECTORS static inline __attribute__((always_inline, unused)) bool any_lane(const
     return any != 0;
 }
 
-/* e to the x: 2 to a whole number times the Taylor series of what is left, up to 0.35. */
-ONLY lanes_exp(const Lanes *a, Lanes *y) {
+/* e to the x within 700: 2 to a whole number times the Taylor series of what is left, up to 0.35. The series is summed
+   in pairs, which takes less time than one term after the other. */
+ONLY lanes_exp_within(const Lanes *a, Lanes *y) {
     Lanes x = *a, shifted = x * 1.4426950408889634 + ROUNDING, n = shifted - ROUNDING;
     Lanes r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10; /* ln 2 in two parts */
-    Lanes s = ALL(1.6059043836821613e-10); /* 1 / 13! */
-    s = s * r + 2.08767569878681e-09;
-    s = s * r + 2.505210838544172e-08;
-    s = s * r + 2.755731922398589e-07;
-    s = s * r + 2.7557319223985893e-06;
-    s = s * r + 2.48015873015873e-05;
-    s = s * r + 1.984126984126984e-04;
-    s = s * r + 1.388888888888889e-03;
-    s = s * r + 8.333333333333333e-03;
-    s = s * r + 4.1666666666666664e-02;
-    s = s * r + 1.6666666666666666e-01;
-    s = s * r + 0.5;
-    s = s * r * r + r + 1.0;
+    Lanes r2 = r * r, r4 = r2 * r2;
+    Lanes p0 = r * 1.6666666666666666e-01 + 0.5, p1 = r * 8.333333333333333e-03 + 4.1666666666666664e-02;
+    Lanes p2 = r * 1.984126984126984e-04 + 1.388888888888889e-03;
+    Lanes p3 = r * 2.7557319223985893e-06 + 2.48015873015873e-05;
+    Lanes p4 = r * 2.505210838544172e-08 + 2.755731922398589e-07;
+    Lanes p5 = r * 1.6059043836821613e-10 + 2.08767569878681e-09; /* the last term is 1 / 13! */
+    Lanes s = ((p5 * r2 + p4) * r4 + (p3 * r2 + p2)) * r4 + (p1 * r2 + p0);
+    s = s * r2 + r + 1.0;
     Bits power = ((Bits)shifted << 52) + (Bits)ALL(1.0); /* n stands in the last bits of the shifted number */
     *y = s * (Lanes)power;
-    LIBRARY_UNLESS(MAGNITUDE(x) < 700.0, exp)
+}
+
+ONLY lanes_exp(const Lanes *a, Lanes *y) {
+    lanes_exp_within(a, y);
+    LIBRARY_UNLESS(MAGNITUDE(*a) < 700.0, exp)
+}
+
+/* Natural logarithm of positive numbers by the polynomials of fdlibm (e_log.c). */
+ONLY lanes_ln(const Lanes *a, Lanes *y) {
+    Bits bits = (Bits)*a, e = (bits >> 52) - 1023;
+    Lanes m = (Lanes)((bits & ALL_BITS(0x000fffffffffffffLL)) | (Bits)ALL(1.0));
+    Bits high = (Bits)(m > 1.41421356237309504880);
+    m = CHOICE(high, m * 0.5, m);
+    e = e - high; /* where high holds, it is -1 */
+    Lanes n = (Lanes)(e + (Bits)ALL(ROUNDING)) - ROUNDING;
+    Lanes f = m - 1.0, s = f / (f + 2.0), z = s * s, w = z * z;
+    Lanes even = ((w * 1.531383769920937332e-01 + 2.222219843214978396e-01) * w + 3.999999999940941908e-01) * w;
+    Lanes odd = (w * 1.479819860511658591e-01 + 1.818357216161805012e-01) * w + 2.857142874366239149e-01;
+    odd = (odd * w + 6.666666666666735130e-01) * z;
+    Lanes half = f * f * 0.5;
+    *y = n * 6.93147180369123816490e-01 - ((half - (s * (half + even + odd) + n * 1.90821492927058770002e-10)) - f);
 }
 
 /* Sine and cosine by the polynomials of fdlibm (k_sin.c, k_cos.c) after removal of quarter turns. */
@@ -168,14 +184,20 @@ ONLY lanes_tanh(const Lanes *a, Lanes *y) {
     *y = CHOICE((size < 0.625) | (x != x), near, far);
 }
 
+/* A power of a positive base, by its logarithm times the exponent, whose size is the error in units of the last place.
+   What is far from 1 is therefore left to C's library. */
 ONLY lanes_pow(const Lanes *a, const Lanes *b, Lanes *y) {
     Lanes base = *a, exponent = *b, r = base;
-    Bits plain = (Bits)(exponent == 1.0), alike = (Bits)(base == ALL(base[0])) & (Bits)(exponent == ALL(exponent[0]));
+    Bits plain = (Bits)(exponent == 1.0);
     if (!USUALLY(lanes_everywhere(&plain))) {
-        if (lanes_everywhere(&alike)) /* as for parameters that all rows share */
-            r = ALL(1.0) * quick_pow(base[0], exponent[0]);
-        else
-            EACH(i) r[i] = quick_pow(base[i], exponent[i]);
+        Lanes product;
+        lanes_ln(&base, &product);
+        product = product * exponent;
+        Bits covered = plain | ((Bits)(base > 1e-300) & (Bits)(base < 1e300) & (Bits)(MAGNITUDE(product) < 50.0));
+        lanes_exp_within(&product, &r);
+        r = CHOICE(plain, base, r);
+        if (!USUALLY(lanes_everywhere(&covered)))
+            EACH(i) if (!covered[i]) r[i] = quick_pow(base[i], exponent[i]);
     }
     *y = r;
 }

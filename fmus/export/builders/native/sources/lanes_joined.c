@@ -114,11 +114,11 @@ VECTORS static long long group_of_joined(const Rows *asked, size_t row) {
     Lanes slopes[N_STATES], after[N_STATES];
     Needed needed = needed_for(asked);
     int active = begin_group(&m, asked, row);
-    size_t first = asked->first ? 1 : 0, k = 0;
+    size_t k = 0;
     Bits everyone = lanes_below(active), bad;
     sampled(&m, asked, 0, driving[0]);
     slopes_of(&m, driving[0], slopes);
-    if (first) read_group(&m, asked, &needed, row, 0, active);
+    read_group(&m, asked, &needed, row, 0, active);
     for (; k + QUARTERS < asked->n_samples; k += QUARTERS) {
         double duration = asked->t[k + QUARTERS] - asked->t[k];
         for (int q = 0; q <= QUARTERS; q++) sampled(&m, asked, k + (size_t)q, driving[q]);
@@ -131,9 +131,10 @@ VECTORS static long long group_of_joined(const Rows *asked, size_t row) {
             for (int j = 0; j < N_STATES; j++) after[j] = CHOICE(bad, slopes[j], after[j]);
         }
         for (int q = 1; q <= QUARTERS; q++) {
+            if (q < QUARTERS && (k + (size_t)q) % asked->every) continue;
             memcpy(m.values, path[q], sizeof path[q]);
             for (int j = 0; j < N_INPUTS; j++) m.values[FIRST_INPUT + j] = ALL(driving[q][j]);
-            read_group(&m, asked, &needed, row, k + (size_t)q - 1 + first, active);
+            read_group(&m, asked, &needed, row, k + (size_t)q, active);
         }
         memcpy(slopes, after, sizeof slopes);
     }
@@ -143,7 +144,7 @@ VECTORS static long long group_of_joined(const Rows *asked, size_t row) {
         for (int j = 0; j < N_INPUTS; j++) m.values[FIRST_INPUT + j] = ALL((driving[0][j] + driving[1][j]) / 2);
         if (!advance_group(&m, asked->t[k + 1] - asked->t[k], &everyone)) return (long long)row;
         for (int j = 0; j < N_INPUTS; j++) m.values[FIRST_INPUT + j] = ALL(driving[1][j]);
-        read_group(&m, asked, &needed, row, k + first, active);
+        read_group(&m, asked, &needed, row, k + 1, active);
     }
     return -1;
 }

@@ -72,9 +72,16 @@ VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted)
     return true;
 }
 
+/* Read what is asked of a sample, if it is one of those that are read. */
 VECTORS static void read_group(
     Group *m, const Rows *asked, const Needed *needed, size_t row, size_t sample, int active) {
-    size_t n_found = asked->n_samples - (asked->first ? 0 : 1);
+    if (sample % asked->every) return;
+    sample /= asked->every;
+    size_t n_found = (asked->n_samples - 1) / asked->every + 1;
+    if (!asked->first) {
+        if (sample == 0) return;
+        n_found--, sample--;
+    }
     if (needed->outputs) lanes_h(m->values, m->outputs);
     if (needed->slopes) lanes_f(m->values, m->slopes);
     for (size_t k = 0; k < asked->n_get; k++) {
@@ -114,14 +121,13 @@ VECTORS static long long group_of_rows(const Rows *asked, size_t row) {
     Group m;
     int active = begin_group(&m, asked, row);
     Bits going = lanes_below(active);
-    size_t first = asked->first ? 1 : 0;
     Needed needed = needed_for(asked);
-    if (first) read_group(&m, asked, &needed, row, 0, active);
+    read_group(&m, asked, &needed, row, 0, active);
     for (size_t k = 0; k + 1 < asked->n_samples; k++) {
         if (!set_inputs(&m, asked, asked->during, k)) return (long long)row;
         if (!advance_group(&m, asked->t[k + 1] - asked->t[k], &going)) return (long long)row;
         if (asked->after && !set_inputs(&m, asked, asked->after, k)) return (long long)row;
-        read_group(&m, asked, &needed, row, k + first, active);
+        read_group(&m, asked, &needed, row, k + 1, active);
     }
     return -1;
 }
