@@ -182,10 +182,9 @@ class Fmu:
     ) -> Array | None:
         """As `simulate` for each of k starts with the same names: outputs (k, N, n_y).
 
-        every: of how many samples after the first one is read, a divisor of N - 1.
-
         joined: whether a step goes over four samples, see fmus/integrators/joined.py. The times must be
-        evenly spaced then, and the inputs samples (N,) of continuous signals.
+        evenly spaced then, and the inputs samples (N,) of continuous signals. every: a divisor of N - 1; the
+        outputs of the first sample and of every so-manyth one after it are returned.
         None if the FMU does not offer it, or refuses a start; simulations one by one say which and why.
         """
         if not offers_rows(self._instance) or (joined and not self.joins):

@@ -66,8 +66,8 @@ class Rows:
     def run(self, rows: Array, t: Array, found: Array, inputs: Inputs | None = None, every: int = 1) -> int:
         """Fill `found` (k, N - 1 or N, n_get) from rows (k, n_put) at times t (N,), s; all C-contiguous.
 
-        With N results for each row the first is that before the first step. every: of how many samples after
-        the first one is read, a divisor of N - 1; there are fewer results then. Returns -1, or a row of a
+        With N results for each row the first is that before the first step. every: a divisor of N - 1; only
+        every so-manyth sample after the first one is read, with fewer results. Returns -1, or a row of a
         group of which one cannot be set or advanced; instances have to be asked why, and for the other rows.
         """
         asked = self._asked

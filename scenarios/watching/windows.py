@@ -17,7 +17,7 @@ from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.header import spelled
 from scenarios.experiment.readers.reader import NO_OPTIONS
 from scenarios.experiment.readers.sheet import Sheet
-from scenarios.experiment.readers.units import StatedUnits, iso_dates, overruled
+from scenarios.experiment.readers.units import StatedUnits, iso_dates, understood
 from scenarios.experiment.record import LARGEST
 
 
@@ -125,9 +125,10 @@ class Reading:
         """Raise BadInput if a window states another unit than the record that the filter was set up with."""
         inputs = self._e.input_columns
         for name, c in self._conversions.items():
-            stated = spelled(sheet.units.get(c.column, ""))
-            declared = name not in inputs or inputs[name].unit is not None
-            if not stated or stated == c.unit or (declared and overruled(c.column, stated, str(c.unit))):
+            stated, why = spelled(sheet.units.get(c.column, "")), ""
+            if c.unit is not None and (name not in inputs or inputs[name].unit is not None):  # declared
+                stated, why = understood(c.column, stated, 0, c.unit)
+            if not stated or stated == c.unit or why:
                 continue
             where = f"{sheet.file}: column '{c.column}'"
             if c.unit is None:

@@ -329,6 +329,11 @@ def test_comments_are_no_names(tmp_path):
     refused(lambda: read_sheet(sheet.file, options={"header": 2}), "say skiprows")
 
 
+def test_thousands_that_hold_the_separator_are_refused_below_padded_names(tmp_path):
+    file = written(tmp_path, ["time,n,"], lambda i: f"{i},1,000,")
+    refused(lambda: read_sheet(file), "line 3 has more cells than line 1 has names; name each column")
+
+
 # --- all of it together
 
 SIGNS = [(",", "."), (";", "."), (";", ","), ("\t", ","), ("\t", "."), (" ", "."), (" ", ",")]

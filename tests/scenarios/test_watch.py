@@ -333,6 +333,16 @@ def test_a_window_in_another_unit_is_refused(rig, tmp_path):
         Reading(rig.e, rig.record.conversions, ()).read("w", file)
 
 
+def test_a_window_in_g_is_one_in_standard_gravity_if_that_is_declared(rig, tmp_path):
+    """As in the record with which the filter was set up."""
+    file = tmp_path / "w.csv"
+    rig.data.iloc[:50].to_csv(file, index=False)
+    (tmp_path / "w.csv.units.json").write_text('{"omega_w": "g"}')
+    declared = [replace(c, unit="g_0") if c.variable == "omega_w" else c for c in rig.record.conversions]
+    found = Reading(rig.e, declared, ()).read("w", file)
+    assert len(found.rows.t) == 50
+
+
 def test_a_word_of_the_files_of_a_stream_does_not_outdo_the_declared_unit(rig, tmp_path):
     file = tmp_path / "w.csv"
     rig.data.iloc[:50].to_csv(file, index=False)

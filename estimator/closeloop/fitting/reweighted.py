@@ -76,10 +76,10 @@ def _fitted_again(fitter: Fitter, found: Sequence[Hypothesis], before: Weighting
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
     stretches = baseline.problem.record.stretches("fit")
     moved = best_by_label(rescaled(found, before, baseline.noise.weighting, stretches))
-    leading = [h for h in moved if h.candidates][: limits.reweighted]
-    leading = [h for h in leading if cost(h) < limits.rival * cost(leading[0])]
-    if not leading:
+    named = [h for h in moved if h.candidates][: limits.reweighted]
+    if not named:
         return moved
+    leading = [h for h in named if cost(h) < limits.rival * cost(named[0])]
     return best_by_label([*moved, *fitter.finished(from_there(leading), leading[0].others)])
 
 

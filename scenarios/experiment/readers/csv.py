@@ -56,7 +56,10 @@ class Csv(Reader):
             as_text = {**options, "dtype": str, "usecols": floats, "parse_dates": False}
             remarks += remarks_on_thousands(file, layout, _table(file, layout, as_text))
         signs = (layout.decimal, str(options.get("thousands") or ""))
-        return Sheet(file, cells, layout.names, units, {}, "line", layout.first, remarks, signs)
+        return Sheet(
+            file, cells, layout.names, units,
+            row="line", first=layout.first, remarks=remarks, signs=signs,
+        )  # fmt: skip
 
 
 def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:

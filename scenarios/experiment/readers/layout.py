@@ -93,6 +93,11 @@ def _layout(
     check_columns(file, len(names))
     if not any(names):
         raise BadInput(f"{file}: is empty or has no column names in line {above + named}; write them there")
+    if not names[-1] and len(data) > len(names):  # pandas would leave out the last cell
+        raise BadInput(
+            f"{file}: line {above + below[-1][0]} has more cells than line {above + named} has names; "
+            "name each column, and put numbers that hold the separator in quotes"
+        )
     twice = sorted(name for name, n in Counter(names).items() if name and n > 1)
     if twice:
         raise BadInput(f"{file}: column '{twice[0]}' occurs twice in line {above + named}; rename one")

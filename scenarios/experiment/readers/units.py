@@ -36,8 +36,7 @@ class StatedUnits:
         said = self._sheet.units.get(column, "")
         if not spelled(said) or (not derived and said == declared):
             return
-        stated = meant(spelled(said), derived, declared)
-        why = overruled(column, stated, declared)
+        stated, why = understood(column, spelled(said), derived, declared)
         if why:
             told = f"{self._file.name}: column '{column}' has the unit '{said}', which {why}"
             self.notes.append(Note("unit", column, f"{told}; it is taken as {declared}, as declared"))
@@ -138,24 +137,21 @@ def differentiated(unit: str, times: int) -> str:
     return unit if times == 0 else f"({differentiated(unit, times - 1)})/s"
 
 
-def meant(word: str, derived: int, declared: str) -> str:
-    """The unit of a column's derivative by a word of the file, in the light of the unit declared for it."""
+def understood(column: str, word: str, derived: int, declared: str) -> tuple[str, str]:
+    """What a file's word for the unit of a column means where a unit is declared for it.
+
+    derived: how many times the column is differentiated to become what has the declared unit. Returns the
+    unit of that, and why the declared one holds whatever the file states; empty if the file can contradict
+    it. A word in round brackets behind a name may be a remark, as in n (min), the least speed.
+    """
     also = ALSO.get(word)
     if also and not another_kind(differentiated(also, derived), declared):
         word = also
-    return differentiated(word, derived)
-
-
-def overruled(column: str, stated: str, declared: str) -> str:
-    """Why a declared unit holds whatever a file states; empty if the file contradicts it.
-
-    A word in round brackets behind a name may be a remark, as in n (min), the least speed.
-    """
+    stated = differentiated(word, derived)
     if not is_unit(stated):
-        return "is not known"
-    if column.rstrip().endswith(")") and another_kind(stated, declared):
-        return "is of another kind"
-    return ""
+        return stated, "is not known"
+    remark = column.rstrip().endswith(")") and another_kind(stated, declared)
+    return stated, "is of another kind" if remark else ""
 
 
 def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> float:

@@ -43,7 +43,7 @@ typedef struct {
     double *found;      /* (n_rows, (n_samples - 1) / every + first, n_get) */
     int processor;      /* 0 at first; then what is known, for the question takes longer than a step */
     int joined;         /* whether a step goes over four samples: `during` has all samples (n_samples, n_inputs) then */
-    size_t every;       /* of how many samples after the first one is read, a divisor of n_samples - 1 */
+    size_t every;       /* a divisor of n_samples - 1: every so-manyth sample after the first one is read */
 } Rows;
 
 enum { WITHOUT_VECTORS = 1, WITH_VECTORS };

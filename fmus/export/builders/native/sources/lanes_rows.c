@@ -75,13 +75,10 @@ VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted)
 /* Read what is asked of a sample, if it is one of those that are read. */
 VECTORS static void read_group(
     Group *m, const Rows *asked, const Needed *needed, size_t row, size_t sample, int active) {
-    if (sample % asked->every) return;
-    sample /= asked->every;
-    size_t n_found = (asked->n_samples - 1) / asked->every + 1;
-    if (!asked->first) {
-        if (sample == 0) return;
-        n_found--, sample--;
-    }
+    size_t left_out = asked->first ? 0 : 1, place = sample / asked->every;
+    if (sample % asked->every || place < left_out) return;
+    size_t n_found = (asked->n_samples - 1) / asked->every + 1 - left_out;
+    place -= left_out;
     if (needed->outputs) lanes_h(m->values, m->outputs);
     if (needed->slopes) lanes_f(m->values, m->slopes);
     for (size_t k = 0; k < asked->n_get; k++) {
@@ -90,7 +87,7 @@ VECTORS static void read_group(
                              : from < FIRST_LOCAL ? &m->outputs[from - N_SET]
                                                   : &m->slopes[LOCALS[from - FIRST_LOCAL]];
         for (int i = 0; i < active; i++)
-            asked->found[((row + (size_t)i) * n_found + sample) * asked->n_get + k] = (*value)[i];
+            asked->found[((row + (size_t)i) * n_found + place) * asked->n_get + k] = (*value)[i];
     }
 }
 
