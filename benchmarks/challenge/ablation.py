@@ -17,6 +17,7 @@ from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.promise import distinct
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.screening.missing_force import MissingForce
@@ -79,7 +80,8 @@ class _Again:
         if not found.singles and not found.pairs:
             return SEARCHED, []
         singles = form_of(baseline).ranked(found.singles)
-        leading = judge(baseline, singles, found.pairs, found.detection.sets_in)
+        kinds = len(distinct(found.promises))
+        leading = judge(baseline, singles, found.pairs, kinds, found.detection.sets_in)
         told = confirmed_on_test(baseline, law_form.confirmed(baseline, leading, found.forces))
         return told.after(before).verdict, _named(told)
 

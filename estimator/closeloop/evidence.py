@@ -72,6 +72,12 @@ class Check:
         return cls(name, float(value), float(limit), bool(value <= limit))
 
 
+def accepted(checks: Sequence[Check]) -> bool:
+    """Whether an answer has passed its checks; if two have the same name, the later one counts."""
+    passed = {c.name: c.passed for c in checks}
+    return all(passed.get(name, True) for name in ANSWER)
+
+
 def verdict_of(checks: Sequence[Check]) -> Verdict:
     """The verdict that follows from the checks; if two have the same name, the later one counts.
 
@@ -90,7 +96,7 @@ def verdict_of(checks: Sequence[Check]) -> Verdict:
         return "no_discrepancy"
     if not passed.get("every sensor moves", True):
         return "sensor_fault"
-    if not all(passed.get(name, True) for name in ANSWER):
+    if not accepted(checks):
         form = passed.get("more than another form of the model leaves", True)
         return "unexplained" if form else "no_discrepancy"
     if not holds("alternatives that this record does not tell apart"):

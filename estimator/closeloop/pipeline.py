@@ -23,6 +23,7 @@ from estimator.closeloop.fitting.resolution import in_fine_steps, in_joined_step
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import distinct
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.planning.advice import next_experiment
 from estimator.closeloop.progress import Progress, Tell
@@ -247,7 +248,8 @@ class Chain:
         pairs: Sequence[Hypothesis], stage: str,
     ) -> tuple[Judgement, Judgement]:  # fmt: skip
         """The judgement by comparison of the fits, and the same after the test of the law's curve."""
-        leading = judge(shown.baseline, shown.twins.joined(singles), pairs, shown.began)
+        ones, kinds = shown.twins.joined(singles), len(distinct(shown.promises))
+        leading = judge(shown.baseline, ones, pairs, kinds, shown.began)
         return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))
 
 

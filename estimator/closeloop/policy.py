@@ -446,8 +446,8 @@ class DecisionPolicy:
     )
     second_share: float = limit(
         0.5,
-        "share of what one effect leaves beyond noise",
-        "share that a second effect, or a free curve beside a law, must explain",
+        "share of what a law leaves beyond noise",
+        "share that a free curve beside the law must explain, so that it is rejected",
         CHALLENGE,
     )
     open_curve_explained: float = limit(
@@ -524,6 +524,12 @@ class PriorPolicy:
         "share of an output's rms",
         "largest size that the form of a right model leaves on average, as far as its order is known",
         "convention: half of `signal_share`, so that one right model in seven at most leaves what matters",
+    )
+    refused: float = limit(
+        0.01,
+        "probability",
+        "probability that the checks of an answer refuse the right one",
+        "convention: as the level of detection; two of some hundred right ones were refused with seed 166636",
     )
 
 

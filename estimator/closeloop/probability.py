@@ -10,7 +10,9 @@ Three questions are answered one after the other, each with the prior of the pol
 2. An effect, or none? By the same criterion.
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
-   share. Where noise hides so small a share, the prior decides.
+   share. Where noise hides so small a share, the prior decides. If the checks of the verdict refuse every
+   hypothesis, that is evidence, too: they refuse a right one with the small probability of the policy, and
+   imitations of a mechanism outside as a rule.
 
 A residual that is too small to matter is not searched. Whether an effect left it, which the calibration
 compensates or which is weak, or the form of a right model, is told by its size alone: see `odds_of_effect`.
@@ -26,7 +28,7 @@ from scipy.special import logsumexp
 
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.detection.importance import TINY, signal_size
-from estimator.closeloop.evidence import Judgement
+from estimator.closeloop.evidence import Judgement, accepted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
@@ -64,7 +66,7 @@ def probabilities(
     named = {m.label: m for m in judgement.members}
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
-    for label, p in _of_fits(baseline, promises, fitted).items():
+    for label, p in _of_fits(baseline, promises, fitted, accepted(judgement.checks)).items():
         name = same.get(label, label)
         found[name] = found.get(name, 0.0) + p
     ranked = sorted(found.items(), key=lambda item: -item[1])
@@ -150,30 +152,45 @@ def _independent(baseline: Baseline) -> float:
 
 
 def _of_fits(
-    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis]
+    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis], passed: bool
 ) -> dict[str, float]:
-    """Probability of each label, and of no discrepancy."""
-    base, prior = baseline.hypothesis, baseline.policy.prior
-    kinds = max(len(distinct(promises)), 1)
-    share = {1: np.log(1 - prior.pair), 2: np.log(prior.pair)}
-    each = {1: -np.log(kinds), 2: -np.log(max(comb(kinds, 2), 1))}
-    price = np.log(_independent(baseline)) / 2
+    """Probability of each label, and of no discrepancy; passed: whether a hypothesis passed all checks."""
+    base, prior, kinds = baseline.hypothesis, baseline.policy.prior, len(distinct(promises))
     best = min(fitted, key=lambda h: h.fit.cost - 2 * baseline.score(h))
     known: dict[str, float] = {}
     alone: dict[str, float] = {}  # without the share of singles or pairs, which a stranger does not have
     for h in fitted:
-        n = min(len(h.candidates), 2)
-        value = _evidence(baseline, best, h) - _price(h, price) + each[n]
+        value = _one_of_its_size(baseline, best, h, kinds)
         if value > alone.get(h.label, -np.inf):
-            alone[h.label], known[h.label] = value, value + share[n]
+            alone[h.label], known[h.label] = value, value + _share(baseline, h)
     library, stranger = (float(logsumexp(list(values.values()))) for values in (known, alone))
     odds = _odds_of_outside(baseline, best)
-    within = np.log(prior.effect * (1 - prior.outside))
+    within = np.log(prior.effect * (1 - prior.outside) * (1 - prior.refused if passed else prior.refused))
     outside = np.log(prior.effect * prior.outside) + np.log(odds) + stranger
     nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
     whole = logsumexp([within + library, outside, nothing])
     found = {label: float(np.exp(within + value - whole)) for label, value in known.items()}
     return {**found, NO_DISCREPANCY: float(np.exp(nothing - whole))}
+
+
+def more_probable(baseline: Baseline, h: Hypothesis, other: Hypothesis, kinds: int) -> bool:
+    """Whether h is more probable than another hypothesis of the library; kinds: number of effects in it."""
+    best = min((h, other), key=lambda x: x.fit.cost - 2 * baseline.score(x))
+    mine, its = (_one_of_its_size(baseline, best, x, kinds) + _share(baseline, x) for x in (h, other))
+    return mine > its
+
+
+def _one_of_its_size(baseline: Baseline, best: Hypothesis, h: Hypothesis, kinds: int) -> float:
+    """Log probability of h among the hypotheses with as many effects, up to a constant."""
+    price = np.log(_independent(baseline)) / 2
+    many = comb(max(kinds, 1), min(len(h.candidates), 2))
+    return _evidence(baseline, best, h) - _price(h, price) - float(np.log(max(many, 1)))
+
+
+def _share(baseline: Baseline, h: Hypothesis) -> float:
+    """Log share of the hypotheses with as many effects as h has."""
+    pair = baseline.policy.prior.pair
+    return float(np.log(pair if len(h.candidates) > 1 else 1 - pair))
 
 
 def _price(h: Hypothesis, most: float) -> float:

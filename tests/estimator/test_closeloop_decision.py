@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import completes, judge
+from estimator.closeloop.decision.verdict import judge
 from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -206,7 +206,7 @@ def test_several_effects_leave_noise_alone_because_they_can_imitate_form(before,
 )
 def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
     base = in_parts(early, late)
-    told = judge(baseline(asked(), base, NOISE), [base], []).after(DETECTED)
+    told = judge(baseline(asked(), base, NOISE), [base], [], 1).after(DETECTED)
     assert told.verdict == "unexplained"
     assert said in told.reason
     assert bool(told.next_experiment) == (said != "best fit:")
@@ -223,7 +223,7 @@ def test_what_is_in_one_part_alone_is_said_to_be(early, late, said):
 )
 def test_what_no_effect_explains_may_be_another_form(form, rms, began, verdict):
     base = left(rms, 1.1)
-    assert judge(baseline(asked(form), base, NOISE), [base], [], began).after(DETECTED).verdict == verdict
+    assert judge(baseline(asked(form), base, NOISE), [base], [], 1, began).after(DETECTED).verdict == verdict
 
 
 # ---- simpler laws
@@ -314,14 +314,6 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
 
 
 # ---- second effects
-
-
-@pytest.mark.parametrize(
-    ("one", "two", "complete"),
-    [(1.2, 1.0, True), (1.2, 1.05, True), (1.2, 1.15, False), (60.0, 45.0, False), (60.0, 1.0, True)],
-)
-def test_a_second_effect_accounts_for_most_of_what_the_first_leaves(one, two, complete):
-    assert completes(baseline(asked(), noise=NOISE), left(two, 1.0), left(one, 1.0)) is complete
 
 
 def test_a_pair_becomes_a_simpler_one_in_either_order():

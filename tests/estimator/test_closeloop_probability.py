@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimator.closeloop.decision.verdict import completes
 from estimator.closeloop.detection.detect import Detection
+from estimator.closeloop.evidence import Verdict
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.probability import NO_DISCREPANCY, odds_of_effect, probabilities
@@ -36,31 +38,29 @@ def asked() -> Problem:
     return Problem(lambda _: Path(), Record((run,), (), ("y",), np.ones(1)), {}, {})
 
 
-def fitted(measured: Array, law: int | None, wide: float = np.inf) -> Hypothesis:
-    """The least-squares fit of a law to the part to identify; None for no effect."""
-    if law is None:
-        nothing = fit_with((), np.zeros(0), np.zeros((0, 0)), measured[FIT], np.zeros((FIT.sum(), 0)))
-        return Hypothesis((), nothing, (measured[:, None],))
-    shape = LAWS[law]
-    squares = float(shape[FIT] @ shape[FIT])
-    size = float(shape[FIT] @ measured[FIT]) / squares
-    unknown = Unknown(f"constant_force_{law}_F_0", 0.0, -wide, wide, 1.0)
-    left = measured - size * shape
-    fit = fit_with((unknown,), np.array([size]), np.array([[1 / squares]]), left[FIT], -shape[FIT, None])
-    return Hypothesis((Candidate("constant_force", str(law), (unknown,)),), fit, (left[:, None],))
+def fitted(measured: Array, *laws: int) -> Hypothesis:
+    """The least-squares fit of some laws to the part to identify."""
+    shapes = np.array([LAWS[i] for i in laws]).reshape(-1, SAMPLES).T
+    covariance = np.linalg.inv(shapes[FIT].T @ shapes[FIT])
+    sizes = covariance @ (shapes[FIT].T @ measured[FIT])
+    unknowns = tuple(Unknown(f"constant_force_{i}_F_0", 0.0, -np.inf, np.inf, 1.0) for i in laws)
+    left = measured - shapes @ sizes
+    fit = fit_with(unknowns, sizes, covariance, left[FIT], -shapes[FIT])
+    candidates = tuple(Candidate("constant_force", str(i), (u,)) for i, u in zip(laws, unknowns, strict=True))
+    return Hypothesis(candidates, fit, (left[:, None],))
 
 
-def answered(measured: Array) -> dict[str, float]:
+def answered(measured: Array, verdict: Verdict = "traced") -> dict[str, float]:
     found = [fitted(measured, i) for i in range(LIBRARY)]
-    return probabilities(on(measured), SEEN, judged("unexplained"), promised(measured), found)
+    return probabilities(on(measured), SEEN, judged(verdict), promised(measured), found)
 
 
 def on(measured: Array) -> Baseline:
-    return baseline(asked(), fitted(measured, None), np.ones(1))
+    return baseline(asked(), fitted(measured), np.ones(1))
 
 
 def promised(measured: Array) -> list[Promise]:
-    base = fitted(measured, None).fit.cost
+    base = fitted(measured).fit.cost
     found = (fitted(measured, i) for i in range(LIBRARY))
     return [Promise(h.candidates, base - h.fit.cost, {}) for h in found]
 
@@ -103,6 +103,18 @@ def test_what_outside_mechanisms_leave_is_said_to_be_none_of_these():
 
 @given(st.floats(3.0, 100.0), st.integers(0, 2**32 - 1))
 @settings(max_examples=25, deadline=None)
+def test_checks_that_refuse_every_hypothesis_are_evidence_for_none_of_these(size, seed):
+    measured = np.random.default_rng(seed).standard_normal(SAMPLES) + size * LAWS[2]
+    passed, refused = (
+        answered(measured, verdict)["constant_force@2"] for verdict in ("traced", "unexplained")
+    )
+    error = DEFAULT.prior.refused
+    odds = passed / (1 - passed) * error / (1 - error)
+    assert refused / (1 - refused) == pytest.approx(odds, rel=1e-6)
+
+
+@given(st.floats(3.0, 100.0), st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
 def test_a_strong_effect_of_the_library_is_certain(size, seed):
     noise = np.random.default_rng(seed).standard_normal(SAMPLES)
     found = answered(noise + size * LAWS[2])
@@ -139,6 +151,29 @@ def test_correlated_residuals_are_less_evidence():
     sure = answered(white + 3 * LAWS[2])
     less = answered(white + slow + 3 * LAWS[2])
     assert sure["constant_force@2"] > 0.97 > less.get("constant_force@2", 0.0)
+
+
+@given(st.floats(1.0, 5.0), st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_two_effects_that_act_are_more_probable_than_one(size, seed):
+    noise = np.random.default_rng(seed).standard_normal(SAMPLES)
+    measured = noise + 2 * LAWS[2] + size * LAWS[6]
+    assert completes(on(measured), fitted(measured, 2, 6), fitted(measured, 2), LIBRARY)
+
+
+def test_what_the_form_leaves_is_no_second_effect():
+    """A second effect can take a part of it, which is better than chance but no more probable."""
+    better = complete = 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        slow = 40 * np.convolve(rng.standard_normal(SAMPLES + 99), np.ones(100) / 100, "valid")
+        measured = rng.standard_normal(SAMPLES) + slow + 30 * LAWS[2]
+        one = fitted(measured, 2)
+        two = min((fitted(measured, 2, i) for i in range(LIBRARY) if i != 2), key=cost)
+        better += cost(one) - cost(two) > DEFAULT.decision.noticed
+        complete += completes(on(measured), two, one, LIBRARY)
+    assert better > 50
+    assert complete < 5
 
 
 def test_without_fits_the_screening_says_whether_there_is_an_effect():

@@ -116,7 +116,7 @@ def looked_at(name: str, asked: Problem, kinds: Sequence[str], quiet: bool = Fal
     promises = [_promise(c, base.fit.theta) for c in candidates]
     singles = form_of(baseline).ranked(Fitter(baseline).finished(promises))
     none = judged("no_discrepancy", (), "nothing")
-    said = none if quiet else judge(baseline, singles, ()).after(DETECTED)
+    said = none if quiet else judge(baseline, singles, (), len(promises)).after(DETECTED)
     detection = Detection(0.01, 0.0, {}, 1.0)
     found = (declared, baseline, detection, tuple(forces), tuple(promises), tuple(singles), ())
     return Traced(name, asked, Outcome(*found, said))

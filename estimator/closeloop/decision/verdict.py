@@ -16,6 +16,7 @@ from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes, splitting
+from estimator.closeloop.probability import more_probable
 from fmus.effects import EFFECTS
 
 
@@ -128,16 +129,20 @@ def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
 
 
 def judge(
-    baseline: Baseline, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], began: bool = False
+    baseline: Baseline,
+    singles: Sequence[Hypothesis],
+    pairs: Sequence[Hypothesis],
+    kinds: int,
+    began: bool = False,
 ) -> Judgement:
     """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy.
 
-    began: whether the discrepancy sets in during the record.
+    kinds: number of effects that were screened; began: whether the discrepancy sets in during the record.
     """
     form = form_of(baseline)
     good = [h for h in singles if explains(baseline, h)]
     both = [h for h in pairs if explains(baseline, h) and needed(baseline, h, singles)]
-    if both and (not good or completes(baseline, both[0], good[0])):
+    if both and (not good or completes(baseline, both[0], good[0], kinds)):
         members = [h for h in equivalent(baseline, both[0], both) if not one_curve(h)]
         checks = account(baseline, both[0])
         return (named(members) if members else no_law(both[0])).after(checks)
@@ -180,13 +185,12 @@ def needed(baseline: Baseline, pair: Hypothesis, singles: Sequence[Hypothesis]) 
     return not singles or baseline.beats(pair, singles[0])
 
 
-def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis) -> bool:
-    """Whether a pair is better than a single hypothesis, and explains enough of what that one leaves.
+def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: int) -> bool:
+    """Whether a pair is better than a single hypothesis that accounts for the residual, and more probable.
 
-    If most of that stays, its cause is neither effect, and the second effect is not a finding.
+    What is left of an error of the model's form lets almost any second effect win on a part of the record.
     """
-    least = baseline.policy.decision.second_share * baseline.beyond_noise(single)
-    return baseline.beats(pair, single) and 2 * baseline.lead(pair, single)[0] >= least
+    return baseline.beats(pair, single) and more_probable(baseline, pair, single, kinds)
 
 
 def _noise_alone(baseline: Baseline, part: Part) -> bool:
