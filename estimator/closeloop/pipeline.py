@@ -11,7 +11,12 @@ from joblib import Parallel, delayed
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
+from estimator.closeloop.decision.verdict import (
+    confirmed_on_test,
+    judge,
+    most_probable_first,
+    without_fits,
+)
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
@@ -164,15 +169,16 @@ class Chain:
             self.tell("weights", "weighting the residuals by the noise that the best fit leaves")
             shown, singles, pairs = self._weighted_anew(shown, singles, pairs, noise)
         baseline, singles, pairs, judgement = self._answered(shown, found.forces, singles, pairs)
+        every, judgement = tuple(shown.twins.joined(singles)), judgement.after(before)
+        found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
         self.tell("test", "checking the answer on the test part")
-        judgement = confirmed_on_test(baseline, judgement).after(before)
+        judgement = confirmed_on_test(baseline, most_probable_first(judgement, found.probability))
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")
             members, twins = judgement.members, shown.twins
             words = self.stages.done("next experiment", lambda: next_experiment(baseline, members, twins))
             judgement = replace(judgement, next_experiment=words)
-        every = tuple(shown.twins.joined(singles))
-        found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
+        found = replace(found, judgement=judgement)
         if judgement.verdict != "unexplained":
             return found
         self.tell("free form", "fitting a force of free form")

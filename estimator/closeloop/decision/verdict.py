@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -241,3 +241,9 @@ def named(members: Sequence[Hypothesis]) -> Judgement:
     names = ", ".join(m.label for m in members)
     reason = f"this record cannot tell apart {names}"
     return Judgement(checks, tuple(members), reason, splitting(members))
+
+
+def most_probable_first(found: Judgement, probability: Mapping[str, float]) -> Judgement:
+    """The judgement with the members of a class sorted by their probability; probability: by label."""
+    members = sorted(found.members, key=lambda m: -probability.get(m.label, 0.0))
+    return replace(found, members=tuple(members), reason=named(members).reason) if members else found
