@@ -28,7 +28,7 @@ from scipy.special import logsumexp
 
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.detection.importance import TINY, signal_size
-from estimator.closeloop.evidence import Judgement, accepted
+from estimator.closeloop.evidence import Judgement, refuted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
@@ -66,7 +66,7 @@ def probabilities(
     named = {m.label: m for m in judgement.members}
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
-    for label, p in _of_fits(baseline, promises, fitted, accepted(judgement.checks)).items():
+    for label, p in _of_fits(baseline, promises, fitted, refuted(judgement.checks)).items():
         name = same.get(label, label)
         found[name] = found.get(name, 0.0) + p
     ranked = sorted(found.items(), key=lambda item: -item[1])
@@ -152,9 +152,9 @@ def _independent(baseline: Baseline) -> float:
 
 
 def _of_fits(
-    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis], passed: bool
+    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis], refused: bool
 ) -> dict[str, float]:
-    """Probability of each label, and of no discrepancy; passed: whether a hypothesis passed all checks."""
+    """Probability of each label, and of no discrepancy; refused: whether checks refuse every hypothesis."""
     base, prior, kinds = baseline.hypothesis, baseline.policy.prior, len(distinct(promises))
     best = min(fitted, key=lambda h: h.fit.cost - 2 * baseline.score(h))
     known: dict[str, float] = {}
@@ -165,7 +165,7 @@ def _of_fits(
             alone[h.label], known[h.label] = value, value + _share(baseline, h)
     library, stranger = (float(logsumexp(list(values.values()))) for values in (known, alone))
     odds = _odds_of_outside(baseline, best)
-    within = np.log(prior.effect * (1 - prior.outside) * (1 - prior.refused if passed else prior.refused))
+    within = np.log(prior.effect * (1 - prior.outside) * (prior.refused if refused else 1 - prior.refused))
     outside = np.log(prior.effect * prior.outside) + np.log(odds) + stranger
     nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
     whole = logsumexp([within + library, outside, nothing])
