@@ -408,7 +408,8 @@ class DecisionPolicy:
     most: float = limit(
         0.5,
         "share of the variance",
-        "share that an answer must explain of the residual's variance if noise is not declared, and that one "
+        "share that an answer must explain of the residual's variance if noise is not declared and what it "
+        "leaves is not white, and that one "
         "effect must explain of the variance beyond noise if the model form is open; a residual of which no "
         "effect could explain as much is left to the form; what inputs that were held over a sample must "
         "explain of the variance beyond noise",

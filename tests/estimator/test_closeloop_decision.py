@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import judge
+from estimator.closeloop.decision.verdict import explains, judge
 from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -315,6 +315,35 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
 
 
 # ---- second effects
+
+
+@pytest.mark.parametrize(
+    ("left", "accounts"), [("noise", True), ("slow motion", False), ("impacts", False), ("half of it", True)]
+)
+@pytest.mark.parametrize("seed", range(5))
+def test_where_noise_is_not_declared_an_answer_leaves_white_noise(left, accounts, seed):
+    """Or it takes most of the variance; otherwise noise cannot be told from what the answer lacks."""
+    rng = np.random.default_rng(seed)
+    noise, shape = rng.standard_normal(len(T)), np.sin(0.05 * T)
+    lacks = {
+        "noise": 0 * T,
+        "slow motion": np.sin(0.021 * T),
+        "impacts": 10.0 * (T % 100 == 0),
+        "half of it": np.sin(0.021 * T),
+    }[left]
+    effect = (4.0 if left == "half of it" else 0.5) * shape
+    unknown = Unknown("constant_force_wheel_F_0", 1.0, -9.0, 9.0, 1.0)
+    candidate = Candidate("constant_force", "wheel", (unknown,))
+    fits = [
+        fit_with((u,) * n, np.ones(n), 1e-4 * np.eye(n), r[: len(T) // 2], -shape[: len(T) // 2, None][:, :n])
+        for n, u, r in ((0, unknown, noise + lacks + effect), (1, unknown, noise + lacks))
+    ]
+    base, one = (
+        Hypothesis(c, fit, (r[:, None] * np.ones(2),))
+        for c, fit, r in (((), fits[0], noise + lacks + effect), ((candidate,), fits[1], noise + lacks))
+    )
+    undeclared = replace(baseline(asked(), base, NOISE).noise, declared=np.zeros(2, bool))
+    assert explains(replace(baseline(asked(), base, NOISE), noise=undeclared), one) is accounts
 
 
 @given(st.permutations((0.0, 0.2, 0.2, 0.6)))
