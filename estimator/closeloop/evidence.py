@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.relations import splitting
 
 Verdict = Literal[
     "no_discrepancy",
@@ -121,6 +122,29 @@ class Judgement:
     members: tuple[Hypothesis, ...]
     reason: str
     next_experiment: str = ""
+
+    @classmethod
+    def naming(cls, members: Sequence[Hypothesis]) -> Judgement:
+        """The judgement if one hypothesis accounts for the residual, or several that cannot be told apart."""
+        best = members[0]
+        faults = sum(c.is_fault for c in best.candidates)
+        checks = (
+            Check.most("alternatives that this record does not tell apart", len(members) - 1, 0),
+            Check.most("effects that are needed", len(best.candidates), 1),
+            Check.most("faults of sensors among them", faults, 0),
+        )
+        if len(members) == 1:
+            return cls(checks, tuple(members), f"{best.label} accounts for the residual")
+        names = ", ".join(m.label for m in members)
+        reason = f"this record cannot tell apart {names}"
+        return cls(checks, tuple(members), reason, splitting(members))
+
+    def most_probable_first(self, probability: Mapping[str, float]) -> Judgement:
+        """The same judgement, its members sorted by their probability; probability: by label."""
+        members = sorted(self.members, key=lambda m: -probability.get(m.label, 0.0))
+        if not members:
+            return self
+        return replace(self, members=tuple(members), reason=Judgement.naming(members).reason)
 
     @property
     def verdict(self) -> Verdict:

@@ -11,12 +11,7 @@ from joblib import Parallel, delayed
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import (
-    confirmed_on_test,
-    judge,
-    most_probable_first,
-    without_fits,
-)
+from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
@@ -172,7 +167,7 @@ class Chain:
         every, judgement = tuple(shown.twins.joined(singles)), judgement.after(before)
         found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
         self.tell("test", "checking the answer on the test part")
-        judgement = confirmed_on_test(baseline, most_probable_first(judgement, found.probability))
+        judgement = confirmed_on_test(baseline, judgement.most_probable_first(found.probability))
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")
             members, twins = judgement.members, shown.twins

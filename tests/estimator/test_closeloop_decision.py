@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import judge, most_probable_first, named
+from estimator.closeloop.decision.verdict import judge
 from estimator.closeloop.detection.importance import importance
+from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.relations import becomes, limits
@@ -320,8 +321,8 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
 def test_a_class_is_listed_with_its_most_probable_member_first(shares):
     kinds = ("constant_force", "viscous_damping", "coulomb_friction", "cubic_stiffness")
     members = [law(kind, 0, 0.0) for kind in kinds]
-    told = named(members)
-    found = most_probable_first(told, {m.label: p for m, p in zip(members, shares, strict=True) if p})
+    told = Judgement.naming(members)
+    found = told.most_probable_first({m.label: p for m, p in zip(members, shares, strict=True) if p})
     listed = [shares[members.index(m)] for m in found.members]
     assert listed == sorted(shares, reverse=True)
     assert sorted(map(members.index, found.members)) == [0, 1, 2, 3]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import named, no_law
+from estimator.closeloop.decision.verdict import no_law
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -39,7 +39,7 @@ def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[Missing
     if len(best.candidates) == 1 and not any(motion(m) == motion(best) for m in rest):
         rest = []
     if rest:
-        return named(rest).after(judgement.checks)
+        return Judgement.naming(rest).after(judgement.checks)
     wrong = doubted(baseline, best, forces)
     return no_law(best, wrong[0] if wrong else None, check).after(judgement.checks)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
-from estimator.closeloop.hypotheses.relations import becomes, splitting
+from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.probability import more_probable
 from fmus.effects import EFFECTS
 
@@ -141,17 +141,18 @@ def judge(
     """
     form = form_of(baseline)
     good = [h for h in singles if explains(baseline, h)]
-    both = [h for h in pairs if explains(baseline, h) and needed(baseline, h, singles)]
+    better_than_one = [h for h in pairs if not singles or baseline.beats(h, singles[0])]
+    both = [h for h in better_than_one if explains(baseline, h)]
     if both and (not good or completes(baseline, both[0], good[0], kinds)):
         members = [h for h in equivalent(baseline, both[0], both) if not one_curve(h)]
         checks = account(baseline, both[0])
-        return (named(members) if members else no_law(both[0])).after(checks)
+        return (Judgement.naming(members) if members else no_law(both[0])).after(checks)
     if good:
         members = equivalent(baseline, good[0], good)
         best, checks = members[0], account(baseline, members[0])
         richer = next((h for h in [*good, *pairs] if form.outgrown(best, h)), None)
         if richer is None:
-            return named(members).after(checks)
+            return Judgement.naming(members).after(checks)
         gained, limit = cost(best) - cost(richer), form.noticed(best)
         checks.append(Check.most("nothing richer gains on the part to identify", gained, limit))
         return (no_law(best) if becomes(richer, best) else _not_all(best, richer)).after(checks)
@@ -178,11 +179,6 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     label = nearest.label if nearest.candidates else "none"
     reason = f"no effect of the library accounts for the residual; best fit: {label}"
     return Judgement(checks, (), reason)
-
-
-def needed(baseline: Baseline, pair: Hypothesis, singles: Sequence[Hypothesis]) -> bool:
-    """Whether a pair is better than the best single hypothesis, so that both members are needed."""
-    return not singles or baseline.beats(pair, singles[0])
 
 
 def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: int) -> bool:
@@ -225,25 +221,3 @@ def _not_all(m: Hypothesis, richer: Hypothesis) -> Judgement:
         f"{richer.label} fits better"
     )
     return Judgement((), (), reason)
-
-
-def named(members: Sequence[Hypothesis]) -> Judgement:
-    """The judgement if one hypothesis accounts for the residual, or several that cannot be told apart."""
-    best = members[0]
-    faults = sum(c.is_fault for c in best.candidates)
-    checks = (
-        Check.most("alternatives that this record does not tell apart", len(members) - 1, 0),
-        Check.most("effects that are needed", len(best.candidates), 1),
-        Check.most("faults of sensors among them", faults, 0),
-    )
-    if len(members) == 1:
-        return Judgement(checks, tuple(members), f"{best.label} accounts for the residual")
-    names = ", ".join(m.label for m in members)
-    reason = f"this record cannot tell apart {names}"
-    return Judgement(checks, tuple(members), reason, splitting(members))
-
-
-def most_probable_first(found: Judgement, probability: Mapping[str, float]) -> Judgement:
-    """The judgement with the members of a class sorted by their probability; probability: by label."""
-    members = sorted(found.members, key=lambda m: -probability.get(m.label, 0.0))
-    return replace(found, members=tuple(members), reason=named(members).reason) if members else found
