@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.closeloop.decision.verdict import confirmed_on_test, named
+from estimator.closeloop.decision.verdict import confirmed_on_test
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -39,7 +39,9 @@ def judged(base: Array, found: Array, effects: int = 1) -> tuple[Baseline, Judge
     run = Run(T, y[:, :0], y, *(np.equal(T // N, i) for i in range(3)))
     problem = Problem(lambda _: None, Record((run,), (), ("y",), NOISE), {}, {})
     at = baseline(problem, leaves(base), NOISE)
-    return at, confirmed_on_test(at, named([leaves(found, (LAW, OTHER)[:effects])])).after(DETECTED)
+    return at, confirmed_on_test(at, Judgement.naming([leaves(found, (LAW, OTHER)[:effects])])).after(
+        DETECTED
+    )
 
 
 @pytest.mark.parametrize(
