@@ -140,10 +140,8 @@ class Judgement:
         return cls(checks, tuple(members), reason, splitting(members))
 
     def most_probable_first(self, probability: Mapping[str, float]) -> Judgement:
-        """The same judgement, its members sorted by their probability; probability: by label."""
+        """The same judgement, its members, at least one, sorted by their probability, which is by label."""
         members = sorted(self.members, key=lambda m: -probability.get(m.label, 0.0))
-        if not members:
-            return self
         return replace(self, members=tuple(members), reason=Judgement.naming(members).reason)
 
     @property

@@ -167,7 +167,9 @@ class Chain:
         every, judgement = tuple(shown.twins.joined(singles)), judgement.after(before)
         found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
         self.tell("test", "checking the answer on the test part")
-        judgement = confirmed_on_test(baseline, judgement.most_probable_first(found.probability))
+        if len(judgement.members) > 1:
+            judgement = judgement.most_probable_first(found.probability)
+        judgement = confirmed_on_test(baseline, judgement)
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")
             members, twins = judgement.members, shown.twins

@@ -1,6 +1,6 @@
 """The probability of each answer: of every fitted hypothesis, of no discrepancy, and of none of these.
 
-Three questions are answered one after the other, each with the prior of the policy.
+Four questions are answered one after the other, each with the prior of the policy.
 
 1. Which hypothesis of the library? Their evidence on the parts to identify and to choose is compared by the
    criterion of G. Schwarz (Annals of Statistics 6 (1978), 461-464), which approximates marginal likelihoods
@@ -10,9 +10,9 @@ Three questions are answered one after the other, each with the prior of the pol
 2. An effect, or none? By the same criterion.
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
-   share. Where noise hides so small a share, the prior decides. If the checks of the verdict refuse every
-   hypothesis, that is evidence, too: they refuse a right one with the small probability of the policy, and
-   imitations of a mechanism outside as a rule.
+   share. Where noise hides so small a share, the prior decides.
+4. Did a hypothesis pass the checks of the verdict? They refuse a right one with the small probability of the
+   policy, and imitations of a mechanism outside as a rule. If they refuse all, that is evidence.
 
 A residual that is too small to matter is not searched. Whether an effect left it, which the calibration
 compensates or which is weak, or the form of a right model, is told by its size alone: see `odds_of_effect`.
@@ -156,7 +156,7 @@ def _of_fits(
 ) -> dict[str, float]:
     """Probability of each label, and of no discrepancy; refused: whether checks refuse every hypothesis."""
     base, prior, kinds = baseline.hypothesis, baseline.policy.prior, len(distinct(promises))
-    best = min(fitted, key=lambda h: h.fit.cost - 2 * baseline.score(h))
+    best = _closest(baseline, fitted)
     known: dict[str, float] = {}
     alone: dict[str, float] = {}  # without the share of singles or pairs, which a stranger does not have
     for h in fitted:
@@ -175,15 +175,20 @@ def _of_fits(
 
 def more_probable(baseline: Baseline, h: Hypothesis, other: Hypothesis, kinds: int) -> bool:
     """Whether h is more probable than another hypothesis of the library; kinds: number of effects in it."""
-    best = min((h, other), key=lambda x: x.fit.cost - 2 * baseline.score(x))
+    best = _closest(baseline, (h, other))
     mine, its = (_one_of_its_size(baseline, best, x, kinds) + _share(baseline, x) for x in (h, other))
     return mine > its
+
+
+def _closest(baseline: Baseline, some: Sequence[Hypothesis]) -> Hypothesis:
+    """The hypothesis with the smallest sum of squares on the parts to identify and to choose."""
+    return min(some, key=lambda h: h.fit.cost - 2 * baseline.score(h))
 
 
 def _one_of_its_size(baseline: Baseline, best: Hypothesis, h: Hypothesis, kinds: int) -> float:
     """Log probability of h among the hypotheses with as many effects, up to a constant."""
     price = np.log(_independent(baseline)) / 2
-    many = comb(max(kinds, 1), min(len(h.candidates), 2))
+    many = comb(kinds, min(len(h.candidates), 2))
     return _evidence(baseline, best, h) - _price(h, price) - float(np.log(max(many, 1)))
 
 

@@ -323,27 +323,19 @@ def test_the_error_of_a_wave_is_that_along_its_phase(phase, ratio, correlation):
 @pytest.mark.parametrize("seed", range(5))
 def test_where_noise_is_not_declared_an_answer_leaves_white_noise(left, accounts, seed):
     """Or it takes most of the variance; otherwise noise cannot be told from what the answer lacks."""
-    rng = np.random.default_rng(seed)
-    noise, shape = rng.standard_normal(len(T)), np.sin(0.05 * T)
-    lacks = {
-        "noise": 0 * T,
-        "slow motion": np.sin(0.021 * T),
-        "impacts": 10.0 * (T % 100 == 0),
-        "half of it": np.sin(0.021 * T),
-    }[left]
-    effect = (4.0 if left == "half of it" else 0.5) * shape
+    noise = np.random.default_rng(seed).standard_normal(len(T))
+    slow = np.sin(0.021 * T)
+    lacks = {"noise": 0 * T, "slow motion": slow, "impacts": 10.0 * (T % 100 == 0), "half of it": slow}[left]
+    shape, size = np.sin(0.05 * T), 4.0 if left == "half of it" else 0.5
+    rest, early = noise + lacks, T < SAMPLES
     unknown = Unknown("constant_force_wheel_F_0", 1.0, -9.0, 9.0, 1.0)
-    candidate = Candidate("constant_force", "wheel", (unknown,))
-    fits = [
-        fit_with((u,) * n, np.ones(n), 1e-4 * np.eye(n), r[: len(T) // 2], -shape[: len(T) // 2, None][:, :n])
-        for n, u, r in ((0, unknown, noise + lacks + effect), (1, unknown, noise + lacks))
-    ]
-    base, one = (
-        Hypothesis(c, fit, (r[:, None] * np.ones(2),))
-        for c, fit, r in (((), fits[0], noise + lacks + effect), ((candidate,), fits[1], noise + lacks))
-    )
-    undeclared = replace(baseline(asked(), base, NOISE).noise, declared=np.zeros(2, bool))
-    assert explains(replace(baseline(asked(), base, NOISE), noise=undeclared), one) is accounts
+    fit = fit_with((unknown,), np.array([size]), np.array([[1e-4]]), rest[early], -shape[early, None])
+    one = Hypothesis((Candidate("constant_force", "wheel", (unknown,)),), fit, (np.outer(rest, [1, 1]),))
+    before = rest + size * shape
+    without = fit_with((), np.zeros(0), np.zeros((0, 0)), before[early], np.zeros((SAMPLES, 0)))
+    b = baseline(asked(), Hypothesis((), without, (np.outer(before, [1, 1]),)), NOISE)
+    undeclared = replace(b, noise=replace(b.noise, declared=np.zeros(2, bool)))
+    assert explains(undeclared, one) is accounts
 
 
 @given(st.permutations((0.0, 0.2, 0.2, 0.6)))

@@ -39,9 +39,8 @@ def judged(base: Array, found: Array, effects: int = 1) -> tuple[Baseline, Judge
     run = Run(T, y[:, :0], y, *(np.equal(T // N, i) for i in range(3)))
     problem = Problem(lambda _: None, Record((run,), (), ("y",), NOISE), {}, {})
     at = baseline(problem, leaves(base), NOISE)
-    return at, confirmed_on_test(at, Judgement.naming([leaves(found, (LAW, OTHER)[:effects])])).after(
-        DETECTED
-    )
+    naming = Judgement.naming([leaves(found, (LAW, OTHER)[:effects])])
+    return at, confirmed_on_test(at, naming).after(DETECTED)
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     ]
     if declared.any():
         found.append(above_noise("outputs left above their noise", baseline, h, "choose"))
-    if not (declared | left_white(baseline, h)).all():
+    if not declared.all() and not (declared | left_white(baseline, h)).all():
         after, before = (
             np.mean((x.of(baseline.problem, "choose") / baseline.noise.scale)[:, ~declared] ** 2)
             for x in (h, base)
