@@ -26,34 +26,36 @@ class Noise:
 
     @classmethod
     def of(
-        cls, record: Record, residuals: Sequence[Array], chance: float, caused: Sequence[Array] = ()
-    ) -> "Noise":
+        cls, record: Record, residuals: Sequence[Array], chance: float, caused: Sequence[Array] = (),
+        all_noise: bool = True,
+    ) -> "Noise":  # fmt: skip
         """Noise of a record, from the residual (N, n_y) of a fit in each run.
 
         A declared size says how large the noise is, not that it is white. If the residual is no larger than
         that, it is taken as noise, and its correlation in time is estimated from it. chance: how far its mean
         square may exceed the declared one, in standard deviations; caused: draws (n, n_y) of further noise,
-        which is added to that of the sensors and which the outputs may share.
+        which is added to that of the sensors and which the outputs may share; all_noise: see `weights`.
         """
         white = noise_floor(record)
         if caused:
-            return cls._shared(record, residuals, white, caused)
+            return cls._shared(record, white, caused, weights(record, residuals, all_noise))
         correlation, fitted = [], _stretches(record, residuals)
         for j, declared in enumerate(record.noise_declared):
             found = _of_noise([r[:, j] / white[j] for r in fitted], chance) if declared else None
             correlation.append(np.ones(1) if found is None else found)
-        size = np.where(record.noise_declared, white, weights(record, residuals))
+        size = np.where(record.noise_declared, white, weights(record, residuals, all_noise))
         return cls(white, Weighting(size, tuple(correlation)), record.noise_declared)
 
     @classmethod
-    def _shared(
-        cls, record: Record, residuals: Sequence[Array], white: Array, caused: Sequence[Array]
-    ) -> "Noise":
-        """Noise of the sensors (n_y,) and the noise that is caused; see `of`."""
+    def _shared(cls, record: Record, white: Array, caused: Sequence[Array], unsaid: Array) -> "Noise":
+        """Noise of the sensors (n_y,) and the noise that is caused; see `of`.
+
+        unsaid: weights (n_y,) of the outputs whose noise is not declared.
+        """
         std = np.sqrt(white**2 + np.mean(np.concatenate(caused) ** 2, axis=0))
         joint = joint_of([d / std for d in caused], white / std)
         correlation = tuple(joint[:, j, j] / joint[0, j, j] for j in range(len(std)))
-        size = np.where(record.noise_declared, std, weights(record, residuals))
+        size = np.where(record.noise_declared, std, unsaid)
         return cls(std, Weighting(size, correlation, joint), record.noise_declared)
 
     @property
@@ -142,15 +144,17 @@ def correlation_time(residual: Array) -> float:
     return float(max(tau[np.argmax(window)] if window.any() else n / 5, 1.0))
 
 
-def weights(record: Record, residuals: Sequence[Array]) -> Array:
+def weights(record: Record, residuals: Sequence[Array], all_noise: bool = True) -> Array:
     """The unit of each output's residual (n_y,), by which residuals are weighted.
 
     It is the declared noise. If noise is not declared, it is the rms of the residual times the root of its
-    correlation time, so that only independent samples count (a composite likelihood).
+    correlation time, so that only independent samples count (a composite likelihood). all_noise: whether the
+    residual is held for noise. Where an effect is still sought in it, its motion says nothing about the
+    noise, and the rms alone balances the outputs.
     """
     size = record.noise_std.copy()
     for j in np.flatnonzero(~record.noise_declared):
         parts = [r[:, j] for r in _fitted(record, residuals)]
-        tau = np.mean([correlation_time(p) for p in parts])
+        tau = np.mean([correlation_time(p) for p in parts]) if all_noise else 1.0
         size[j] = np.sqrt(np.mean(np.concatenate(parts) ** 2) * tau)
     return np.maximum(size, noise_floor(record))

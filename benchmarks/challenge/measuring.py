@@ -64,6 +64,12 @@ class Undeclared(Measuring):
         return DECLARED.sub("", text)
 
 
+class Unknown(Correlated, Undeclared):
+    """As in `correlated`, and the experiment file says nothing of the noise."""
+
+    name = "unknown"
+
+
 class Quantised(Measuring):
     """White noise, then rounding to steps of 1 to 6 times that noise; the size of both is declared."""
 
@@ -109,5 +115,5 @@ class Clock(Measuring):
 
 
 WAYS: dict[str, type[Measuring]] = {
-    way.name: way for way in (Measuring, Correlated, Undeclared, Quantised, Inputs, Clock)
+    way.name: way for way in (Measuring, Correlated, Undeclared, Unknown, Quantised, Inputs, Clock)
 }

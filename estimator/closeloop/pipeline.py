@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
+from estimator.closeloop.decision.verdict import confirmed_on_test, judge, probable, without_fits
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
@@ -167,8 +167,8 @@ class Chain:
         every, judgement = tuple(shown.twins.joined(singles)), judgement.after(before)
         found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
         self.tell("test", "checking the answer on the test part")
-        if len(judgement.members) > 1:
-            judgement = judgement.most_probable_first(found.probability)
+        if judgement.members:
+            judgement = probable(baseline, judgement, found.probability, shown.began)
         judgement = confirmed_on_test(baseline, judgement)
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")

@@ -317,7 +317,10 @@ class SearchPolicy:
     )
     partners: int = limit(12, "candidates", "leading candidates whose pairs are all screened", CHALLENGE)
     pairs: int = limit(
-        4, "pairs", "pairs that are fitted from each of the two screenings of pairs", CHALLENGE
+        8,
+        "pairs",
+        "pairs that are fitted from each of the two screenings of pairs",
+        "calibrated on the Cascaded Tanks, whose right pair is the sixth of a screening",
     )
     second_effect: float = limit(
         0.25,
@@ -408,12 +411,16 @@ class DecisionPolicy:
     most: float = limit(
         0.5,
         "share of the variance",
-        "share that an answer must explain of the residual's variance if noise is not declared and what it "
-        "leaves is not white, and that one "
-        "effect must explain of the variance beyond noise if the model form is open; a residual of which no "
-        "effect could explain as much is left to the form; what inputs that were held over a sample must "
-        "explain of the variance beyond noise",
+        "share that one effect must explain of the variance beyond noise if the model form is open; a "
+        "residual of which no effect could explain as much is left to the form; what inputs that were held "
+        "over a sample must explain of the variance beyond noise",
         "derivation: what explains less than it leaves is not what the residual is mainly made of",
+    )
+    probable: float = limit(
+        0.5,
+        "probability",
+        "probability of the effects of an answer together, below which none is named",
+        "derivation: a name that is less probable is more often wrong than right",
     )
     open_alike: float = limit(
         0.25,
@@ -525,6 +532,12 @@ class PriorPolicy:
         "share of an output's rms",
         "largest size that the form of a right model leaves on average, as far as its order is known",
         "convention: half of `signal_share`, so that one right model in seven at most leaves what matters",
+    )
+    coloured: float = limit(
+        0.5,
+        "probability",
+        "probability that undeclared noise is not white, so that a right answer may leave any share",
+        "convention: nothing is known about noise of which nothing is said",
     )
     refused: float = limit(
         0.01,

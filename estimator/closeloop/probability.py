@@ -10,7 +10,8 @@ Four questions are answered one after the other, each with the prior of the poli
 2. An effect, or none? By the same criterion.
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
-   share. Where noise hides so small a share, the prior decides.
+   share. Where noise hides so small a share, the prior decides. Where noise is not declared, it may be
+   coloured, and all that a right answer leaves. What is unlike any effect differs from it by its size alone.
 4. Did a hypothesis pass the checks of the verdict? They refuse a right one with the small probability of the
    policy, and imitations of a mechanism outside as a rule. If they refuse all, that is evidence.
 
@@ -79,12 +80,19 @@ def _is(h: Hypothesis, member: Hypothesis) -> bool:
 
 
 def _of_size(baseline: Baseline) -> float:
-    """Probability that no effect left a residual that is too small to be searched.
+    """Probability that no effect left a residual that is too small to be searched."""
+    prior = baseline.policy.prior
+    odds = _odds_by_size(baseline) * prior.effect / (1 - prior.effect)
+    return float(1 / (1 + odds))
+
+
+def _odds_by_size(baseline: Baseline) -> float:
+    """How much more probable an effect makes the size of the residual of the calibrated FMU.
 
     The mean square of a residual has the scatter of noise. The output and the part of the record that leave
     the largest share of their signal count.
     """
-    b, prior = baseline, baseline.policy.prior
+    b = baseline
     noise, signal = b.noise.std**2, np.maximum(signal_size(b.problem) ** 2, TINY)
     shares, errors = [], []
     for part in WHOLE:
@@ -94,9 +102,8 @@ def _of_size(baseline: Baseline) -> float:
         errors.append(error / signal)
     share, error = np.array(shares).ravel(), np.array(errors).ravel()
     most = int(np.argmax(share))
-    form = max(prior.material, b.problem.form_error)
-    odds = odds_of_effect(float(share[most]), float(error[most]), form) * prior.effect / (1 - prior.effect)
-    return float(1 / (1 + odds))
+    form = max(b.policy.prior.material, b.problem.form_error)
+    return odds_of_effect(float(share[most]), float(error[most]), form)
 
 
 def odds_of_effect(share: float, error: float, form: float) -> float:
@@ -168,9 +175,17 @@ def _of_fits(
     within = np.log(prior.effect * (1 - prior.outside) * (prior.refused if refused else 1 - prior.refused))
     outside = np.log(prior.effect * prior.outside) + np.log(odds) + stranger
     nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
+    if not baseline.noise.known:  # what is unlike any effect of the library is told from noise by its size
+        outside = np.logaddexp(outside, nothing + _log_odds_of_outside_by_size(baseline))
     whole = logsumexp([within + library, outside, nothing])
     found = {label: float(np.exp(within + value - whole)) for label, value in known.items()}
     return {**found, NO_DISCREPANCY: float(np.exp(nothing - whole))}
+
+
+def _log_odds_of_outside_by_size(baseline: Baseline) -> float:
+    prior = baseline.policy.prior
+    share = prior.effect * prior.outside / (1 - prior.effect)
+    return float(np.log(share * _odds_by_size(baseline)))
 
 
 def more_probable(baseline: Baseline, h: Hypothesis, other: Hypothesis, kinds: int) -> bool:
@@ -232,7 +247,8 @@ def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
     """How much more probable a mechanism outside the library makes what the best hypothesis leaves.
 
     A right answer leaves a share of the sum of squares beyond noise that is exponentially distributed with
-    the mean of the policy; a mechanism outside leaves any share of it with equal probability.
+    the mean of the policy; a mechanism outside leaves any share of it with equal probability. So does a right
+    answer if noise is not declared and is not white, since only its white part is told from a residual.
     """
     prior, exact = baseline.policy.prior, not baseline.problem.form_error
     total, _ = _beyond(baseline, baseline.hypothesis)
@@ -242,9 +258,10 @@ def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
     share = np.linspace(0.0, 1.0, SHARES)
     seen = np.exp(-0.5 * ((min(left, total) - share * total) / error) ** 2)
     of_right = np.exp(-share / (prior.left if exact else prior.left_open))
-    right = float(np.sum(of_right * seen) / np.sum(of_right))
+    right, any_share = float(np.sum(of_right * seen) / np.sum(of_right)), float(np.mean(seen))
+    coloured = 0.0 if baseline.noise.known else prior.coloured
     tiny = np.finfo(float).tiny
-    return max(float(np.mean(seen)), tiny) / max(right, tiny)
+    return max(any_share, tiny) / max((1 - coloured) * right + coloured * any_share, tiny)
 
 
 def _beyond(baseline: Baseline, h: Hypothesis) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from estimator.closeloop.decision.verdict import completes
 from estimator.closeloop.detection.detect import Detection
@@ -99,6 +100,25 @@ def test_what_outside_mechanisms_leave_is_said_to_be_none_of_these():
     rng = np.random.default_rng(4)
     rest = [1 - sum(answered(rng.standard_normal(SAMPLES) + STRANGER).values()) for _ in range(20)]
     assert min(rest) > 0.99
+
+
+@given(st.floats(5.0, 10.0), st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_noise_that_is_not_declared_may_be_all_that_a_right_answer_leaves(size, seed):
+    """It may also be a mechanism outside the library; only the priors tell these apart."""
+    rng, prior = np.random.default_rng(seed), DEFAULT.prior
+    slow = lfilter([1.0], [1.0, -0.95], rng.standard_normal(SAMPLES))
+    measured = rng.standard_normal(SAMPLES) + slow + size * LAWS[2]
+    known = on(measured)
+    unknown = replace(known, noise=replace(known.noise, declared=np.zeros(1, bool)))
+    found = [fitted(measured, i) for i in range(LIBRARY)]
+    declared, undeclared = (
+        1 - sum(probabilities(b, SEEN, judged("traced"), promised(measured), found).values())
+        for b in (known, unknown)
+    )
+    within = (1 - prior.outside) * (1 - prior.refused)
+    assert declared > 0.9
+    assert undeclared == pytest.approx(prior.outside / (prior.outside + within * prior.coloured), abs=0.05)
 
 
 @given(st.floats(3.0, 100.0), st.integers(0, 2**32 - 1))

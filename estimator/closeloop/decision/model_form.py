@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimator.closeloop.detection.importance import TINY, importance, signal_size
+from estimator.closeloop.detection.importance import TINY, importance, importance_as_noise, signal_size
 from estimator.closeloop.evidence import Check
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
@@ -53,7 +53,10 @@ class ModelForm(ABC):
 
     @abstractmethod
     def another(self, began: bool) -> Check | None:
-        """The check that the residual exceeds the open share; None if the form is not open."""
+        """The check that the residual exceeds what needs no effect: the open share, or undeclared noise.
+
+        None if the form is not open and noise is declared.
+        """
 
     @abstractmethod
     def curve_limit(self, h: Hypothesis) -> float:
@@ -112,7 +115,10 @@ class Closed(ModelForm):
 
     def another(self, began: bool) -> Check | None:
         """See ModelForm."""
-        return None
+        if self.baseline.noise.known:
+            return None
+        size = importance_as_noise(self.baseline)
+        return Check.least("more than undeclared noise may leave", size, 1.0)
 
     def curve_limit(self, h: Hypothesis) -> float:
         """See ModelForm; more than chance, and most of what the law leaves beyond noise."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +10,12 @@ import numpy as np
 from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.detection.detect import Detection
-from estimator.closeloop.detection.importance import TINY
 from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.probability import more_probable
-from estimator.noise import DIFFERENCE, white_noise
-from estimator.record import BoolArray
 from fmus.effects import EFFECTS
 
 
@@ -31,39 +28,35 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     """The checks of a hypothesis on the part to choose.
 
     Every effect must differ clearly from zero, and the hypothesis must be better than the calibrated FMU.
-    Outputs with declared noise must come down to that noise, or nearly so. The residual of the others must be
-    white noise, or lose most of its variance: noise that is not declared may also be correlated.
+    Outputs with declared noise must come down to that noise, or nearly so. The others need not: noise that is
+    not declared may be all that is left, and how probable that is, the probability of the answer says.
     """
     limits, base = baseline.policy.decision, baseline.hypothesis
-    declared = baseline.noise.declared
     clear = min(h.significance(base), default=0.0)
     found = [
         Check.least("the size is clear of zero", clear, limits.significant),
         better("better than without it on the part to choose", baseline, h, "choose"),
     ]
-    if declared.any():
+    if baseline.noise.declared.any():
         found.append(above_noise("outputs left above their noise", baseline, h, "choose"))
-    if not declared.all() and not (declared | left_white(baseline, h)).all():
-        after, before = (
-            np.mean((x.of(baseline.problem, "choose") / baseline.noise.scale)[:, ~declared] ** 2)
-            for x in (h, base)
-        )
-        taken = 1 - float(after) / max(float(before), TINY)
-        found.append(Check.least("share of the variance taken away", taken, limits.most))
     return found
 
 
-def left_white(baseline: Baseline, h: Hypothesis) -> BoolArray:
-    """Whether the residual of each output (n_y,) on the part to choose is white noise, whatever its size.
+def probable(
+    baseline: Baseline, found: Judgement, probability: Mapping[str, float], began: bool
+) -> Judgement:
+    """The judgement with its most probable member first; without an answer if its members are improbable.
 
-    Neither slow motion nor single impacts add to the white noise that third differences show.
+    probability: by label; began: see `judge`.
     """
-    limits, residual = baseline.policy.decision, h.of(baseline.problem, "choose")
-    ends = np.cumsum(baseline.problem.record.stretches("choose"))[:-1]
-    pieces = [p for p in np.split(residual, ends) if len(p) >= len(DIFFERENCE)]
-    white = np.array([white_noise(p[:, j] for p in pieces) for j in range(residual.shape[1])])
-    allowed = limits.clean + limits.scatter / np.sqrt(2 * len(residual))
-    return np.asarray(h.rms(baseline.problem, "choose") < allowed * white)
+    if not found.members:
+        return found
+    together = sum(probability.get(m.label, 0.0) for m in found.members)
+    check = Check.least("more probable than not", together, baseline.policy.decision.probable)
+    if check.passed:
+        found = found.most_probable_first(probability)
+        return replace(found, checks=(*found.checks, check))
+    return _nothing(baseline, began, found.members[0]).after([*found.checks, check])
 
 
 def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part, sign: float = 1.0) -> Check:
@@ -180,11 +173,7 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     another = form_of(baseline).another(began)
     checks = () if another is None else (another,)
     if another is not None and not another.passed:
-        reason = (
-            "the residual is within the share that the form of the FMU leaves open, and no effect explains "
-            "most of it"
-        )
-        return Judgement(checks, (), reason)
+        return Judgement(checks, (), f"{_needs_no_effect(another.name)}, and no effect explains most of it")
     if _noise_alone(baseline, "fit"):
         reason = "the part to identify shows only noise: the discrepancy begins after it"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")
@@ -194,6 +183,13 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     label = nearest.label if nearest.candidates else "none"
     reason = f"no effect of the library accounts for the residual; best fit: {label}"
     return Judgement(checks, (), reason)
+
+
+def _needs_no_effect(check: Name) -> str:
+    """What is said of a residual that failed a check of those that tell it from noise or an error of form."""
+    if check == "more than undeclared noise may leave":
+        return "the residual is small beside the signals, and may be noise, whose size is not declared"
+    return "the residual is within the share that the form of the FMU leaves open"
 
 
 def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: int) -> bool:

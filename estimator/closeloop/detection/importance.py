@@ -24,11 +24,23 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
     b, limits, share = baseline, baseline.policy.detection, baseline.problem.form_error
     beyond = _beyond(b, "unseen")
     if not share:
-        return _material(b, np.maximum(beyond, _beyond(b, "fit")))
+        return _material(b, np.maximum(beyond, _beyond(b, "fit")), b.noise.std)
     form = np.maximum(share * signal_size(b.problem), TINY)
     noises = b.hypothesis.rms(b.problem, "unseen") / (limits.open_form_noises * b.noise.std)
     large = float(np.max(np.minimum(beyond / form, noises)))
-    return large if could_be_form(b, likeness) and not sets_in else max(large, _material(b, beyond))
+    if could_be_form(b, likeness) and not sets_in:
+        return large
+    return max(large, _material(b, beyond, b.noise.std))
+
+
+def importance_as_noise(baseline: Baseline) -> float:
+    """The same where no effect explains the residual, so that it may be noise if noise is not declared.
+
+    Noise may be larger than its white part, so that only a share of the signal matters then.
+    """
+    b, unsaid = baseline, ~baseline.noise.declared
+    beyond = np.maximum(_beyond(b, "unseen"), _beyond(b, "fit"))
+    return _material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
 
 
 def could_be_form(baseline: Baseline, likeness: float) -> bool:
@@ -50,8 +62,8 @@ def _beyond(b: Baseline, part: Part) -> Array:
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
-def _material(b: Baseline, beyond: Array) -> float:
-    """Size beyond noise over the smallest size that matters."""
+def _material(b: Baseline, beyond: Array, noise: Array) -> float:
+    """Size beyond noise (n_y,) over the smallest size that matters; noise: (n_y,) standard deviations."""
     limits = b.policy.detection
-    lowest = np.minimum(limits.signal_share * signal_size(b.problem), limits.noise_share * b.noise.std)
+    lowest = np.minimum(limits.signal_share * signal_size(b.problem), limits.noise_share * noise)
     return float(np.max(beyond / np.maximum(lowest, TINY)))

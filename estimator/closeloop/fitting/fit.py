@@ -7,8 +7,8 @@ from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import least_squares
 
+from estimator.closeloop.fitting.bounded import descended
 from estimator.closeloop.fitting.slopes import STEP, Residuals, Slopes
 from estimator.closeloop.hypotheses.fitted import (
     WIDE,
@@ -26,6 +26,9 @@ GAIN = 1e-6  # relative reduction of the sum of squares, below which the fit end
 
 
 NEAR_NOISE = 5.0  # mean square, in units of noise, below which derivatives are updated by secants
+
+
+ROUGH = 1e-5  # the same of a fit that began far from the optimum, below which it has come near
 
 
 LITTLE = 1e-4  # relative reduction with new derivatives, below which the secants were accurate enough
@@ -150,38 +153,43 @@ def _descended(
     Far from the optimum, derivatives are computed by finite differences at every step. Near it they are
     updated by secants, then computed by finite differences again, until these gain little.
     """
-    left = evaluations
+
+    def near(at: Array) -> bool:
+        residual = slopes.residual(at)
+        return secants and float(residual @ residual) < NEAR_NOISE * len(residual)
+
+    def jacobian(at: Array) -> Array:
+        return slopes.at(at) if near(at) else slopes.by_differences(at)
+
+    left, enough = evaluations, gain if near(x) or not secants else max(gain, ROUGH)
     while True:
         exact, before = slopes.exact, float(np.sum(slopes.residual(x) ** 2))
-        near = secants and before < NEAR_NOISE * len(slopes.residual(x))
-        found = least_squares(
-            *compressed(slopes.residual, slopes.at if near else slopes.by_differences, x), bounds,
-            x_scale=scale, xtol=1e-5, ftol=gain, max_nfev=left,
-        )  # fmt: skip
+        found = descended(*compressed(slopes.residual, jacobian), x, bounds, scale, enough, left)
         x, left = found.x, left - found.nfev
-        little = 2 * found.cost > (1 - LITTLE) * before
-        if not near or (exact and little) or left <= 0:
+        arrived = not near(x) or (exact and 2 * found.cost > (1 - LITTLE) * before)
+        if left <= 0 or (arrived and enough == gain):
             break
         slopes.by_differences(x)
-    if near and not (slopes.exact or (exact and little)):
+        enough = gain
+    if not (arrived or slopes.exact):
         slopes.by_differences(x)
-    return x, found.status > 0
+    return x, found.converged
 
 
-def compressed(residual: Function, jacobian: Function, x: Array) -> tuple[Function, Array, Function]:
-    """Residual (n + 1,), start and Jacobian (n + 1, n) with the same steps as those of m samples.
+def compressed(residual: Function, jacobian: Function) -> tuple[Function, Function]:
+    """Residual (n + 1,) and Jacobian (n + 1, n) with the same steps as those of m samples.
 
     They are turned into a basis that begins with the residual, so that all but its first element is zero; a
     decomposition of samples by samples at each step is not needed then.
     """
 
     def length(at: Array) -> Array:
-        return np.append(np.linalg.norm(residual(at)), np.zeros(len(x)))
+        return np.append(np.linalg.norm(residual(at)), np.zeros(len(at)))
 
     def turned(at: Array) -> Array:
         return triangle(residual(at), jacobian(at))[:, 1:]
 
-    return length, x, turned
+    return length, turned
 
 
 def triangle(r: Array, j: Array) -> Array:

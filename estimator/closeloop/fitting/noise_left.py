@@ -10,14 +10,16 @@ from estimator.noise import Noise, larger
 from estimator.record import Array
 
 
-def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> Noise:
+def noise_left(
+    problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array], all_noise: bool
+) -> Noise:
     """The noise of the sensors, with that of the inputs where the residual (N, n_y) of a run is larger.
 
-    theta: values of the fit that leaves the residuals.
+    theta: values of the fit that leaves the residuals; all_noise: see `weights`.
     """
     record, chance = problem.record, problem.policy.detection.chance
     more = caused(problem, theta) if larger(record, residuals, chance) else []
-    return Noise.of(record, residuals, chance, more)
+    return Noise.of(record, residuals, chance, more, all_noise)
 
 
 def caused(problem: Problem, theta: Mapping[str, float]) -> list[Array]:

@@ -1,7 +1,9 @@
 """Jacobian of the residual by finite differences, updated between steps by Broyden's secant method.
 
-The influence of a start state decays. Once the decay has been observed, the difference for that state is
-simulated only as long as the influence lasts.
+An FMU that takes several simulations in the time of one simulates some differences beside each residual,
+those of other unknowns each time, so that these columns are differences and not secants. The influence of a
+start state decays. Once the decay has been observed, the difference for that state is simulated only as long
+as the influence lasts.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -38,6 +40,8 @@ class Slopes:
         self._residuals, self._scale, self._high, self._known = residuals, scale, high, list(known)
         self._step, self._at_once = step * scale, at_once
         self._parts = dict.fromkeys(fading, PARTS)
+        # unknowns whose differences are simulated beside residuals, the next ones first
+        self._turn = [i for i, column in enumerate(known) if column is None and i not in self._parts]
         self._whole: dict[bytes, Array] = {}  # the last whole residuals, by x
         self._last: tuple[Array, Array, Array] | None = None  # last x, with its residual and Jacobian
         self.exact = False  # whether the last Jacobian comes from finite differences only
@@ -45,8 +49,9 @@ class Slopes:
     def residual(self, x: Array) -> Array:
         """The residual (m,) at x; what is simulated in the same time is kept for the Jacobian there."""
         if x.tobytes() not in self._whole:
-            free = [i for i, known in enumerate(self._known) if known is None and i not in self._parts]
-            self._simulated([x, *(self._beside(i, x)[1] for i in free[: self._at_once - 1])], 1.0)
+            others = self._turn[: self._at_once - 1]
+            self._turn = self._turn[len(others) :] + others
+            self._simulated([x, *(self._beside(i, x)[1] for i in others)], 1.0)
         return self._whole[x.tobytes()]
 
     def _simulated(self, xs: Sequence[Array], share: float) -> list[Array]:
@@ -98,24 +103,43 @@ class Slopes:
         return found
 
     def at(self, x: Array) -> Array:
-        """The Jacobian at x, updated from the last one by Broyden's method."""
+        """The Jacobian at x, updated from the last one by differences that are known there, and by secants.
+
+        What the differences do not account for is left to the other columns by Broyden's method, each by its
+        share of the step.
+        """
         if self._last is None:
             return self.by_differences(x)
         before, r_before, jacobian = self._last
-        step = (x - before) / self._scale
+        moved = x - before
+        step = moved / self._scale
         if (length := float(step @ step)) > SHORT**2:
             r = self.residual(x)
-            jacobian = by_rows(
-                jacobian.shape,
-                lambda rows: (
-                    jacobian[rows]
-                    + np.outer(
-                        r[rows] - r_before[rows] - jacobian[rows] @ (x - before), step / self._scale / length
-                    )
-                ),
-            )
+            fresh = self._known_beside(x, r)
+            onto = step / self._scale / length
+            onto[list(fresh)] = 0.0
+
+            def updated(rows: slice) -> Array:
+                here = jacobian[rows].copy()
+                missed = r[rows] - r_before[rows] - here @ moved
+                for i, column in fresh.items():
+                    missed -= (column[rows] - here[:, i]) / 2 * moved[i]  # the mean slope counts over a step
+                    here[:, i] = column[rows]
+                here += np.outer(missed, onto)
+                return here
+
+            jacobian = by_rows(jacobian.shape, updated)
             self._last, self.exact = (x.copy(), r, jacobian), False
         return jacobian
+
+    def _known_beside(self, x: Array, r: Array) -> dict[int, Array]:
+        """The columns at x, whose residual is r (m,), of the differences that were simulated beside it."""
+        found = {}
+        for i in self._turn:
+            h, there = self._beside(i, x)
+            if there.tobytes() in self._whole:
+                found[i] = set_aside((self._whole[there.tobytes()] - r) / h)
+        return found
 
 
 def faded(column: Array) -> int:

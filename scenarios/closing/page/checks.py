@@ -18,12 +18,15 @@ MEANINGS: Mapping[Name, tuple[str, str]] = {  # how the value stands to the limi
     "the size is clear of zero": (LEAST, "size of the effect over its standard error"),
     "better than without it on the part to choose": (ABOVE, GAIN),
     "outputs left above their noise": (MOST, "number of outputs with declared noise that stay above it"),
-    "share of the variance taken away": (LEAST, "of the residual on the part to choose, by the answer"),
+    "more probable than not": (LEAST, "probability of the effects that are named, together"),
     "nothing richer gains on the part to identify": (
         MOST, "what an effect that contains this one would take away more from the sum of squares",
     ),
     "more than another form of the model leaves": (
         LEAST, "size of the residual over what the open form of the model may leave",
+    ),
+    "more than undeclared noise may leave": (
+        LEAST, "size of the residual over the share of a signal below which it may be noise",
     ),
     "the force follows the law": (MOST, "what a free curve takes away more from the sum of squares"),
     "better than without it on the test part": (ABOVE, GAIN),

@@ -11,7 +11,6 @@ from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem
-from estimator.record import Array
 from scenarios.closing.page.glossary import candidate_words, effect_words, title
 from scenarios.closing.result import none_of_these
 from scenarios.drawing.typography import HELD, chance, number, percent
@@ -88,20 +87,6 @@ def _left(problem: Problem, found: Outcome, h: Hypothesis) -> Iterator[str]:
     if short.size:
         j = short[np.argmax(over[short])]
         yield f"leaves {number(over[j], 2)} times the noise in {problem.record.outputs[j]}"
-    if not declared.all():
-        share = (
-            1
-            - _squares(problem, found, h)[~declared].sum()
-            / _squares(problem, found, found.base)[~declared].sum()
-        )
-        needed = problem.policy.decision.most
-        if share < needed:
-            yield f"explains {percent(max(share, 0.0))} of the residual's variance ({needed:.0%} needed)"
-
-
-def _squares(problem: Problem, found: Outcome, h: Hypothesis) -> Array:
-    squares: Array = (h.rms(problem, "choose") / found.baseline.noise.scale) ** 2
-    return squares
 
 
 def detection_words(problem: Problem, found: Outcome) -> str:
