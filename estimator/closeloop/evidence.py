@@ -27,7 +27,7 @@ Name = Literal[
     "the size is clear of zero",
     "better than without it on the part to choose",
     "outputs left above their noise",
-    "more probable than not",
+    "not improbable",
     "nothing richer gains on the part to identify",
     "more than another form of the model leaves",
     "more than undeclared noise may leave",
@@ -51,7 +51,7 @@ ANSWER: tuple[Name, ...] = (
     "the size is clear of zero",
     "better than without it on the part to choose",
     "outputs left above their noise",
-    "more probable than not",
+    "not improbable",
     "nothing richer gains on the part to identify",
     "the force follows the law",
     "better than without it on the test part",
@@ -82,7 +82,7 @@ class Check:
 
 def refuted(checks: Sequence[Check]) -> bool:
     """Whether checks of an answer speak against the best hypothesis; its probability follows from them."""
-    return not all(c.passed for c in checks if c.name in ANSWER and c.name != "more probable than not")
+    return not all(c.passed for c in checks if c.name in ANSWER and c.name != "not improbable")
 
 
 def verdict_of(checks: Sequence[Check]) -> Verdict:

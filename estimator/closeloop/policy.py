@@ -417,10 +417,10 @@ class DecisionPolicy:
         "derivation: what explains less than it leaves is not what the residual is mainly made of",
     )
     probable: float = limit(
-        0.5,
+        0.05,
         "probability",
         "probability of the effects of an answer together, below which none is named",
-        "derivation: a name that is less probable is more often wrong than right",
+        "convention, as the level of a test; a right pair beside undeclared noise rarely has more than 0.17",
     )
     open_alike: float = limit(
         0.25,

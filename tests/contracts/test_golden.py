@@ -16,7 +16,7 @@ LIMITS = {  # of the checks whose limit is one of the policy
     "the outputs move out of their noise": DECISION.excited,
     "the size is clear of zero": DECISION.significant,
     "better than without it on the part to choose": DECISION.telling,
-    "more probable than not": DECISION.probable,
+    "not improbable": DECISION.probable,
     "better than without it on the test part": DECISION.telling,
     "no worse than without it on the test part": -DECISION.telling,
 }

@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from estimator.closeloop.fitting import likelihood_profile as likelihood
-from estimator.closeloop.fitting.bounded import descended
 from estimator.closeloop.fitting.fit import compressed, fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.slopes import (
@@ -111,7 +110,7 @@ def test_finer_differences_see_the_slopes_of_a_rugged_valley(phase, t0):
     found = fit(asked, (x,), unit, valley.theta, fixed={moment.name: 0.5}, step=FINE_STEP)
     assert found.residual @ found.residual <= valley.residual @ valley.residual < 0.45**2 * 100 + 101
     slope = -1e-3 / 0.004 * np.sin(found.values[0] / 0.004 + phase)
-    assert_allclose(found.jacobian[100:200, 0], slope, atol=0.01)  # of 0.25 at most; carried by secants
+    assert_allclose(found.jacobian[100:200, 0], slope, atol=1e-3)
     timed = fit(asked, (x, moment), unit, step=FINE_STEP)
     assert np.any(timed.jacobian[:, 1])  # a moment is not moved less than a sample
 
@@ -185,40 +184,13 @@ def test_a_compressed_problem_takes_the_same_steps(seed, bounded):
     def jacobian(x):
         return a * (1 + 0.4 * (a @ x))[:, None]
 
-    limit = np.full(3, 0.3 if bounded else np.inf)
-    how = ((-limit, limit), np.array([1.0, 2.0, 0.5]), 1e-8, 4)
-    expected = descended(residual, jacobian, np.full(3, 0.1), *how)
-    found = descended(*compressed(residual, jacobian), np.full(3, 0.1), *how)
+    bounds = (-0.3, 0.3) if bounded else (-np.inf, np.inf)
+    how = {"bounds": bounds, "max_nfev": 4, "x_scale": np.array([1.0, 2.0, 0.5])}
+    expected = least_squares(residual, np.full(3, 0.1), jacobian, **how)
+    found = least_squares(*compressed(residual, jacobian, np.full(3, 0.1)), **how)
     assert_allclose(found.x, expected.x, rtol=1e-9, atol=1e-12)
     assert_allclose(found.cost, expected.cost)
     assert found.nfev == expected.nfev
-
-
-@given(st.integers(0, 2**32 - 1), st.booleans())
-def test_a_descent_ends_at_the_optimum_between_the_bounds(seed, bounded):
-    """Rosenbrock's valley, turned and stretched at random, with and without bounds that it runs into."""
-    rng = np.random.default_rng(seed)
-    turn = np.linalg.qr(rng.standard_normal((2, 2)))[0] * rng.uniform(0.5, 2.0, 2)
-    where = rng.standard_normal(2)
-    limit = rng.uniform(0.2, 2.0, 2) if bounded else np.full(2, np.inf)
-    seen = []
-
-    def residual(x):
-        seen.append(x)
-        a, b = turn @ x - where
-        return np.array([10 * (b - a**2), 1 - a])
-
-    def jacobian(x):
-        a, _ = turn @ x - where
-        return np.array([[-20 * a, 10.0], [-1.0, 0.0]]) @ turn
-
-    found = descended(residual, jacobian, np.zeros(2), (-limit, limit), np.array([1.0, 0.3]), 1e-10, 500)
-    assert found.converged
-    assert found.nfev == len(seen)
-    assert all(np.all(np.abs(x) <= limit) for x in seen)
-    assert found.cost <= 0.5 * float(np.sum(residual(np.zeros(2)) ** 2))
-    further = least_squares(residual, found.x, jacobian, (-limit, limit), xtol=1e-12, ftol=1e-12)
-    assert found.cost <= further.cost * (1 + 1e-5) + 1e-9
 
 
 class Fading:

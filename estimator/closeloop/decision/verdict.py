@@ -52,7 +52,7 @@ def probable(
     if not found.members:
         return found
     together = sum(probability.get(m.label, 0.0) for m in found.members)
-    check = Check.least("more probable than not", together, baseline.policy.decision.probable)
+    check = Check.least("not improbable", together, baseline.policy.decision.probable)
     if check.passed:
         found = found.most_probable_first(probability)
         return replace(found, checks=(*found.checks, check))

@@ -7,8 +7,8 @@ from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
+from scipy.optimize import least_squares
 
-from estimator.closeloop.fitting.bounded import descended
 from estimator.closeloop.fitting.slopes import STEP, Residuals, Slopes
 from estimator.closeloop.hypotheses.fitted import (
     WIDE,
@@ -164,7 +164,10 @@ def _descended(
     left, enough = evaluations, gain if near(x) or not secants else max(gain, ROUGH)
     while True:
         exact, before = slopes.exact, float(np.sum(slopes.residual(x) ** 2))
-        found = descended(*compressed(slopes.residual, jacobian), x, bounds, scale, enough, left)
+        found = least_squares(
+            *compressed(slopes.residual, jacobian, x), bounds,
+            x_scale=scale, xtol=1e-5, ftol=enough, max_nfev=left,
+        )  # fmt: skip
         x, left = found.x, left - found.nfev
         arrived = not near(x) or (exact and 2 * found.cost > (1 - LITTLE) * before)
         if left <= 0 or (arrived and enough == gain):
@@ -173,23 +176,23 @@ def _descended(
         enough = gain
     if not (arrived or slopes.exact):
         slopes.by_differences(x)
-    return x, found.converged
+    return x, found.status > 0
 
 
-def compressed(residual: Function, jacobian: Function) -> tuple[Function, Function]:
-    """Residual (n + 1,) and Jacobian (n + 1, n) with the same steps as those of m samples.
+def compressed(residual: Function, jacobian: Function, x: Array) -> tuple[Function, Array, Function]:
+    """Residual (n + 1,), start and Jacobian (n + 1, n) with the same steps as those of m samples.
 
     They are turned into a basis that begins with the residual, so that all but its first element is zero; a
     decomposition of samples by samples at each step is not needed then.
     """
 
     def length(at: Array) -> Array:
-        return np.append(np.linalg.norm(residual(at)), np.zeros(len(at)))
+        return np.append(np.linalg.norm(residual(at)), np.zeros(len(x)))
 
     def turned(at: Array) -> Array:
         return triangle(residual(at), jacobian(at))[:, 1:]
 
-    return length, turned
+    return length, x, turned
 
 
 def triangle(r: Array, j: Array) -> Array:

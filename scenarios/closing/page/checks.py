@@ -18,7 +18,7 @@ MEANINGS: Mapping[Name, tuple[str, str]] = {  # how the value stands to the limi
     "the size is clear of zero": (LEAST, "size of the effect over its standard error"),
     "better than without it on the part to choose": (ABOVE, GAIN),
     "outputs left above their noise": (MOST, "number of outputs with declared noise that stay above it"),
-    "more probable than not": (LEAST, "probability of the effects that are named, together"),
+    "not improbable": (LEAST, "probability of the effects that are named, together"),
     "nothing richer gains on the part to identify": (
         MOST, "what an effect that contains this one would take away more from the sum of squares",
     ),
