@@ -10,6 +10,7 @@ from estimator.closeloop.decision.verdict import judge
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.promise import Promise
@@ -117,6 +118,8 @@ def looked_at(name: str, asked: Problem, kinds: Sequence[str], quiet: bool = Fal
     singles = form_of(baseline).ranked(Fitter(baseline).finished(promises))
     none = judged("no_discrepancy", (), "nothing")
     said = none if quiet else judge(baseline, singles, (), len(promises)).after(DETECTED)
+    errors = {m.key: profiled(Fitter(baseline), m) for m in said.members}
+    singles, said = [errors.get(h.key, h) for h in singles], said.of(list(errors.values()))
     detection = Detection(0.01, 0.0, {}, 1.0)
     found = (declared, baseline, detection, tuple(forces), tuple(promises), tuple(singles), ())
     return Traced(name, asked, Outcome(*found, said))

@@ -28,7 +28,7 @@ GAIN = 1e-6  # relative reduction of the sum of squares, below which the fit end
 NEAR_NOISE = 5.0  # mean square, in units of noise, below which derivatives are updated by secants
 
 
-ROUGH = 1e-5  # the same of a fit that began far from the optimum, below which it has come near
+COME_NEAR = 1e-5  # the same of a fit that began far from the optimum, below which it has come near
 
 
 LITTLE = 1e-4  # relative reduction with new derivatives, below which the secants were accurate enough
@@ -161,7 +161,7 @@ def _descended(
     def jacobian(at: Array) -> Array:
         return slopes.at(at) if near(at) else slopes.by_differences(at)
 
-    left, enough = evaluations, gain if near(x) or not secants else max(gain, ROUGH)
+    left, enough = evaluations, gain if near(x) or not secants else max(gain, COME_NEAR)
     while True:
         exact, before = slopes.exact, float(np.sum(slopes.residual(x) ** 2))
         found = least_squares(

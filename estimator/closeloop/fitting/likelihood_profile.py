@@ -58,6 +58,13 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     return over_forms(fitter, replace(h, fit=replace(h.fit, covariance=covariance)))
 
 
+def reaching_a_bound(h: Hypothesis) -> list[str]:
+    """Names of the shapes of a profiled hypothesis whose 95 % intervals reach a bound."""
+    shapes = {u.name for c in h.candidates for u in c.shape}
+    rooms = {u.name: (h.theta[u.name] - u.low, u.high - h.theta[u.name]) for u in h.fit.unknowns}
+    return [n for n in rooms if n in shapes and min(rooms[n]) <= WIDTH * h.fit.std[n] * (1 + 1e-9)]
+
+
 def carefully(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis fitted as an answer is: in divided steps, with its durations, in the lowest minimum."""
     return refined(fitter, from_declared(fitter, with_duration(fitter, in_divided_steps(fitter, h))))
@@ -79,7 +86,8 @@ def _widened(fitter: Fitter, h: Hypothesis, leave: bool) -> tuple[Array, dict[st
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     names = [u.name for u in h.fit.unknowns]
-    here, found = built(problem, h.candidates), np.zeros(len(names))
+    here = built(problem, h.candidates)
+    found = _to_limits(here, h, weighting)
     for i, name in enumerate(names):
         if name in h.onset_names:
             half, deeper = _when(here, h, i, weighting)
@@ -89,7 +97,36 @@ def _widened(fitter: Fitter, h: Hypothesis, leave: bool) -> tuple[Array, dict[st
     followed = {*names} - {*problem.free_states, *h.onset_names}
     places, deeper = ends(here, h, followed, weighting, leave)
     away = np.abs(places - h.fit.values).max(axis=0) / WIDTH
-    return np.where([name in followed for name in names], away, found), deeper
+    return np.where([name in followed for name in names], np.maximum(away, found), found), deeper
+
+
+def _to_limits(here: Problem, h: Hypothesis, weighting: Weighting) -> Array:
+    """Standard errors (n,) of shapes whose intervals reach as far as a bound; zero for all others.
+
+    At its bounds a law may become another one, as friction without rounding is that of Coulomb. Slopes may
+    not lead there, where the record does not depend on the shape. All other unknowns follow linearly.
+    """
+    shapes = {u.name for c in h.candidates for u in c.shape}
+    limits = [
+        (i, float(bound))
+        for i, u in enumerate(h.fit.unknowns)
+        if u.name in shapes
+        for bound in (u.low, u.high)
+        if np.isfinite(bound)
+    ]
+    asked = [{**h.theta, h.fit.unknowns[i].name: bound} for i, bound in limits]
+    found = np.zeros(len(h.fit.unknowns))
+    for (i, bound), r in zip(limits, in_turn(here, asked, weighting), strict=True):
+        rise = _followed(h, i, r) - _followed(h, i, h.fit.residual)
+        if rise < WIDTH**2 * h.fit.inflation[i]:
+            found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
+    return found
+
+
+def _followed(h: Hypothesis, i: int, r: Array) -> float:
+    """Sum of squares of a residual (m,) after all unknowns but the i-th have followed linearly."""
+    others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
+    return float(np.sum((r - others @ (others.T @ r)) ** 2))
 
 
 def _when(here: Problem, h: Hypothesis, i: int, weighting: Weighting) -> tuple[float, dict[str, float]]:

@@ -19,13 +19,15 @@ TELLS = 0.5  # share of the prior standard deviation, above which a record does 
 class Estimates:
     """Estimates of the machine's unknowns from one record.
 
-    values: (n,); covariance: (n, n); white: (n, n), the covariance that white residuals would give.
+    values: (n,); covariance: (n, n); white: (n, n), the covariance that white residuals would give; open:
+    names of unknowns whose intervals reach a bound, of which slopes at the estimate say too little.
     """
 
     unknowns: tuple[Unknown, ...]
     values: Array
     covariance: Array
     white: Array
+    open: frozenset[str] = frozenset()
 
     @property
     def figures(self) -> dict[str, tuple[float, float]]:
@@ -39,14 +41,17 @@ class Estimates:
     def told(self) -> tuple[str, ...]:
         """Names of the unknowns that the record determines."""
         error = np.sqrt(np.diag(self.covariance))
-        return tuple(u.name for u, e in zip(self.unknowns, error, strict=True) if e < TELLS * LOOSE * u.scale)
+        known = (e < TELLS * LOOSE * u.scale for u, e in zip(self.unknowns, error, strict=True))
+        return tuple(
+            u.name for u, k in zip(self.unknowns, known, strict=True) if k and u.name not in self.open
+        )
 
     def only(self, names: Sequence[str]) -> "Estimates":
         """The estimates of the named unknowns, in the order of the names."""
         at = [[u.name for u in self.unknowns].index(n) for n in names]
         block = np.ix_(at, at)
         some = tuple(self.unknowns[i] for i in at)
-        return Estimates(some, self.values[at], self.covariance[block], self.white[block])
+        return Estimates(some, self.values[at], self.covariance[block], self.white[block], self.open)
 
 
 def widths(unknowns: Sequence[Unknown], loose: Sequence[Unknown]) -> Array:

@@ -12,6 +12,7 @@ from joblib import Parallel, delayed
 
 from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.likelihood_profile import reaching_a_bound
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -167,7 +168,8 @@ def values_of(h: Hypothesis) -> dict[str, float]:
 
 def said_of(h: Hypothesis, labels: Sequence[str]) -> Estimates:
     """Estimates of the machine's unknowns of some effects of a fit."""
-    return estimates(chart([c for c in h.candidates if c.label in labels]), h.fit)
+    found = estimates(chart([c for c in h.candidates if c.label in labels]), h.fit)
+    return replace(found, open=frozenset(reaching_a_bound(h)))
 
 
 def _transferred(task: _Task) -> Transfer:
