@@ -438,6 +438,40 @@ def test_errors_of_a_moment_reach_over_a_rest(monkeypatch):
     assert np.mean(after) > 0.9
 
 
+class Sliding(Playing):
+    """Friction of a body that never slows down enough to show how its friction is rounded about zero."""
+
+    def __init__(self, seed: int) -> None:
+        t = np.arange(400) * 0.01
+        self.v = 0.5 + 0.3 * np.sin(2 * np.pi * t)
+        y = np.tanh(self.v / 1e-3) + 0.05 * np.random.default_rng(seed).standard_normal(len(t))
+        every = np.ones(len(t), bool)
+        run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
+        self.record = record_with(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        return run.y - (theta["F_c"] * np.tanh(self.v / theta["v_s"]))[:, None]
+
+
+def test_an_interval_reaches_the_bound_of_a_shape_on_which_the_record_does_not_depend(monkeypatch):
+    """Slopes are zero from some rounding on, so that none of them leads there."""
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    force = Unknown("F_c", 1.0, 0.0, np.inf, 1.0)
+    rounding = Unknown("v_s", 0.15, 1e-6, np.inf, 0.02)
+    before, after = [], []
+    for seed in range(120):
+        asked = Sliding(seed)
+        found = fit(asked, (force, rounding), Weighting.white(np.array([0.05])), {"F_c": 1.0, "v_s": 0.15})
+        h = Hypothesis((Candidate("coulomb_friction", "rail", (force,), (rounding,)),), found, ())
+        whole = likelihood.profiled(Fitter(baseline(asked, noise=0.05)), h)
+        before.append(abs(h.theta["v_s"] - 1e-3) < 1.96 * h.fit.std["v_s"])
+        after.append(abs(whole.theta["v_s"] - 1e-3) < 1.96 * whole.fit.std["v_s"])
+        assert (likelihood.reaching_a_bound(whole) == ["v_s"]) == after[-1]
+    assert np.mean(after) > 0.9
+    assert np.mean(before) < 0.8
+
+
 class Refitter(Fitter):
     """Fits without an FMU."""
 
