@@ -175,17 +175,27 @@ def _of_fits(
     within = np.log(prior.effect * (1 - prior.outside) * (prior.refused if refused else 1 - prior.refused))
     outside = np.log(prior.effect * prior.outside) + np.log(odds) + stranger
     nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
-    if not baseline.noise.known:  # what is unlike any effect of the library is told from noise by its size
-        outside = np.logaddexp(outside, nothing + _log_odds_of_outside_by_size(baseline))
+    if not baseline.noise.known:  # what is unlike any effect of the library may be noise
+        unlike, as_noise = _unlike_any(baseline)
+        outside, nothing = np.logaddexp(outside, nothing + unlike), nothing + as_noise
     whole = logsumexp([within + library, outside, nothing])
     found = {label: float(np.exp(within + value - whole)) for label, value in known.items()}
     return {**found, NO_DISCREPANCY: float(np.exp(nothing - whole))}
 
 
-def _log_odds_of_outside_by_size(baseline: Baseline) -> float:
-    prior = baseline.policy.prior
-    share = prior.effect * prior.outside / (1 - prior.effect)
-    return float(np.log(share * _odds_by_size(baseline)))
+def _unlike_any(baseline: Baseline) -> tuple[float, float]:
+    """Log probabilities of what is left by a mechanism unlike any effect, and by noise that is not declared.
+
+    The first one is in proportion to the prior of no effect. Whether outputs depend on each other tells the
+    two apart, or else the size of the residual.
+    """
+    prior, level = baseline.policy.prior, baseline.policy.detection.level
+    share = float(np.log(prior.effect * prior.outside / (1 - prior.effect)))
+    several = baseline.seen_by_several(baseline.hypothesis)
+    if several is None:
+        return share + float(np.log(_odds_by_size(baseline))), 0.0
+    rare, usual = float(np.log(level)), float(np.log(1 - level))
+    return (share + usual, rare) if several else (share + rare, usual)
 
 
 def more_probable(baseline: Baseline, h: Hypothesis, other: Hypothesis, kinds: int) -> bool:
@@ -248,7 +258,8 @@ def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
 
     A right answer leaves a share of the sum of squares beyond noise that is exponentially distributed with
     the mean of the policy; a mechanism outside leaves any share of it with equal probability. So does a right
-    answer if noise is not declared and is not white, since only its white part is told from a residual.
+    answer if noise is not declared and is not white, since only its white part is told from a residual. Its
+    noise is independent between outputs, however, and what a mechanism leaves is not.
     """
     prior, exact = baseline.policy.prior, not baseline.problem.form_error
     total, _ = _beyond(baseline, baseline.hypothesis)
@@ -260,8 +271,10 @@ def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
     of_right = np.exp(-share / (prior.left if exact else prior.left_open))
     right, any_share = float(np.sum(of_right * seen) / np.sum(of_right)), float(np.mean(seen))
     coloured = 0.0 if baseline.noise.known else prior.coloured
-    tiny = np.finfo(float).tiny
-    return max(any_share, tiny) / max((1 - coloured) * right + coloured * any_share, tiny)
+    tiny, level = np.finfo(float).tiny, baseline.policy.detection.level
+    several = baseline.seen_by_several(best)
+    odds = 1.0 if several is None else (1 - level) / level if several else level / (1 - level)
+    return odds * max(any_share, tiny) / max((1 - coloured) * right + coloured * any_share, tiny)
 
 
 def _beyond(baseline: Baseline, h: Hypothesis) -> tuple[float, float]:

@@ -36,11 +36,15 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
 def importance_as_noise(baseline: Baseline) -> float:
     """The same where no effect explains the residual, so that it may be noise if noise is not declared.
 
-    Noise may be larger than its white part, so that only a share of the signal matters then.
+    What depends between outputs is no noise of sensors, and what does not, is. Where that says nothing, as
+    for a single output, noise may be larger than its white part, so that only a share of the signal matters.
     """
     b, unsaid = baseline, ~baseline.noise.declared
     beyond = np.maximum(_beyond(b, "unseen"), _beyond(b, "fit"))
-    return _material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
+    several = b.seen_by_several(b.hypothesis)
+    if several is None:
+        return _material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
+    return _material(b, beyond if several else np.where(unsaid, 0.0, beyond), b.noise.std)
 
 
 def could_be_form(baseline: Baseline, likeness: float) -> bool:

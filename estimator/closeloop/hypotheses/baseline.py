@@ -12,6 +12,7 @@ from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
 from estimator.closeloop.policy import Policy
 from estimator.closeloop.question.problem import Problem
+from estimator.independence import chance_of_independence
 from estimator.noise import Noise
 from estimator.record import Array
 
@@ -78,6 +79,18 @@ class Baseline:
         """Whether the residual of h on the part to identify is only noise."""
         chance = self.policy.detection.chance
         return bool(h.fit.beyond_noise < chance * np.sqrt(2 * len(h.fit.residual)))
+
+    def seen_by_several(self, h: Hypothesis) -> bool | None:
+        """Whether what h leaves depends between outputs, as noise of sensors does not.
+
+        None where that says nothing: fewer than two outputs have noise that is not declared, or the form is
+        open, whose error several outputs see too.
+        """
+        unsaid = ~self.noise.declared
+        if np.sum(unsaid) < 2 or self.problem.form_error:
+            return None
+        parts = [r[:, unsaid] for r in h.residuals]
+        return chance_of_independence(parts) < self.policy.detection.level
 
     def beyond_noise(self, h: Hypothesis, part: Part = "choose") -> float:
         """Sum of squares on a part minus its expectation for pure noise."""
