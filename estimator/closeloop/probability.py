@@ -11,7 +11,7 @@ Four questions are answered one after the other, each with the prior of the poli
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
    share. Where noise hides so small a share, the prior decides. Where noise is not declared, it may be
-   coloured, and all that a right answer leaves. What is unlike any effect differs from it by its size alone.
+   coloured, and all that a right answer leaves; outputs that depend on each other show that it is none.
 4. Did a hypothesis pass the checks of the verdict? They refuse a right one with the small probability of the
    policy, and imitations of a mechanism outside as a rule. If they refuse all, that is evidence.
 

@@ -18,6 +18,11 @@ from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.probability import more_probable
 from fmus.effects import EFFECTS
 
+NO_EFFECT: Mapping[Name, str] = {  # what a residual that fails a check may be
+    "more than undeclared noise may leave": "the residual may be noise, whose size is not declared",
+    "more than another form of the model leaves": "the residual is within what the FMU's form leaves open",
+}
+
 
 def explains(baseline: Baseline, h: Hypothesis) -> bool:
     """Whether a hypothesis accounts for the discrepancy on the part to choose."""
@@ -173,7 +178,7 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     another = form_of(baseline).another(began)
     checks = () if another is None else (another,)
     if another is not None and not another.passed:
-        return Judgement(checks, (), f"{_needs_no_effect(another.name)}, and no effect explains most of it")
+        return Judgement(checks, (), f"{NO_EFFECT[another.name]}, and no effect explains most of it")
     if _noise_alone(baseline, "fit"):
         reason = "the part to identify shows only noise: the discrepancy begins after it"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")
@@ -183,13 +188,6 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     label = nearest.label if nearest.candidates else "none"
     reason = f"no effect of the library accounts for the residual; best fit: {label}"
     return Judgement(checks, (), reason)
-
-
-def _needs_no_effect(check: Name) -> str:
-    """What is said of a residual that failed a check of those that tell it from noise or an error of form."""
-    if check == "more than undeclared noise may leave":
-        return "the residual is small beside the signals, and may be noise, whose size is not declared"
-    return "the residual is within the share that the form of the FMU leaves open"
 
 
 def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: int) -> bool:
