@@ -26,7 +26,7 @@ MEANINGS: Mapping[Name, tuple[str, str]] = {  # how the value stands to the limi
         LEAST, "size of the residual over what the open form of the model may leave",
     ),
     "more than undeclared noise may leave": (
-        LEAST, "size of the residual over the share of a signal below which it may be noise",
+        LEAST, "its size over the smallest size that matters, without what may be noise of sensors",
     ),
     "the force follows the law": (MOST, "what a free curve takes away more from the sum of squares"),
     "better than without it on the test part": (ABOVE, GAIN),
