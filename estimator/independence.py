@@ -13,39 +13,36 @@ import numpy as np
 from scipy.special import gammaincc
 
 from estimator.record import Array
-from estimator.weighting import correlation_of, white_errors
-
-LAGS = 20  # samples to both sides, over which two sensors are compared
+from estimator.weighting import Weighting, correlation_of
 
 
-def chance_of_independence(parts: Sequence[Array]) -> float:
+def chance_of_independence(parts: Sequence[Array], lags: int) -> float:
     """Probability that independent noise is correlated as much between its outputs as a residual is.
 
-    parts: uninterrupted stretches of the residual (n, n_y) of at least two outputs.
+    parts: uninterrupted stretches of the residual (n, n_y), of which those of less than four times the lags
+    are left out; lags: samples to both sides, over which two outputs are compared. 1 if nothing is compared.
     """
-    long = [p - p.mean(axis=0) for p in parts if len(p) > 4 * LAGS]
+    long = [p - p.mean(axis=0) for p in parts if len(p) > 4 * lags]
     if not long or long[0].shape[1] < 2:
         return 1.0
     outputs = range(long[0].shape[1])
-    correlations = [correlation_of([p[:, j] for p in long]) for j in outputs]
-    errors = [
-        np.column_stack([white_errors(p[:, j], c) for j, c in zip(outputs, correlations, strict=True)])
-        for p in long
-    ]
+    correlation = tuple(correlation_of([p[:, j] for p in long]) for j in outputs)
+    alone = Weighting(np.ones(len(correlation)), correlation)
+    errors = [alone.of(p, [len(p)]) for p in long]
     samples = sum(len(e) for e in errors)
     size = np.sqrt(sum(np.sum(e**2, axis=0) for e in errors) / samples)
     square, compared = 0.0, 0
     for i, j in combinations(outputs, 2):
         crossed = sum(
-            (_crossed(e[:, i] / size[i], e[:, j] / size[j]) for e in errors), np.zeros(2 * LAGS + 1)
+            (_crossed(e[:, i] / size[i], e[:, j] / size[j], lags) for e in errors), np.zeros(2 * lags + 1)
         )
         square += float(np.sum(crossed**2)) / samples
         compared += len(crossed)
     return float(gammaincc(compared / 2, square / 2))  # of a chi-squared
 
 
-def _crossed(a: Array, b: Array) -> Array:
-    """Sums of the products of two signals (n,) at all lags, (2 LAGS + 1,)."""
-    length = len(a) + LAGS
+def _crossed(a: Array, b: Array, lags: int) -> Array:
+    """Sums of the products of two signals (n,) at all lags, (2 lags + 1,)."""
+    length = len(a) + lags
     product = np.fft.irfft(np.fft.rfft(a, length) * np.fft.rfft(b, length).conj(), length)
-    return np.append(product[-LAGS:], product[: LAGS + 1])
+    return np.append(product[-lags:], product[: lags + 1])

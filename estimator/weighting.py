@@ -227,11 +227,6 @@ def correlation_of(parts: Sequence[Array]) -> Array:
     return shortened(autocovariance(parts, most + 1), sum(len(x) for x in parts))
 
 
-def white_errors(x: Array, correlation: Array) -> Array:
-    """Prediction errors (N,) of a signal with this autocorrelation (p + 1,), in its own unit."""
-    return _Predictor(correlation).errors(x)
-
-
 def autocovariance(parts: Sequence[Array], lags: int) -> Array:
     """Autocovariance (lags,) of a signal of mean zero, given in stretches (N,), from lag 0 on."""
     sums = np.zeros(lags)

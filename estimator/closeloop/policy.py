@@ -58,6 +58,12 @@ class DetectionPolicy:
         "allowance for chance: how far the mean square of pure noise may exceed its expectation",
         "derivation: 1 in 700 by the normal distribution",
     )
+    lags: int = limit(
+        20,
+        "samples",
+        "to both sides, over which residuals of two outputs are compared if their noise is not declared",
+        "convention: more lags find what one sensor sees later, and test less well what both see at once",
+    )
     open_form_noises: float = limit(
         2.0,
         "times the noise",

@@ -184,10 +184,11 @@ def _of_fits(
 
 
 def _unlike_any(baseline: Baseline) -> tuple[float, float]:
-    """Log probabilities of what is left by a mechanism unlike any effect, and by noise that is not declared.
+    """Log of how probable the residual of the calibrated FMU is where noise is not declared, in two cases.
 
-    The first one is in proportion to the prior of no effect. Whether outputs depend on each other tells the
-    two apart, or else the size of the residual.
+    First, that a mechanism which is like no effect of the library has left it, as a multiple of the prior of
+    no effect. Second, that it is noise. Whether outputs depend on each other tells these apart. Where that
+    says nothing, the size of the residual does, and the second is not weighed.
     """
     prior, level = baseline.policy.prior, baseline.policy.detection.level
     share = float(np.log(prior.effect * prior.outside / (1 - prior.effect)))
@@ -230,7 +231,7 @@ def _price(h: Hypothesis, most: float) -> float:
     sample, or it is uniform within narrower bounds. That of a shape is no wider than its value, so that what
     a record does not determine costs nothing, such as the rounding of a friction on a shaft that never stops.
     """
-    shapes = {u.name for c in h.candidates for u in c.shape}
+    shapes = h.shapes
     found = 0.0
     for u, value in zip(h.fit.unknowns, h.fit.values, strict=True):
         if u.name in h.own:

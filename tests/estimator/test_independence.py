@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator.independence import LAGS, chance_of_independence
+from estimator.closeloop.policy import DEFAULT
+from estimator.independence import chance_of_independence
 
-SAMPLES = 4000
+SAMPLES, LAGS = 4000, DEFAULT.detection.lags
 
 
 def slow(rng, kept, outputs=3, samples=SAMPLES):
@@ -17,7 +18,7 @@ def slow(rng, kept, outputs=3, samples=SAMPLES):
 @pytest.mark.parametrize("kept", [0.0, 0.9, 0.99])
 def test_of_independent_noise_one_in_a_hundred_is_called_dependent(kept):
     rng = np.random.default_rng(1)
-    found = np.array([chance_of_independence([slow(rng, kept)]) for _ in range(300)])
+    found = np.array([chance_of_independence([slow(rng, kept)], LAGS) for _ in range(300)])
     assert np.mean(found < 0.01) < 0.04
     assert np.mean(found < 0.5) == pytest.approx(0.5, abs=0.12)
 
@@ -29,14 +30,17 @@ def test_what_two_sensors_see_is_found_also_if_one_sees_it_later(delay, kept):
     noise, common = slow(rng, kept), slow(rng, kept, 1, SAMPLES + delay)[:, 0]
     noise[:, 0] += 0.5 * common[delay:]
     noise[:, 2] += 0.5 * common[: len(noise)]
-    assert chance_of_independence([noise]) < 1e-6
+    assert chance_of_independence([noise], LAGS) < 1e-6
 
 
 def test_stretches_count_together_and_a_single_output_says_nothing():
     rng = np.random.default_rng(3)
     noise = slow(rng, 0.5)
     noise[:, 1] += 0.1 * noise[:, 0]
-    whole, half = chance_of_independence([noise[:2000], noise[2000:]]), chance_of_independence([noise[:2000]])
+    whole, half = (
+        chance_of_independence([noise[:2000], noise[2000:]], LAGS),
+        chance_of_independence([noise[:2000]], LAGS),
+    )
     assert whole < half
-    assert chance_of_independence([noise[:, :1]]) == 1.0
-    assert chance_of_independence([noise[: 2 * LAGS]]) == 1.0
+    assert chance_of_independence([noise[:, :1]], LAGS) == 1.0
+    assert chance_of_independence([noise[: 2 * LAGS]], LAGS) == 1.0

@@ -52,10 +52,8 @@ def probable(
 ) -> Judgement:
     """The judgement with its most probable member first; without an answer if its members are improbable.
 
-    probability: by label; began: see `judge`.
+    found: with at least one member; probability: by label; began: see `judge`.
     """
-    if not found.members:
-        return found
     together = sum(probability.get(m.label, 0.0) for m in found.members)
     check = Check.least("not improbable", together, baseline.policy.decision.probable)
     if check.passed:

@@ -54,13 +54,13 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
         for n, (low, high) in problem.calibrate.items()
     ]
     unknowns = [*parameters, *states]
-    base, noise = declared, noise_left(problem, start.theta, declared.residuals, False)
+    base, noise = declared, noise_left(problem, start.theta, declared.residuals, all_noise=False)
     for _ in range(1 if noise.known else 2):
         found = fit(problem, unknowns, noise.weighting, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < ROUGHLY_MATCHED:
             found = fit(problem, unknowns, noise.weighting, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
-        noise = noise_left(problem, found.theta, base.residuals, False)
+        noise = noise_left(problem, found.theta, base.residuals, all_noise=False)
     if not noise.weighting.is_white:
         found = fit(problem, unknowns, noise.weighting, base.fit.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))

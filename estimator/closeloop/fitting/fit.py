@@ -25,10 +25,10 @@ from fmus.host.fmu import FmuError
 GAIN = 1e-6  # relative reduction of the sum of squares, below which the fit ends
 
 
+COME_NEAR = 1e-5  # the same while a fit that began far from the optimum comes near it
+
+
 NEAR_NOISE = 5.0  # mean square, in units of noise, below which derivatives are updated by secants
-
-
-COME_NEAR = 1e-5  # the same of a fit that began far from the optimum, below which it has come near
 
 
 LITTLE = 1e-4  # relative reduction with new derivatives, below which the secants were accurate enough

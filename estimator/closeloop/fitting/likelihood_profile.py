@@ -6,6 +6,7 @@ covariance at its minimum underestimates the errors. Every parameter that is rep
 interval confirmed by simulations of its ends, see `profile_trace`.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -60,9 +61,9 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
 
 def reaching_a_bound(h: Hypothesis) -> list[str]:
     """Names of the shapes of a profiled hypothesis whose 95 % intervals reach a bound."""
-    shapes = {u.name for c in h.candidates for u in c.shape}
     rooms = {u.name: (h.theta[u.name] - u.low, u.high - h.theta[u.name]) for u in h.fit.unknowns}
-    return [n for n in rooms if n in shapes and min(rooms[n]) <= WIDTH * h.fit.std[n] * (1 + 1e-9)]
+    reached = {n: WIDTH * h.fit.std[n] * (1 + 1e-9) for n in rooms}  # what was set to a bound is rounded
+    return [n for n in rooms if n in h.shapes and min(rooms[n]) <= reached[n]]
 
 
 def carefully(fitter: Fitter, h: Hypothesis) -> Hypothesis:
@@ -106,27 +107,26 @@ def _to_limits(here: Problem, h: Hypothesis, weighting: Weighting) -> Array:
     At its bounds a law may become another one, as friction without rounding is that of Coulomb. Slopes may
     not lead there, where the record does not depend on the shape. All other unknowns follow linearly.
     """
-    shapes = {u.name for c in h.candidates for u in c.shape}
     limits = [
         (i, float(bound))
         for i, u in enumerate(h.fit.unknowns)
-        if u.name in shapes
+        if u.name in h.shapes and not u.is_onset
         for bound in (u.low, u.high)
         if np.isfinite(bound)
     ]
     asked = [{**h.theta, h.fit.unknowns[i].name: bound} for i, bound in limits]
     found = np.zeros(len(h.fit.unknowns))
     for (i, bound), r in zip(limits, in_turn(here, asked, weighting), strict=True):
-        rise = _followed(h, i, r) - _followed(h, i, h.fit.residual)
-        if rise < WIDTH**2 * h.fit.inflation[i]:
+        least, there = _followed(h, i, [h.fit.residual, r])
+        if there - least < WIDTH**2 * h.fit.inflation[i]:
             found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
     return found
 
 
-def _followed(h: Hypothesis, i: int, r: Array) -> float:
-    """Sum of squares of a residual (m,) after all unknowns but the i-th have followed linearly."""
+def _followed(h: Hypothesis, i: int, residuals: Iterable[Array]) -> Array:
+    """Sums of squares of residuals (m,) after all unknowns but the i-th have followed linearly."""
     others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
-    return float(np.sum((r - others @ (others.T @ r)) ** 2))
+    return np.array([float(np.sum((r - others @ (others.T @ r)) ** 2)) for r in residuals])
 
 
 def _when(here: Problem, h: Hypothesis, i: int, weighting: Weighting) -> tuple[float, dict[str, float]]:
@@ -138,13 +138,9 @@ def _when(here: Problem, h: Hypothesis, i: int, weighting: Weighting) -> tuple[f
     """
     name, now = h.fit.unknowns[i].name, float(h.fit.values[i])
     length, usual = here.record.runs[0].fit_time(1.0), float(h.fit.inflation[i])
-    others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
-
     tried = np.array([t for t in (*onsets_near(now, length), *onsets_beside(now, length)) if t != now])
     asked = [{**h.theta, name: t} for t in (now, *tried.tolist())]
-    squares = np.array(
-        [float(np.sum((r - others @ (others.T @ r)) ** 2)) for r in in_turn(here, asked, weighting)]
-    )
+    squares = _followed(h, i, in_turn(here, asked, weighting))
     rises = (squares[1:] - squares[0]) / usual
     if rises.min() < -here.policy.interval.deeper:
         return 0.0, {name: float(tried[np.argmin(rises)])}

@@ -42,7 +42,7 @@ def noise_of_best(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> 
     if not any(found):
         return None
     best = min((h for some in found for h in some), key=cost)
-    noise = noise_left(built(baseline.problem, best.candidates), best.theta, best.residuals, True)
+    noise = noise_left(built(baseline.problem, best.candidates), best.theta, best.residuals, all_noise=True)
     same = all(n.known and n.weighting.is_white for n in (baseline.noise, noise))
     return None if same else noise
 

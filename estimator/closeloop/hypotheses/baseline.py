@@ -90,7 +90,8 @@ class Baseline:
         if np.sum(unsaid) < 2 or self.problem.form_error:
             return None
         parts = [r[:, unsaid] for r in h.residuals]
-        return chance_of_independence(parts) < self.policy.detection.level
+        limits = self.policy.detection
+        return chance_of_independence(parts, limits.lags) < limits.level
 
     def beyond_noise(self, h: Hypothesis, part: Part = "choose") -> float:
         """Sum of squares on a part minus its expectation for pure noise."""

@@ -51,6 +51,11 @@ class Hypothesis:
         return {u.name for c in self.candidates for u in c.unknowns}
 
     @property
+    def shapes(self) -> set[str]:
+        """Names of the unknowns that shape the laws of its candidates, onset times among them."""
+        return {u.name for c in self.candidates for u in c.shape}
+
+    @property
     def onset_names(self) -> list[str]:
         """Names of its unknowns that are onset times."""
         return [u.name for c in self.candidates for u in c.shape if u.is_onset]
