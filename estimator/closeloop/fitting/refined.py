@@ -22,7 +22,7 @@ RUGGED = 1.05  # mean square of the residual, in units of noise, above which fur
 
 def refined(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis fitted with smaller differences, if it leaves more than noise and this fits better."""
-    if _arrived(fitter, h):
+    if arrived(fitter, h):
         return h
     return lower(h, fitter.alone.finished(from_there([h]), h.others, step=FINE_STEP))
 
@@ -32,7 +32,7 @@ def from_declared(fitter: Fitter, h: Hypothesis) -> Hypothesis:
 
     Its effects start from the values that they have.
     """
-    if _arrived(fitter, h) or not h.others:
+    if arrived(fitter, h) or not h.others:
         return h
     declared = {u.name: u.start for u in h.others}
     there = Promise(h.candidates, 0.0, {**h.fit.theta, **declared})
@@ -55,7 +55,7 @@ def evenly(
     return [*Parallel(fitter.jobs)(tasks), *found[len(leading) :]]
 
 
-def _arrived(fitter: Fitter, h: Hypothesis) -> bool:
+def arrived(fitter: Fitter, h: Hypothesis) -> bool:
     """Whether a fit leaves no more than noise, so that no other minimum is sought."""
     return fitter.baseline.leaves_noise(h) or mean_square(h) < RUGGED
 

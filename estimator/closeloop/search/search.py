@@ -6,7 +6,7 @@ from functools import cached_property
 
 from estimator.closeloop.decision.model_form import ModelForm, form_of
 from estimator.closeloop.fitting.fitter import BRIEF, Fitter
-from estimator.closeloop.fitting.refined import evenly, from_declared
+from estimator.closeloop.fitting.refined import arrived, evenly, from_declared
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.progress import Progress
@@ -123,7 +123,7 @@ class Search:
         finals = s.stages.done("singles", lambda: fitter.to_the_end(brief))
         dates = s.stages.done("dated", lambda: dated(fitter, finals))
         alone = s.stages.done("declared", lambda: self._from_declared(dates))
-        if s.baseline.noise.known and not s.explained(alone):
+        if s.baseline.noise.known and not (s.explained(alone) and arrived(fitter, alone[0])):
             self.tell("growing", "fitting the leading effects to a growing part of the record")
             found, hopes = alone, [*sudden, *self._promises]
             alone = s.stages.done("growing", lambda: from_the_beginning(fitter, found, hopes))
