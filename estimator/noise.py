@@ -34,23 +34,28 @@ class Noise:
         A declared size says how large the noise is, not that it is white. If the residual is no larger than
         that, it is taken as noise, and its correlation in time is estimated from it. chance: how far its mean
         square may exceed the declared one, in standard deviations; caused: draws (n, n_y) of further noise,
-        which is added to that of the sensors and which the outputs may share; all_noise: see `weights`.
+        which is added to that of the sensors and which the outputs may share.
+
+        all_noise: whether the residual is held for noise where none is declared, so that its correlation is
+        estimated, too. Where an effect is still sought in it, its motion says nothing about the noise, and
+        its rms alone balances the outputs.
         """
         white = noise_floor(record)
         if caused:
-            return cls._shared(record, white, caused, weights(record, residuals, all_noise))
+            return cls._shared(record, white, caused, scales(record, residuals))
+        said, size = record.noise_declared, np.where(record.noise_declared, white, scales(record, residuals))
+        most = np.where(said, chance, np.inf if all_noise else -np.inf)
         correlation, fitted = [], _stretches(record, residuals)
-        for j, declared in enumerate(record.noise_declared):
-            found = _of_noise([r[:, j] / white[j] for r in fitted], chance) if declared else None
+        for j in range(len(said)):
+            found = _of_noise([r[:, j] / size[j] for r in fitted], most[j])
             correlation.append(np.ones(1) if found is None else found)
-        size = np.where(record.noise_declared, white, weights(record, residuals, all_noise))
-        return cls(white, Weighting(size, tuple(correlation)), record.noise_declared)
+        return cls(white, Weighting(size, tuple(correlation)), said)
 
     @classmethod
     def _shared(cls, record: Record, white: Array, caused: Sequence[Array], unsaid: Array) -> "Noise":
         """Noise of the sensors (n_y,) and the noise that is caused; see `of`.
 
-        unsaid: weights (n_y,) of the outputs whose noise is not declared.
+        unsaid: units (n_y,) of the outputs whose noise is not declared.
         """
         std = np.sqrt(white**2 + np.mean(np.concatenate(caused) ** 2, axis=0))
         joint = joint_of([d / std for d in caused], white / std)
@@ -128,33 +133,7 @@ def noise_floor(record: Record) -> Array:
     return lowest
 
 
-def correlation_time(residual: Array) -> float:
-    """Number of samples of a residual (N,) per independent sample; 1 for white noise.
-
-    It is the integrated autocorrelation with Sokal's automatic window of five correlation times.
-    """
-    r = residual - residual.mean()
-    n = len(r)
-    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
-    rho = np.fft.irfft(spectrum)[: n // 2]
-    if rho[0] <= 0:
-        return 1.0
-    tau = 2 * np.cumsum(rho / rho[0]) - 1
-    window = np.arange(len(tau)) >= 5 * tau
-    return float(max(tau[np.argmax(window)] if window.any() else n / 5, 1.0))
-
-
-def weights(record: Record, residuals: Sequence[Array], all_noise: bool = True) -> Array:
-    """The unit of each output's residual (n_y,), by which residuals are weighted.
-
-    It is the declared noise. If noise is not declared, it is the rms of the residual times the root of its
-    correlation time, so that only independent samples count (a composite likelihood). all_noise: whether the
-    residual is held for noise. Where an effect is still sought in it, its motion says nothing about the
-    noise, and the rms alone balances the outputs.
-    """
-    size = record.noise_std.copy()
-    for j in np.flatnonzero(~record.noise_declared):
-        parts = [r[:, j] for r in _fitted(record, residuals)]
-        tau = np.mean([correlation_time(p) for p in parts]) if all_noise else 1.0
-        size[j] = np.sqrt(np.mean(np.concatenate(parts) ** 2) * tau)
-    return np.maximum(size, noise_floor(record))
+def scales(record: Record, residuals: Sequence[Array]) -> Array:
+    """The unit of each output's residual (n_y,): its declared noise, or else the residual's own rms."""
+    rms = np.sqrt(np.mean(np.concatenate(_fitted(record, residuals)) ** 2, axis=0))
+    return np.maximum(np.where(record.noise_declared, record.noise_std, rms), noise_floor(record))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,8 @@ from estimator.closeloop.fitting.slopes import (
 from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose, sandwich
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
+from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Run
@@ -491,3 +493,51 @@ def test_a_moment_a_swing_off_is_fitted_again(monkeypatch):
     stayed = replace(h, fit=replace(h.fit, values=np.array([1.0, 5.35]), residual=off))
     found = likelihood.profiled(Refitter(baseline(asked, noise=0.1)), stayed).fit
     assert found.theta["d_t0"] == pytest.approx(5.0, abs=0.03)
+
+
+@dataclass(frozen=True)
+class Saturating(OneByOne):
+    """A motion whose size saturates with a calibrated parameter, and a sensor with a bias."""
+
+    q: np.ndarray
+    record: Any
+    declared: Mapping[str, float]
+    free_states = ()
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        return run.y - (np.tanh(4 * theta["mu"]) * self.q + theta.get("bias", 0.0))[:, None]
+
+
+class Briefly(Fitter):
+    """Fits without an FMU."""
+
+    def fitted(self, promises, evaluations, unknowns=None, known=None, guess=None, step=STEP):
+        """See Fitter."""
+        asked, noise = self.baseline.problem, self.baseline.noise.weighting
+        found = []
+        for p in promises:
+            every = [*unknowns, *(u for c in p.candidates for u in c.unknowns)]
+            made = fit(asked, every, noise, p.start, None, evaluations, known)
+            found.append(Hypothesis(p.candidates, made, ()))
+        return best_by_label(found)
+
+
+@given(st.floats(0.1, 0.4), st.floats(1.5, 3.0), st.integers(0, 99))
+@settings(max_examples=20, deadline=None)
+def test_a_brief_fit_that_is_worse_than_without_its_effect_begins_there(mu, begin, seed):
+    """The linearisation begins where the motion is saturated, so that no slope leads back."""
+    t = np.arange(500) * 0.01
+    q = np.sin(2 * np.pi * t)
+    y = np.tanh(4 * mu) * q + 0.05 + 0.01 * np.random.default_rng(seed).standard_normal(len(t))
+    every = np.ones(len(t), bool)
+    run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
+    record = record_with(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
+    asked = Saturating(q, record, {})
+    calibrated = Unknown("mu", 0.3, 0.0, 5.0, 0.1)
+    base = fit(asked, [calibrated], Weighting.white(np.array([0.01])))
+    fitter = Briefly(baseline(asked, Hypothesis((), base, ()), noise=0.01))
+    bias = Candidate("sensor_bias", "y", (Unknown("bias", 0.0, -np.inf, np.inf, 0.1),), ())
+    [found] = fitter.briefly([Promise((bias,), 0.0, {"mu": begin, "bias": 0.0})])
+    assert cost(found) < 1.3 * len(t)
+    assert found.theta["bias"] == pytest.approx(0.05, abs=0.005)

@@ -119,8 +119,21 @@ def test_a_residual_of_the_declared_size_is_noise_of_any_colour_and_a_larger_one
     assert [len(c) > 1 for c in noise.weighting.correlation] == [True, False]
     large = Noise.of(record_of(both, [0.1, 1.0]), [both], chance=3.0)
     assert large.weighting.is_white
-    unsaid = Noise.of(record_of(both, [np.nan, 1.0]), [both], chance=3.0)
-    assert unsaid.weighting.is_white
+
+
+def test_what_the_best_fit_leaves_gives_the_colour_of_noise_that_is_not_declared():
+    rng = np.random.default_rng(3)
+    slow = 0.2 * logger_noise(rng, 6000, 1.0, 50.0)
+    both = np.column_stack([slow, rng.standard_normal(6000)])
+    record = record_of(both, [np.nan, np.nan])
+    noise = Noise.of(record, [both], chance=3.0)
+    assert [len(c) > 1 for c in noise.weighting.correlation] == [True, False]
+    assert_allclose(noise.scale, np.sqrt(np.mean(both**2, axis=0)), rtol=0.05)
+    e = noise.weighting.of(both, record.stretches("fit"))
+    assert_allclose(np.mean(e**2, axis=0), 1.0, rtol=0.05)
+    searched = Noise.of(record, [both], chance=3.0, all_noise=False)
+    assert searched.weighting.is_white
+    assert_allclose(searched.scale, noise.scale)
 
 
 def test_the_samples_after_a_gap_are_not_predicted_from_those_before_it():

@@ -10,7 +10,7 @@ from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.input_noise import InputNoise
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.noise import Noise, noise_floor, weights
+from estimator.noise import Noise, noise_floor, scales
 from estimator.weighting import Weighting
 
 ROUGH = 1e-3  # tolerance of the first fit, which is enough while the residual is large
@@ -81,6 +81,6 @@ def _start_unknowns(problem: Problem) -> list[Unknown]:
     moved = [{**start, u.name: u.start + u.scale} for u in unknowns]
     residuals = problem.several_residuals([start, *moved])
     as_guessed = next(residuals)
-    size = weights(problem.record, as_guessed)
+    size = scales(problem.record, as_guessed)
     away = (float(np.sum(((r[0] - as_guessed[0]) / size) ** 2)) for r in residuals)
     return [u for u, square in zip(unknowns, away, strict=True) if square > SEEN]

@@ -54,13 +54,18 @@ class Fitter:
         """Fits of few evaluations, one per label, sorted by sum of squares, best first.
 
         Start states hardly matter for the ranking and keep the values and derivatives of the calibrated FMU.
-        known: whether the derivatives of the other unknowns are taken from the calibrated FMU too.
+        known: whether the derivatives of the other unknowns are taken from the calibrated FMU too. With an
+        effect of size zero, every hypothesis is the calibrated FMU. Where a fit is worse, its start by the
+        linearisation was, and it begins there.
         """
         problem, base = self.baseline.problem, self.baseline.hypothesis.fit
         states = {n: v for n, v in base.theta.items() if n in problem.free_states}
         started = self.asked(replace(problem, declared={**problem.declared, **states}))
         others = [u for u in base.unknowns if u.name not in states]
-        found = started.fitted(promises, BRIEF, others, base.columns if known else None)
+        columns = base.columns if known else None
+        found = started.fitted(promises, BRIEF, others, columns)
+        worse = [_without_effect(h, base) for h in found if cost(h) > base.cost]
+        found = best_by_label([*found, *started.fitted(worse, BRIEF, others, columns)])
         return [replace(h, fit=h.fit.extended(base, states)) for h in found]
 
     def to_the_end(
@@ -219,6 +224,12 @@ def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
         group = next((g for g in groups if own <= set(g)), [])
         found.append(problem.with_effects(sorted({*problem.effects, *group})))
     return found
+
+
+def _without_effect(h: Hypothesis, base: Fit) -> Promise:
+    """A promise of the effects of h that starts at the calibrated FMU, with sizes of zero."""
+    off = {u.name: 0.0 for c in h.candidates for u in c.amplitudes}
+    return Promise(h.candidates, 0.0, {**h.theta, **base.theta, **off})
 
 
 def from_there(found: Sequence[Hypothesis]) -> list[Promise]:

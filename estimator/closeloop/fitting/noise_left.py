@@ -15,7 +15,7 @@ def noise_left(
 ) -> Noise:
     """The noise of the sensors, with that of the inputs where the residual (N, n_y) of a run is larger.
 
-    theta: values of the fit that leaves the residuals; all_noise: see `weights`.
+    theta: values of the fit that leaves the residuals; all_noise: see `Noise.of`.
     """
     record, chance = problem.record, problem.policy.detection.chance
     more = caused(problem, theta) if larger(record, residuals, chance) else []

@@ -85,8 +85,13 @@ class Screened:
         return self.open_to_form and self.came() is not None
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
-        """Whether one of them accounts for the residual; False if the noise is not declared."""
-        return self.baseline.noise.known and any(explains(self.baseline, h) for h in found)
+        """Whether one of them accounts for the residual, and leaves noise as far as that can be told.
+
+        Where noise is not declared, what is left is noise if outputs do not depend on each other.
+        """
+        b = self.baseline
+        told = (h for h in found if b.noise.known or b.seen_by_several(h) is False)
+        return any(explains(b, h) for h in told)
 
 
 def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress, stages: Stages) -> Screened:

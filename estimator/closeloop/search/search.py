@@ -127,7 +127,7 @@ class Search:
             self.tell("growing", "fitting the leading effects to a growing part of the record")
             found, hopes = alone, [*sudden, *self._promises]
             alone = s.stages.done("growing", lambda: from_the_beginning(fitter, found, hopes))
-        if s.explained(alone):
+        if s.explained(alone) or s.baseline.seen_by_several(s.baseline.hypothesis) is False:
             return alone, []
         self.tell("pairs", "trying pairs of effects")
         pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, alone, self._single))
