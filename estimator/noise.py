@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from estimator.weighting import Weighting, correlation_of, joint_of
 
 # weights of the third difference; white noise of variance 1 leaves variance 20
 DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])
+
+
+Left = Literal["effect", "noise", "form"]  # what a residual is held for where noise is not declared
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +31,7 @@ class Noise:
     @classmethod
     def of(
         cls, record: Record, residuals: Sequence[Array], chance: float, caused: Sequence[Array] = (),
-        all_noise: bool = True,
+        left: Left = "noise",
     ) -> "Noise":  # fmt: skip
         """Noise of a record, from the residual (N, n_y) of a fit in each run.
 
@@ -36,15 +40,19 @@ class Noise:
         square may exceed the declared one, in standard deviations; caused: draws (n, n_y) of further noise,
         which is added to that of the sensors and which the outputs may share.
 
-        all_noise: whether the residual is held for noise where none is declared, so that its correlation is
-        estimated, too. Where an effect is still sought in it, its motion says nothing about the noise, and
-        its rms alone balances the outputs.
+        left: what the residual is held for where noise is not declared. Of an effect, its motion says nothing
+        about the noise, and its rms alone balances the outputs. Noise has a correlation, which is estimated.
+        An error of the model's form has one too, but predictions of it from its past are no measure of a
+        model: only independent samples count (a composite likelihood).
         """
         white = noise_floor(record)
         if caused:
-            return cls._shared(record, white, caused, scales(record, residuals))
-        said, size = record.noise_declared, np.where(record.noise_declared, white, scales(record, residuals))
-        most = np.where(said, chance, np.inf if all_noise else -np.inf)
+            return cls._shared(record, white, caused, scales(record, residuals, left))
+        said, size = (
+            record.noise_declared,
+            np.where(record.noise_declared, white, scales(record, residuals, left)),
+        )
+        most = np.where(said, chance, np.inf if left == "noise" else -np.inf)
         correlation, fitted = [], _stretches(record, residuals)
         for j in range(len(said)):
             found = _of_noise([r[:, j] / size[j] for r in fitted], most[j])
@@ -133,7 +141,30 @@ def noise_floor(record: Record) -> Array:
     return lowest
 
 
-def scales(record: Record, residuals: Sequence[Array]) -> Array:
-    """The unit of each output's residual (n_y,): its declared noise, or else the residual's own rms."""
-    rms = np.sqrt(np.mean(np.concatenate(_fitted(record, residuals)) ** 2, axis=0))
-    return np.maximum(np.where(record.noise_declared, record.noise_std, rms), noise_floor(record))
+def correlation_time(residual: Array) -> float:
+    """Number of samples of a residual (N,) per independent sample; 1 for white noise.
+
+    It is the integrated autocorrelation with Sokal's automatic window of five correlation times.
+    """
+    r = residual - residual.mean()
+    n = len(r)
+    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
+    rho = np.fft.irfft(spectrum)[: n // 2]
+    if rho[0] <= 0:
+        return 1.0
+    tau = 2 * np.cumsum(rho / rho[0]) - 1
+    window = np.arange(len(tau)) >= 5 * tau
+    return float(max(tau[np.argmax(window)] if window.any() else n / 5, 1.0))
+
+
+def scales(record: Record, residuals: Sequence[Array], left: Left) -> Array:
+    """The unit of each output's residual (n_y,): its declared noise, or else the residual's own rms.
+
+    left: see Noise.of. The rms of an error of form is multiplied by the root of its correlation time.
+    """
+    size = record.noise_std.copy()
+    for j in np.flatnonzero(~record.noise_declared):
+        parts = [r[:, j] for r in _fitted(record, residuals)]
+        tau = np.mean([correlation_time(p) for p in parts]) if left == "form" else 1.0
+        size[j] = np.sqrt(np.mean(np.concatenate(parts) ** 2) * tau)
+    return np.maximum(size, noise_floor(record))

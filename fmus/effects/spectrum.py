@@ -7,6 +7,7 @@ Array = NDArray[np.float64]
 LINES = 2  # that are tried
 MAX_ORDER = 60.0  # cycles per turn, beyond which nothing on a shaft is looked for
 PERIODS = 3  # in a record, to tell a line from a slow change
+BAND = 20  # lines, over which the spectrum about a line is compared with it
 FINE = 8  # points of the grids over a period of the highest line, and over a line of the spectrum
 
 
@@ -50,7 +51,11 @@ def _without_damping(v: Array, force: Array) -> Array:
 
 
 def _lines(place: Array, rest: Array, low: float, high: float) -> list[float]:
-    """Strongest lines between two angular frequencies, of samples at places in any order."""
+    """Lines between two angular frequencies that stand out most, of samples at places in any order.
+
+    A line stands above the spectrum about it. What is merely slow, as a drift or correlated noise, fills a
+    wide band, whose median is taken off as a factor.
+    """
     if high <= low:
         return []
     cell = 2 * np.pi / high / FINE
@@ -59,9 +64,18 @@ def _lines(place: Array, rest: Array, low: float, high: float) -> list[float]:
     )  # what falls on one place adds up
     power = np.abs(np.fft.rfft(gathered, FINE * len(gathered)))
     grid = 2 * np.pi * np.fft.rfftfreq(FINE * len(gathered), cell)
-    power[(grid < low) | (grid > high)] = 0.0
+    inside = (grid >= low) & (grid <= high)
+    power = np.where(inside, power / _about(power, inside), 0.0)
     peaks = _peaks(power, distance=2 * FINE)
     return [float(grid[i]) for i in peaks[np.argsort(power[peaks])[::-1][:LINES]]]
+
+
+def _about(power: Array, inside: NDArray[np.bool_]) -> Array:
+    """Median of a spectrum (N,) in bands of the part that is looked at, interpolated between these."""
+    at = np.flatnonzero(inside)
+    bands = np.array_split(at, max(1, len(at) // (BAND * FINE)))
+    middle, level = [float(np.mean(band)) for band in bands], [np.median(power[band]) for band in bands]
+    return np.maximum(np.interp(np.arange(len(power)), middle, level), np.finfo(float).tiny)
 
 
 def _peaks(x: Array, distance: float) -> NDArray[np.intp]:

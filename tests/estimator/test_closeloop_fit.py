@@ -474,6 +474,38 @@ def test_an_interval_reaches_the_bound_of_a_shape_on_which_the_record_does_not_d
     assert np.mean(before) < 0.8
 
 
+class Swinging(Playing):
+    """A harmonic force of any frequency, which is a constant one at the lowest."""
+
+    def __init__(self, f: float, seed: int) -> None:
+        self.t = np.arange(400) * 0.01
+        y = np.sin(2 * np.pi * f * self.t) + 0.2 * np.random.default_rng(seed).standard_normal(400)
+        every = np.ones(len(y), bool)
+        run = Run(self.t, self.t[:, None], y[:, None], every, ~every, ~every)
+        self.record = record_with(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
+
+    def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
+        [run] = self.record.runs
+        phase = 2 * np.pi * theta["f"] * self.t
+        return run.y - (theta["F_sin"] * np.sin(phase) + theta["F_cos"] * np.cos(phase))[:, None]
+
+
+@given(st.floats(0.8, 8.0), st.integers(0, 99))
+@settings(max_examples=20, deadline=None)
+def test_an_interval_does_not_reach_a_bound_at_which_the_law_is_another_one(f, seed):
+    """At no frequency the two amplitudes cannot make up for the line, as they do at its own."""
+    asked = Swinging(f, seed)
+    size = [Unknown(n, 0.0, -np.inf, np.inf, 1.0) for n in ("F_sin", "F_cos")]
+    shape = Unknown("f", f, 0.0, np.inf, 0.1)
+    found = fit(asked, (*size, shape), Weighting.white(np.array([0.2])), {"F_sin": 1.0, "F_cos": 0.0, "f": f})
+    h = Hypothesis((Candidate("harmonic_excitation", "rail", tuple(size), (shape,)),), found, ())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(likelihood, "built", lambda problem, _: problem)
+        whole = likelihood.profiled(Fitter(baseline(asked, noise=0.2)), h)
+    assert whole.fit.std["f"] < 2 * found.std["f"]
+    assert not likelihood.reaching_a_bound(whole)
+
+
 class Refitter(Fitter):
     """Fits without an FMU."""
 

@@ -17,7 +17,7 @@ from estimator.closeloop.screening.levers import Course, shifts
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.pushes import pushed
 from estimator.closeloop.screening.screen import screen
-from estimator.noise import noise_floor
+from estimator.noise import correlation_time, noise_floor
 from estimator.record import Record, Run
 from estimator.sensor_faults import FAULTS, faulty
 from estimator.weighting import Weighting
@@ -147,6 +147,19 @@ def test_a_final_fmu_starts_with_what_was_found(drive: ForeignBuilder, tmp_path:
     made = drive.final((("constant_force", "carriage"),), starts, tmp_path)
     known = describe(made).variables
     assert {name: known[name].start for name in starts} == starts
+
+
+@given(st.floats(-0.9, 0.95), st.integers(0, 99))
+@settings(max_examples=15)
+def test_correlation_time_of_an_autoregression(phi: float, seed: int) -> None:
+    n = 40000
+    e = np.random.default_rng(seed).standard_normal(n)
+    x = np.empty(n)
+    x[0] = e[0]
+    for k in range(1, n):
+        x[k] = phi * x[k - 1] + e[k]
+    theory = max((1 + phi) / (1 - phi), 1.0)
+    assert_allclose(correlation_time(x), theory, rtol=0.35)
 
 
 @pytest.mark.parametrize("width", [np.inf, 40.0])

@@ -183,7 +183,7 @@ def test_the_noise_that_stays_in_the_inputs_is_found_at_the_outputs(seed):
     sensor = 0.002
     problem = without_input_noise(measured(np.random.default_rng(seed), sensor), {})
     left = residuals(problem)
-    noise = noise_left(problem, {}, left, True)
+    noise = noise_left(problem, {}, left, "noise")
     assert 0.6 < np.std(left[0]) / noise.std[0] < 1.5
     assert noise.std[0] > 3 * sensor
     weighed = noise.weighting.of(left[0], [N])

@@ -131,9 +131,13 @@ def test_what_the_best_fit_leaves_gives_the_colour_of_noise_that_is_not_declared
     assert_allclose(noise.scale, np.sqrt(np.mean(both**2, axis=0)), rtol=0.05)
     e = noise.weighting.of(both, record.stretches("fit"))
     assert_allclose(np.mean(e**2, axis=0), 1.0, rtol=0.05)
-    searched = Noise.of(record, [both], chance=3.0, all_noise=False)
+    searched = Noise.of(record, [both], chance=3.0, left="effect")
     assert searched.weighting.is_white
     assert_allclose(searched.scale, noise.scale)
+    misfit = Noise.of(record, [both], chance=3.0, left="form")
+    assert misfit.weighting.is_white
+    assert misfit.scale[0] > 5 * noise.scale[0]
+    assert misfit.scale[1] == pytest.approx(noise.scale[1], rel=0.1)
 
 
 def test_the_samples_after_a_gap_are_not_predicted_from_those_before_it():

@@ -54,13 +54,13 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
         for n, (low, high) in problem.calibrate.items()
     ]
     unknowns = [*parameters, *states]
-    base, noise = declared, noise_left(problem, start.theta, declared.residuals, all_noise=False)
+    base, noise = declared, noise_left(problem, start.theta, declared.residuals, left="effect")
     for _ in range(1 if noise.known else 2):
         found = fit(problem, unknowns, noise.weighting, base.fit.theta, gain=ROUGH)
         if np.mean(found.residual**2) < ROUGHLY_MATCHED:
             found = fit(problem, unknowns, noise.weighting, found.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
-        noise = noise_left(problem, found.theta, base.residuals, all_noise=False)
+        noise = noise_left(problem, found.theta, base.residuals, left="effect")
     if not noise.weighting.is_white:
         found = fit(problem, unknowns, noise.weighting, base.fit.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
@@ -81,6 +81,6 @@ def _start_unknowns(problem: Problem) -> list[Unknown]:
     moved = [{**start, u.name: u.start + u.scale} for u in unknowns]
     residuals = problem.several_residuals([start, *moved])
     as_guessed = next(residuals)
-    size = scales(problem.record, as_guessed)
+    size = scales(problem.record, as_guessed, "effect")
     away = (float(np.sum(((r[0] - as_guessed[0]) / size) ** 2)) for r in residuals)
     return [u for u, square in zip(unknowns, away, strict=True) if square > SEEN]

@@ -17,6 +17,7 @@ from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.profile_trace import WIDTH, ends
 from estimator.closeloop.fitting.refined import from_declared, lower, refined
 from estimator.closeloop.fitting.resolution import in_divided_steps
+from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import onsets_beside, onsets_near
@@ -105,27 +106,32 @@ def _to_limits(here: Problem, h: Hypothesis, weighting: Weighting) -> Array:
     """Standard errors (n,) of shapes whose intervals reach as far as a bound; zero for all others.
 
     At its bounds a law may become another one, as friction without rounding is that of Coulomb. Slopes may
-    not lead there, where the record does not depend on the shape. All other unknowns follow linearly.
+    not lead there, where the record does not depend on the shape. All other unknowns follow linearly; what
+    the amplitudes of the law change is simulated at the bound, as it is a matter of the shape.
     """
-    limits = [
-        (i, float(bound))
-        for i, u in enumerate(h.fit.unknowns)
-        if u.name in h.shapes and not u.is_onset
-        for bound in (u.low, u.high)
-        if np.isfinite(bound)
-    ]
-    asked = [{**h.theta, h.fit.unknowns[i].name: bound} for i, bound in limits]
-    found = np.zeros(len(h.fit.unknowns))
-    for (i, bound), r in zip(limits, in_turn(here, asked, weighting), strict=True):
-        least, there = _followed(h, i, [h.fit.residual, r])
-        if there - least < WIDTH**2 * h.fit.inflation[i]:
-            found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
+    found, names = np.zeros(len(h.fit.unknowns)), [u.name for u in h.fit.unknowns]
+    for c in h.candidates:
+        sizes = [names.index(u.name) for u in c.amplitudes if u.name in names]
+        for i, bound in ((names.index(u.name), b) for u in c.shape for b in (u.low, u.high)):
+            if h.fit.unknowns[i].is_onset or not np.isfinite(bound):
+                continue
+            steps = np.array([STEP * h.fit.unknowns[j].scale for j in sizes])
+            there = {**h.theta, names[i]: float(bound)}
+            moved = [{**there, names[j]: there[names[j]] + d} for j, d in zip(sizes, steps, strict=True)]
+            r, *others = in_turn(here, [there, *moved], weighting)
+            jacobian = h.fit.jacobian.copy()
+            jacobian[:, sizes] = np.array([(o - r) / d for o, d in zip(others, steps, strict=True)]).T
+            rise = _followed(jacobian, i, [r])[0] - _followed(h.fit.jacobian, i, [h.fit.residual])[0]
+            if rise < WIDTH**2 * h.fit.inflation[i]:
+                found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
     return found
 
 
-def _followed(h: Hypothesis, i: int, residuals: Iterable[Array]) -> Array:
+def _followed(jacobian: Array, i: int, residuals: Iterable[Array]) -> Array:
     """Sums of squares of residuals (m,) after all unknowns but the i-th have followed linearly."""
-    others = np.linalg.qr(np.delete(h.fit.jacobian, i, axis=1))[0]
+    columns = np.delete(jacobian, i, axis=1)
+    seen = columns[:, np.linalg.norm(columns, axis=0) > 0]
+    others = np.linalg.qr(seen)[0]
     return np.array([float(np.sum((r - others @ (others.T @ r)) ** 2)) for r in residuals])
 
 
@@ -140,7 +146,7 @@ def _when(here: Problem, h: Hypothesis, i: int, weighting: Weighting) -> tuple[f
     length, usual = here.record.runs[0].fit_time(1.0), float(h.fit.inflation[i])
     tried = np.array([t for t in (*onsets_near(now, length), *onsets_beside(now, length)) if t != now])
     asked = [{**h.theta, name: t} for t in (now, *tried.tolist())]
-    squares = _followed(h, i, in_turn(here, asked, weighting))
+    squares = _followed(h.fit.jacobian, i, in_turn(here, asked, weighting))
     rises = (squares[1:] - squares[0]) / usual
     if rises.min() < -here.policy.interval.deeper:
         return 0.0, {name: float(tried[np.argmin(rises)])}

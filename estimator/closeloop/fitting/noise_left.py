@@ -6,20 +6,18 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.question.problem import Problem
-from estimator.noise import Noise, larger
+from estimator.noise import Left, Noise, larger
 from estimator.record import Array
 
 
-def noise_left(
-    problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array], all_noise: bool
-) -> Noise:
+def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array], left: Left) -> Noise:
     """The noise of the sensors, with that of the inputs where the residual (N, n_y) of a run is larger.
 
-    theta: values of the fit that leaves the residuals; all_noise: see `Noise.of`.
+    theta: values of the fit that leaves the residuals; left: see `Noise.of`.
     """
     record, chance = problem.record, problem.policy.detection.chance
     more = caused(problem, theta) if larger(record, residuals, chance) else []
-    return Noise.of(record, residuals, chance, more, all_noise)
+    return Noise.of(record, residuals, chance, more, left)
 
 
 def caused(problem: Problem, theta: Mapping[str, float]) -> list[Array]:

@@ -18,7 +18,7 @@ from estimator.closeloop.hypotheses.fitted import Fit, sandwich
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
-from estimator.noise import Noise
+from estimator.noise import Left, Noise
 from estimator.record import Array
 from estimator.weighting import Weighting
 from fmus.aside import set_aside
@@ -38,11 +38,16 @@ def reweighted(
 
 
 def noise_of_best(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise | None:
-    """The noise that the best of the hypotheses leaves; None if it says no more than that of the baseline."""
+    """The noise that the best of the hypotheses leaves; None if it says no more than that of the baseline.
+
+    Noise that is not declared is taken from what it leaves, unless outputs depend on each other in that.
+    """
     if not any(found):
         return None
     best = min((h for some in found for h in some), key=cost)
-    noise = noise_left(built(baseline.problem, best.candidates), best.theta, best.residuals, all_noise=True)
+    here = built(baseline.problem, best.candidates)
+    left: Left = "noise" if baseline.seen_by_several(best) is False else "form"
+    noise = noise_left(here, best.theta, best.residuals, left)
     same = all(n.known and n.weighting.is_white for n in (baseline.noise, noise))
     return None if same else noise
 
