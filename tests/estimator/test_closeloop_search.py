@@ -28,6 +28,7 @@ from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration
 from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
+from estimator.closeloop.search import search
 from estimator.closeloop.search.lookalikes import lookalikes
 from estimator.closeloop.search.nomination import overlooked
 from estimator.closeloop.search.onset import ONSET_BLOCKS, onset
@@ -421,3 +422,22 @@ def test_a_group_starts_where_the_best_of_its_parameters_has_arrived():
     assert promise.start[prefix + "t0"] == 20.0
     assert promise.start["k"] == 1.1
     assert in_groups([one, step_of("friction", "delta_mu0", "delta_A", cost=50.0)], every) == []
+
+
+@pytest.mark.parametrize(("mean_square", "grows"), [(1.0, False), (1.5, True)])
+def test_an_answer_that_leaves_more_than_noise_does_not_end_the_search(monkeypatch, mean_square, grows):
+    """It may have won only because the right fit has not arrived."""
+    left = np.sqrt(mean_square) * np.ones(4000)
+    answer = Hypothesis((), Fit((), np.zeros(0), np.zeros((0, 0)), left, ()), ())
+    right = replace(answer, fit=replace(answer.fit, residual=0 * left))
+    known = baseline(SimpleNamespace(policy=DEFAULT))
+    fitter = SimpleNamespace(baseline=known, to_the_end=list)
+    stages = SimpleNamespace(done=lambda _, work: work())
+    screened = SimpleNamespace(baseline=known, stages=stages, explained=lambda _: True)
+    monkeypatch.setattr(search, "dated", lambda _, found: found)
+    monkeypatch.setattr(search, "from_the_beginning", lambda _, found, promises: [right, *found])
+    asked = search.Search(screened, fitter, lambda *_: None)
+    monkeypatch.setattr(search.Search, "_promises", [])
+    singles, pairs = asked._finished([answer], [])
+    assert singles[0] is (right if grows else answer)
+    assert pairs == []

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import HANDFUL, ForceLaw
@@ -182,3 +183,14 @@ def test_sizes_are_realistic():
     assert EFFECTS["parameter_step"].size(0.0, 60.0) > 0
     assert -1 < EFFECTS["stiffness_change"].size(60.0) < 0
     assert 0 < EFFECTS["actuator_lag"].size(60.0) < 1
+
+
+@given(st.floats(2.0, 15.0), st.integers(0, 99))
+@settings(max_examples=20, deadline=None)
+def test_a_line_is_found_beside_slow_noise_of_more_power(f, seed):
+    """Slow noise fills a band; a line stands above the spectrum about it."""
+    rng, t = np.random.default_rng(seed), np.arange(6000) * 0.01
+    slow = lfilter([1.0], [1.0, -0.998], rng.standard_normal(len(t)))
+    force = 5.0 * slow / slow.std() + np.sin(2 * np.pi * f * t)
+    found = frequencies(t, rng.standard_normal(len(t)), force)
+    assert min(abs(x - f) for x in found) < 0.01
