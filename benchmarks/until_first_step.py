@@ -18,11 +18,13 @@ def reached(*_: Any) -> None:
 
 def main() -> None:
     """Replace all calls that step an FMU, and run the command."""
-    from fmus.host.instance import Instance
+    from fmus.host.fmi2 import Fmi2Instance
+    from fmus.host.fmi3 import Fmi3Instance
     from scenarios.cli.app import run_safely
 
-    for name in ("run", "stepper"):
-        setattr(Instance, name, reached)
+    for kind in (Fmi2Instance, Fmi3Instance):
+        for name in ("run", "stepper"):
+            setattr(kind, name, reached)
     sys.exit(run_safely(sys.argv[1:]))
 
 

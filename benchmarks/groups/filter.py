@@ -1,6 +1,7 @@
 """A step of the friction filter, beside FMPy with filterpy, the bare C code of its steps, and real time."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -9,7 +10,8 @@ from benchmarks.group import Disagreement, Group, Row, Work
 from benchmarks.peers.generated_c import Loops, begin
 from benchmarks.peers.plain_filter import PlainFilter
 from benchmarks.timing import Run, in_turns, seconds
-from estimator.filters.history import filtered
+from estimator.filters.history import Samples, filtered
+from estimator.filters.system import Joint
 from estimator.record import Array
 from fmus.wheelset.model import Wheelset
 
@@ -37,9 +39,15 @@ class FilterGroup(Group):
             ours, slow = Ours(path), Ours(path, compiled=False)
             plain = PlainFilter(path, work.folder / f"plain_{build}", ours.joint)
             filters: dict[str, Ours | PlainFilter] = {"ours": ours, "without numba": slow, PLAIN: plain}
-            runs = {BARE: bare(work, steps)} if build == "native" else {}
+            data = as_samples(y[: steps + 1])
+            runs: dict[str, Run] = {"record": partial(_whole, ours.joint, data)}
+            runs |= {BARE: bare(work, steps)} if build == "native" else {}
             times = in_turns(runs | {n: _through(f, y, steps) for n, f in filters.items()}, rounds)
             _agreed(ours, plain, said)
+            how = f"{CASE}; a record of {steps} steps with its history, as `railfmi estimate` filters it"
+            yield times.row(
+                f"friction filter: record, {said}", "record", PLAIN, "µs", how, factor=1e6 / steps
+            )
             name = f"friction filter: step, {said}"
             yield times.row(name, "ours", PLAIN, "µs", CASE, factor=1e6 / steps)
             if build == "native":
@@ -56,15 +64,14 @@ class FilterGroup(Group):
         data = as_samples(y[: round(work.of(20, 1) / DT) + 1])
         length = float(data.t[-1])
         with Ours(work.fmu("wheelset")).joint as joint:
-
-            def whole() -> None:
-                filtered(ukf(joint), data)
-
+            whole = partial(_whole, joint, data)
             whole()
             speeds = [length / seconds(whole) for _ in range(work.of(5, 2))]
         low, speed, high = (float(v) for v in np.percentile(speeds, (25, 50, 75)))
         how = f"{CASE}; a record of {length:g} s with its history, native FMU, simulated over processor time"
-        return Row("friction filter: record", speed, "real time", 1.0, speed, "s/s", how, (low, high))
+        return Row(
+            "friction filter: record, native FMU", speed, "real time", 1.0, speed, "s/s", how, (low, high)
+        )
 
 
 def bare(work: Work, steps: int) -> Run:
@@ -73,6 +80,11 @@ def bare(work: Work, steps: int) -> Run:
     loops, (x, u, p) = Loops.of(model, work.folder / "loops_filter"), begin(model)
     X = x * np.linspace(0.9, 1.1, POINTS)[:, None]
     return lambda: loops.rows(X, u, p, DT, steps)
+
+
+def _whole(joint: Joint, data: Samples) -> None:
+    """Filter a record from its start, with its history."""
+    filtered(ukf(joint), data)
 
 
 def _through(filter: Ours | PlainFilter, y: Array, steps: int) -> Run:

@@ -29,6 +29,7 @@ from estimator.closeloop.planning.advice import next_experiment
 from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.moments import identified_at
 from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.screening.clock_offset import clock_of
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
 from estimator.closeloop.search.free_form import free_form
 from estimator.closeloop.search.pairs import with_worth
@@ -77,6 +78,10 @@ class Chain:
         tell("missing force", "estimating the missing force at each port")
         forces = done("forces", lambda: missing_forces(problem, base.fit.theta, noise.std))
         shown = screened(baseline, forces, tell, self.stages)
+        if most := clock_of(baseline, shown.screening, shown.fit, shown.promises, shown.change):
+            tell("clock", "beginning anew with an offset of the outputs' clock as a further unknown")
+            clocked = replace(self.problem, clock=most)
+            return replace(self, problem=clocked, stages=self.stages.under("clock")).run()
         detection = self._detected(shown)
         diagnostics = self._diagnosed(shown, detection)
         before, early = without_fits(baseline, detection)

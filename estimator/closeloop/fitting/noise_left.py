@@ -5,27 +5,41 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimator.closeloop.question.clock import jitter, slopes
 from estimator.closeloop.question.problem import Problem
 from estimator.noise import Left, Noise, larger
 from estimator.record import Array
 
 
 def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array], left: Left) -> Noise:
-    """The noise of the sensors, with that of the inputs where the residual (N, n_y) of a run is larger.
+    """The noise of the sensors, with that of inputs and times where the residual (N, n_y) of a run is larger.
 
     theta: values of the fit that leaves the residuals; left: see `Noise.of`.
     """
     record, chance = problem.record, problem.policy.detection.chance
-    more = caused(problem, theta) if larger(record, residuals, chance) else []
+    more = caused(problem, theta, residuals) if larger(record, residuals, chance) else []
     return Noise.of(record, residuals, chance, more, left)
 
 
-def caused(problem: Problem, theta: Mapping[str, float]) -> list[Array]:
-    """Draws (n, n_y) of the outputs' noise that comes from the noise left in the inputs, if there is any.
+def caused(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> list[Array]:
+    """Draws (n, n_y) of the outputs' noise that comes from noise of the inputs and times, if there is any.
 
-    They are the responses of the FMU to that much more noise, on each run that has a part to identify.
+    They are made for each run that has a part to identify.
     """
-    record, noise, rng = problem.record, problem.input_noise, np.random.default_rng(0)
+    rng = np.random.default_rng(0)
+    found = _by_inputs(problem, theta, rng)
+    scatter = jitter(problem.record, residuals, problem.policy.detection.chance)
+    if not scatter:
+        return found
+    pairs = zip(problem.record.runs, residuals, strict=True)
+    rates = [slopes(run, r) for run, r in pairs if run.fit.any()]
+    late = [v * scatter * rng.standard_normal((len(v), 1)) for v in rates * (len(found) // len(rates) or 1)]
+    return [a + b for a, b in zip(found, late, strict=True)] if found else late
+
+
+def _by_inputs(problem: Problem, theta: Mapping[str, float], rng: np.random.Generator) -> list[Array]:
+    """The responses of the FMU to as much noise as is left in the inputs."""
+    record, noise = problem.record, problem.input_noise
     if noise is None:
         return []
     found, still = [], problem.simulate(theta)

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from estimator.closeloop.policy import DEFAULT, Policy, StartPolicy
+from estimator.closeloop.question.clock import CLOCK, read_later
 from estimator.closeloop.question.input_noise import InputNoise
 from estimator.plant import PLANTS, USUAL, Plant, Steps
 from estimator.record import Array, Record, Run
@@ -72,9 +73,10 @@ class Problem:
     the start states that are given; calibrate: bounds by name; free_states: states whose start value is not
     given; form_error: share of an output that the form of the FMU leaves open; other_forms: values of
     parameters that choose other forms of the model, as plausible as the chosen one; policy: the limits of the
-    decision; input_noise: noise that was smoothed away in the inputs of the record; steps: those of the
-    simulation; searched: those with which hypotheses are searched. The object is small and picklable; worker
-    processes open the FMU themselves.
+    decision; input_noise: noise that was smoothed away in the inputs of the record; clock: bound of the
+    offset of the outputs' clock, s, 0 where there is none; steps: those of the simulation; searched: those
+    with which hypotheses are searched. The object is small and picklable; worker processes open the FMU
+    themselves.
     """
 
     builder: Builder
@@ -88,6 +90,7 @@ class Problem:
     other_forms: tuple[dict[str, float], ...] = ()
     policy: Policy = DEFAULT
     input_noise: InputNoise | None = None
+    clock: float = 0.0
     steps: Steps = USUAL
     searched: Steps = USUAL
 
@@ -103,8 +106,9 @@ class Problem:
 
     @property
     def at_once(self) -> int:
-        """How many unknowns `identify_residuals` takes in the time of little more than one."""
-        return self.plant.fmu.at_once
+        """How many unknowns `identify_residuals` takes in the time of one, if memory allows."""
+        plant = self.plant
+        return min(plant.at_once(run) for run in self.record.runs)
 
     @cached_property
     def measured_state(self) -> dict[str, int]:
@@ -188,7 +192,7 @@ class Problem:
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
         y = self.plant.simulate(run, self._start(run, theta), more, steps=self.steps)
-        return faulty(y, run.t, self.record.outputs, theta)
+        return self._measured(y, run, theta)
 
     def _residual(self, run: Run, theta: Mapping[str, float]) -> Array:
         """Measured minus simulated outputs of a run, (N, n_y)."""
@@ -200,7 +204,12 @@ class Problem:
         rows = self.plant.simulate_rows(run, starts, steps=self.steps)
         if rows is None:
             return None
-        return [faulty(y, run.t, self.record.outputs, theta) for y, theta in zip(rows, thetas, strict=True)]
+        return [self._measured(y, run, theta) for y, theta in zip(rows, thetas, strict=True)]
+
+    def _measured(self, y: Array, run: Run, theta: Mapping[str, float]) -> Array:
+        """Simulated outputs, the first columns of y, as the record's clock and faulty sensors show them."""
+        outputs, offset = self.record.outputs, theta.get(CLOCK, self.declared.get(CLOCK, 0.0))
+        return faulty(read_later(y, run.t, len(outputs), offset), run.t, outputs, theta)
 
     def _start(self, run: Run, theta: Mapping[str, float]) -> dict[str, float]:
         """Start values of the FMU for a run; free states of a run that is not fitted are guessed from it."""
@@ -212,7 +221,9 @@ class Problem:
     def start(self, theta: Mapping[str, float]) -> dict[str, float]:
         """Start values of the FMU: the declared ones, and those in theta that are variables of the FMU."""
         known = self.plant.fmu.description.variables
-        return {**self.declared, **{n: v for n, v in theta.items() if n in known}}
+        every = {**self.declared, **{n: v for n, v in theta.items() if n in known}}
+        every.pop(CLOCK, None)
+        return every
 
 
 def simulate_ahead(asked: Sequence[tuple[Problem, Mapping[str, float]]]) -> None:

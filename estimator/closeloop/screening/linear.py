@@ -136,19 +136,21 @@ def influences(
     n_y, n = len(plant.outputs), len(plant.states)
     sizes = {name: LEVER_NUDGE * _size(known[name], start) for name in levers if name not in found}
     moved = [{**start, name: _value(known[name], start) + h} for name, h in sizes.items()]
-    kept = (y[keep] for y in plant.simulate_in_turn(run, [start, *moved], plant.states, problem.steps))
+    kept = (
+        set_aside(y[keep]) for y in plant.simulate_in_turn(run, [start, *moved], plant.states, problem.steps)
+    )
     before = next(kept)
     for (name, h), after in zip(sizes.items(), kept, strict=True):
-        dy, dx = np.split((after - before) / h, (n_y,), axis=1)
         steps, shown = np.empty((len(keep), n)), np.empty((len(keep), n_y))
         for rows in blocks(len(keep), 8 * n * (n + n_y)):
-            at, now = near[rows], dx[rows]
-            shown[rows] = dy[rows] - np.einsum("kyn,kn->ky", local.C[at], now)
-            then = dx[rows.start + 1 : rows.stop + 1]
-            steps[rows.start : rows.start + len(then)] = then - np.einsum(
-                "kmn,kn->km", local.A[at[: len(then)]], now[: len(then)]
-            )
-        steps[0] = dx[1]  # a change of the start state is not part of a step
+            at, ahead = near[rows], slice(rows.start, rows.stop + 1)
+            dy, dx = np.split((after[ahead] - before[ahead]) / h, (n_y,), axis=1)
+            now, then = dx[: len(at)], dx[1:]
+            shown[rows] = dy[: len(at)] - np.einsum("kyn,kn->ky", local.C[at], now)
+            by_state = np.einsum("kmn,kn->km", local.A[at[: len(then)]], now[: len(then)])
+            steps[rows.start : rows.start + len(then)] = then - by_state
+            if rows.start == 0:
+                steps[0] = dx[1]  # a change of the start state is not part of a step
         steps[-1] = steps[-2]
         found[name] = Influence(set_aside(steps), set_aside(shown))
     return local, found

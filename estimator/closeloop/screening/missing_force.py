@@ -63,7 +63,7 @@ def missing_forces(problem: Problem, theta: Mapping[str, float], noise: Array) -
             for i, (p, (f, s)) in enumerate(zip(problem.ports, pushes, strict=True))
         ]
     local = linearise(problem, theta, x, keep, [port.force for port in problem.ports], names)
-    found = smooth(local.of(slice(n_y)), (run.y - y)[keep], noise, np.diff(run.t[keep]))
+    found = smooth(local.of(slice(n_y)), run.y[keep] - y[keep], noise, np.diff(run.t[keep]))
     seen = local.of(slice(n_y, None)).C[local.near(len(keep))]
     moved = motion[keep] + np.einsum("kmn,kn->km", seen, found.together)
     return [

@@ -7,7 +7,7 @@ the candidates; the joint fits decide.
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import islice
@@ -32,10 +32,10 @@ from estimator.closeloop.screening.linear import (
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.regressors import batches
 from estimator.plant import USUAL
-from estimator.record import Array
+from estimator.record import Array, Run
 from estimator.sensor_faults import faulty
 from estimator.weighting import Weighting
-from fmus.aside import all_set_aside, set_aside
+from fmus.aside import all_set_aside, by_rows, set_aside
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
 
@@ -138,13 +138,18 @@ class Screening:
         known = plant.fmu.description.variables
         start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
         columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
-        given = np.empty((len(at), len(names)))
-        for i, n in enumerate(names):
-            given[:, i] = columns[n][at] if n in columns else start[n]
+
+        def values(rows: slice) -> Array:
+            some = at[rows]
+            return np.column_stack(
+                [columns[n][some] if n in columns else np.full(len(some), start[n]) for n in names]
+            )
+
+        given = by_rows((len(at), len(names)), values)
         t = run.t[:last] - run.t[0]
         speed = columns.get(SPEED, np.zeros(last))
         way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
-        return Course(t[at], full[at, len(plant.outputs) :], given, way[at])
+        return Course(t[at], set_aside(full[at, len(plant.outputs) :]), given, way[at])
 
     @cached_property
     def _courses(self) -> dict[str, Course]:
@@ -157,7 +162,7 @@ class Screening:
         plant = self.problem.plant
         as_restarts = replace(self.problem, steps=USUAL)
         [full, *_] = as_restarts.simulate(self.theta, plant.states)
-        x: Array = full[: _last(self.problem), len(plant.outputs) :]
+        x: Array = set_aside(full[: _last(self.problem), len(plant.outputs) :])
         return x if shows_its_state(self.problem, self.theta, x) else None
 
     def _answers(self, moved: Sequence[Mapping[str, Array]], levers: list[str]) -> list[Array]:
@@ -201,13 +206,14 @@ class Screening:
 
     def _fault(self, c: Candidate) -> Array:
         """Change of the residual by a fault of a sensor, (m, 1)."""
-        record, fault = self.problem.record, {u.name: u.scale for u in c.amplitudes}
-        parts = [
-            (faulty(y, run.t, record.outputs, fault) - y)[run.fit]
-            for y, run in zip(self._shown, record.runs, strict=True)
-            if run.fit.any()
-        ]
-        return self._weighted(np.concatenate(parts))[:, None]
+        outputs, fault = self.problem.record.outputs, {u.name: u.scale for u in c.amplitudes}
+        return self.by_outputs(lambda y, run: faulty(y, run.t, outputs, fault))[:, None]
+
+    def by_outputs(self, measured: Callable[[Array, Run], Array]) -> Array:
+        """Change of the residual if outputs (N, n_y) of a run are measured in another way, (m,)."""
+        runs = zip(self._shown, self.problem.record.runs, strict=True)
+        parts = [(measured(y, run) - y)[run.fit] for y, run in runs if run.fit.any()]
+        return self._weighted(np.concatenate(parts))
 
     def _weighted(self, change: Array) -> Array:
         """The change of the residual of `fit` by a change (m, n_y) of the outputs on the part to identify."""

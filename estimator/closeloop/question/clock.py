@@ -1,0 +1,111 @@
+"""Errors of the times of a record: an offset of the outputs' clock against the inputs', and jitter.
+
+A logger takes its samples by clocks of its own. The outputs may be early or late by up to a sample, which no
+file says, and an effect such as a delay or a mass then fits better than none. The offset is a nuisance
+parameter that is fitted beside the others where the record shows it. Jitter is white noise that grows with
+the rate of the output.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import convolve1d
+
+from estimator.noise import DIFFERENCE
+from estimator.plant import EVEN
+from estimator.record import Array, Note, Record, Run
+
+CLOCK = (
+    "clock_offset"  # its name among the unknowns, s; positive where the outputs are of later times than said
+)
+NODES = np.arange(-3, 4)  # samples of the polynomial from which a value between samples is read
+TURNS = 3  # of the weighted regression, after which its weights stand still
+NEIGHBOURS = 3.0  # squares of third differences that share half of their samples, for each independent one
+
+
+def read_later(y: Array, t: Array, outputs: int, offset: float) -> Array:
+    """Values y (N, n) at times t (N,), whose first columns, the outputs, are read later by an offset, s."""
+    if not offset or len(t) < 2:
+        return y
+    found = y.copy()
+    found[:, :outputs] = _at(y[:, :outputs], t, offset)
+    return found
+
+
+def _at(y: Array, t: Array, offset: float) -> Array:
+    """Values (N, n) at times that are later by an offset, s, of about a sample at most."""
+    steps = np.diff(t)
+    step = float(np.median(steps))
+    if np.all(np.abs(steps - step) < EVEN * step):
+        return np.asarray(convolve1d(y, _weights(offset / step)[::-1], axis=0, mode="nearest"))
+    return np.asarray(CubicSpline(t, y)(np.clip(t + offset, t[0], t[-1])))
+
+
+def _weights(at: float) -> Array:
+    """Weights (7,) of the samples NODES in the value of their polynomial at a place, in samples."""
+    others = [np.delete(NODES, k) for k in range(len(NODES))]
+    return np.array([np.prod((at - o) / (x - o)) for x, o in zip(NODES, others, strict=True)])
+
+
+def slopes(run: Run, residual: Array) -> Array:
+    """Rates of the simulated outputs (N, n_y), from the residual that the simulation leaves."""
+    return np.gradient(run.y - residual, run.t, axis=0)
+
+
+def jitter(record: Record, residuals: Sequence[Array], chance: float) -> float:
+    """Standard deviation of the times of a record, s; 0 if the residual (N, n_y) of its runs shows none.
+
+    Jitter adds to the third differences of a residual what grows with the square of the output's rate. It is
+    the same for all outputs: one that shows less than the others bounds it. Above half a sample, samples
+    would change their order. chance: standard deviations by which estimates may differ by chance.
+    """
+    known = np.flatnonzero(record.noise_declared)
+    parts = [_squares(run, r) for run, r in zip(record.runs, residuals, strict=True) if run.fit.any()]
+    if not len(known) or not parts:
+        return 0.0
+    rough, rates = (
+        np.concatenate(some)[:, known] / record.noise_std[known] ** 2 for some in zip(*parts, strict=True)
+    )
+    whole, error = _regressed(rough.ravel(), rates.ravel())
+    if not whole > chance * error:
+        return 0.0
+    alone = [_regressed(rough[:, j], rates[:, j]) for j in range(len(known))]
+    most = min(run.sample for run in record.runs) / 2
+    least = min([whole, most**2, *(value + chance * wide for value, wide in alone)])
+    return float(np.sqrt(max(least, 0.0)))
+
+
+def _squares(run: Run, residual: Array) -> tuple[Array, Array]:
+    """Squares of the third differences on the part to identify, as of white noise, and those of the rates."""
+    inside = np.convolve(run.fit, np.ones(len(DIFFERENCE)), "valid") == len(DIFFERENCE)
+    size = float(DIFFERENCE @ DIFFERENCE)
+    rough = np.column_stack([np.convolve(r, DIFFERENCE, "valid") ** 2 for r in residual.T])
+    rates = np.column_stack([np.convolve(v, DIFFERENCE**2, "valid") for v in slopes(run, residual).T ** 2])
+    return rough[inside] / size, rates[inside] / size
+
+
+def _regressed(rough: Array, rates: Array) -> tuple[float, float]:
+    """Variance of the times and its standard error, where `rough` is 1 + variance * rates in the mean."""
+    variance, error = 0.0, np.inf
+    for _ in range(TURNS):
+        weight = rates / (1 + variance * rates) ** 2
+        along = float(weight @ rates)
+        if along <= 0:
+            return 0.0, np.inf
+        variance = max(float(weight @ (rough - 1)) / along, 0.0)
+        error = float(np.sqrt(2 * NEIGHBOURS / along))
+    return variance, error
+
+
+def clock_notes(offset: float, error: float, scatter: float) -> list[Note]:
+    """What the record shows of its times: offset of the clock with its standard error, and jitter, s."""
+    found = []
+    if offset:
+        side = "later" if offset > 0 else "earlier"
+        found.append(
+            f"the outputs are of times that are {abs(offset):.3g} ± {error:.1g} s {side} than those of the inputs"
+        )
+    if scatter:
+        found.append(f"the times of the samples scatter by {scatter:.2g} s")
+    return [Note("clock", "", sentence) for sentence in found]
