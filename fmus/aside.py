@@ -82,9 +82,10 @@ class _Shelf:
 
     def let_go(self) -> None:
         """Release the memory of the mapped files, which is read again if used again, and of freed arrays."""
-        for file in list(self._files):
+        files = list(self._files)
+        for file in files:
             file.madvise(mmap.MADV_DONTNEED)
-        if trim := _trim():
+        if files and (trim := _trim()):
             trim(0)
 
     def _room(self, size: int) -> tuple[_File, int]:

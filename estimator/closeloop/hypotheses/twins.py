@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from hashlib import blake2b
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Unknown
 from estimator.record import Array
+from fmus.aside import let_go
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,9 @@ class Twins:
         kinds: dict[str, str] = {}
         for c, g in change:
             if not c.is_fault:
-                changes.setdefault(c.label, []).append(g.tobytes())
+                changes.setdefault(c.label, []).append(blake2b(g.tobytes()).digest())
                 kinds[c.label] = c.kind
+                let_go()
         alike: dict[int, list[str]] = {}
         for label, parts in changes.items():
             alike.setdefault(hash((kinds[label], *parts)), []).append(label)

@@ -31,27 +31,23 @@ def clock_of(
         return 0.0
     step = float(min(run.sample for run in record.runs))
     column = screening.by_outputs(lambda y, run: read_later(y, run.t, len(record.outputs), step))
+    sets = [((c,), g) for c, g in change]
+    best = next(iter(screen(_widened(fit, column, step), sets)), None)
+    share = np.clip((best.start[CLOCK] if best else 0.0) / step, -1.0, 1.0)
+    moved = replace(fit, residual=fit.residual + share * column)
     calibrated = Calibration.of(fit)
-    left, along = calibrated.without(fit.residual), calibrated.without(column)
-    alone = max((p.gain for p in promises), default=0.0)
-    beside = screen(_widened(fit, column, step), [((c,), g) for c, g in change])
-    together = _gain(left, along) + max((p.gain for p in beside), default=0.0)
-    dispersion = max(1.0, (float(left @ left) - together) / len(left))
-    return step if together - alone > chance**2 * dispersion else 0.0
-
-
-def _gain(left: Array, along: Array) -> float:
-    """Reduction of the sum of squares of a residual (m,) by an offset of a sample (m,), or a part of it."""
-    size, product = float(along @ along), float(left @ along)
-    share = float(np.clip(-product / size, -1.0, 1.0)) if size else 0.0
-    return -2 * share * product - share**2 * size
+    before, after = (float(np.sum(calibrated.without(f.residual) ** 2)) for f in (fit, moved))
+    alone, beside = (max((p.gain for p in some), default=0.0) for some in (promises, screen(moved, sets)))
+    gained, left = before - after + beside - alone, after - beside
+    dispersion = max(1.0, left / len(fit.residual))
+    return step if gained > chance**2 * dispersion else 0.0
 
 
 def _widened(fit: Fit, column: Array, step: float) -> Fit:
     """The fit with the clock's offset, (m,) for a sample, as a further unknown."""
     return replace(
         fit,
-        unknowns=(*fit.unknowns, Unknown(CLOCK, 0.0, -step, step, step / 10)),
+        unknowns=(*fit.unknowns, Unknown(CLOCK, 0.0, -step, step, step)),
         values=np.append(fit.values, 0.0),
         covariance=block_diag(fit.covariance, np.zeros((1, 1))),
         slopes=(*fit.slopes, column / step),
