@@ -29,11 +29,11 @@ from estimator.closeloop.planning.advice import next_experiment
 from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.moments import identified_at
 from estimator.closeloop.question.problem import Problem
-from estimator.closeloop.screening.clock_offset import clock_of
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
+from estimator.closeloop.search.clock_offset import clock_beside, clock_of
 from estimator.closeloop.search.free_form import free_form
 from estimator.closeloop.search.pairs import with_worth
-from estimator.closeloop.search.rivals import as_carefully
+from estimator.closeloop.search.rivals import with_rivals
 from estimator.closeloop.search.screened import Screened, screened
 from estimator.closeloop.search.search import Search
 from estimator.noise import Noise
@@ -78,10 +78,8 @@ class Chain:
         tell("missing force", "estimating the missing force at each port")
         forces = done("forces", lambda: missing_forces(problem, base.fit.theta, noise.std))
         shown = screened(baseline, forces, tell, self.stages)
-        if most := clock_of(baseline, shown.screening, shown.fit, shown.promises, shown.change):
-            tell("clock", "beginning anew with an offset of the outputs' clock as a further unknown")
-            clocked = replace(self.problem, clock=most)
-            return replace(self, problem=clocked, stages=self.stages.under("clock")).run()
+        if most := clock_of(shown):
+            return self._clocked(most).run()
         detection = self._detected(shown)
         diagnostics = self._diagnosed(shown, detection)
         before, early = without_fits(baseline, detection)
@@ -92,8 +90,22 @@ class Chain:
         if early:
             return self._over_forms(found)
         singles, pairs = self._search(shown).run()
-        again = self._moved(shown.problem, [*singles[:1], *pairs[:1]])
+        leading = [*singles[:1], *pairs[:1]]
+        again = self._late(shown, leading) or self._moved(shown.problem, leading)
         return again.run() if again else self._over_forms(self._answer(found, shown, before, singles, pairs))
+
+    def _late(self, shown: Screened, leading: Sequence[Hypothesis]) -> "Chain | None":
+        """The same with an offset of the outputs' clock, if the best fit shows one and explains nothing."""
+        if not leading or shown.explained(leading):
+            return None
+        fitter, best = self.fitter(shown.baseline, self.jobs), min(leading, key=cost)
+        most = self.stages.done("late", lambda: clock_beside(fitter, best))
+        return self._clocked(most) if most else None
+
+    def _clocked(self, most: float) -> "Chain":
+        """The same with an offset of the outputs' clock as a further unknown; most: its bound, s."""
+        self.tell("clock", "beginning anew with an offset of the outputs' clock as a further unknown")
+        return replace(self, problem=replace(self.problem, clock=most), stages=self.stages.under("clock"))
 
     def _moved(self, problem: Problem, leading: Sequence[Hypothesis]) -> "Chain | None":
         """The same with the moment at which a leading effect sets in identified; None if it is already."""
@@ -241,7 +253,7 @@ class Chain:
             if any(new.theta != old.theta for new, old in zip(found, again, strict=True)):
                 self.tell("rivals", "fitting the rivals of the answer as carefully as the answer")
                 others = [[h for h in some if h.key not in asked] for some in (singles, pairs)]
-                found = self.stages.done(f"careful {turn}", partial(_with_rivals, fitter, found, others))
+                found = self.stages.done(f"careful {turn}", partial(with_rivals, fitter, found, others))
             final = {h.key: h for h in found}
             singles, pairs = (form.ranked([final.get(h.key, h) for h in some]) for some in (singles, pairs))
         return (
@@ -274,14 +286,6 @@ def _in_fine_steps(
     if finer.steps == before.problem.steps:
         return shown, list(new)
     return replace(shown, baseline=before.asked(finer)), list(members)
-
-
-def _with_rivals(
-    fitter: Fitter, members: Sequence[Hypothesis], others: Sequence[Sequence[Hypothesis]]
-) -> list[Hypothesis]:
-    """The members of an answer, and their nearest rivals of each list (best first) fitted as carefully."""
-    best = min(members, key=cost)
-    return [*members, *(h for some in others for h in as_carefully(fitter, best, some))]
 
 
 def _profiled(

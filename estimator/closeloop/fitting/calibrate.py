@@ -71,7 +71,7 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
 def _clock(problem: Problem) -> list[Unknown]:
     """The offset of the outputs' clock, if there may be one."""
     most = problem.clock
-    return [Unknown(CLOCK, 0.0, -most, most, most / 10)] if most else []
+    return [Unknown(CLOCK, 0.0, -most, most, most)] if most else []
 
 
 def _start_unknowns(problem: Problem) -> list[Unknown]:

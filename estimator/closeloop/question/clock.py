@@ -104,8 +104,9 @@ def clock_notes(offset: float, error: float, scatter: float) -> list[Note]:
     if offset:
         side = "later" if offset > 0 else "earlier"
         found.append(
-            f"the outputs are of times that are {abs(offset):.3g} ± {error:.1g} s {side} than those of the inputs"
+            f"the outputs are of times that are {abs(offset):.3g} ± {error:.1g} s {side} than those of the "
+            "inputs; this offset was fitted with the parameters"
         )
     if scatter:
-        found.append(f"the times of the samples scatter by {scatter:.2g} s")
+        found.append(f"the times of the samples scatter by {scatter:.2g} s, which adds to the noise")
     return [Note("clock", "", sentence) for sentence in found]

@@ -36,6 +36,14 @@ def as_carefully(fitter: Fitter, answer: Hypothesis, rivals: Sequence[Hypothesis
     return list(Parallel(fitter.jobs)(tasks))
 
 
+def with_rivals(
+    fitter: Fitter, members: Sequence[Hypothesis], others: Sequence[Sequence[Hypothesis]]
+) -> list[Hypothesis]:
+    """The members of an answer, and their nearest rivals of each list (best first) fitted as carefully."""
+    best = min(members, key=cost)
+    return [*members, *(h for some in others for h in as_carefully(fitter, best, some))]
+
+
 def _as_carefully(fitter: Fitter, h: Hypothesis, shared: Mapping[str, float]) -> Hypothesis:
     own = carefully(fitter, h)
     there = Promise(own.candidates, 0.0, {**own.theta, **shared})
