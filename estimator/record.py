@@ -15,7 +15,7 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 class Note:
     """A peculiarity of the data that does not prevent their use but is reported."""
 
-    kind: Literal["jitter", "gap", "constant", "clipped", "unit", "input noise", "clock", "parts", "file"]
+    kind: Literal["jitter", "gap", "constant", "clipped", "unit", "input noise", "parts", "file"]
     column: str  # the data column, empty if the note concerns the time
     sentence: str
 

@@ -19,10 +19,11 @@ from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_inp
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
+from estimator.closeloop.fitting.refined import arrived
 from estimator.closeloop.fitting.resolution import in_fine_steps, in_joined_steps, joined_steps_hold
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import distinct
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.planning.advice import next_experiment
@@ -95,11 +96,14 @@ class Chain:
         return again.run() if again else self._over_forms(self._answer(found, shown, before, singles, pairs))
 
     def _late(self, shown: Screened, leading: Sequence[Hypothesis]) -> "Chain | None":
-        """The same with an offset of the outputs' clock, if the best fit shows one and explains nothing."""
-        if not leading or shown.explained(leading):
+        """The same with an offset of the outputs' clock, if the best single effect lacks one.
+
+        It leaves more than noise then. A second effect may explain the same, but an offset needs no effect.
+        """
+        fitter = self.fitter(shown.baseline, self.jobs)
+        if not leading or arrived(fitter, leading[0]):
             return None
-        fitter, best = self.fitter(shown.baseline, self.jobs), min(leading, key=cost)
-        most = self.stages.done("late", lambda: clock_beside(fitter, best))
+        most = self.stages.done("late", lambda: clock_beside(fitter, leading[0]))
         return self._clocked(most) if most else None
 
     def _clocked(self, most: float) -> "Chain":

@@ -24,6 +24,7 @@ from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.export.builders.hypotheses import ForeignBuilder
 from fmus.host.archive import describe
+from scenarios.closing.notes import notes_of
 from scenarios.output import written
 from scenarios.shown import Shown, axes_or_new
 
@@ -155,11 +156,7 @@ def result_of(
             "material": found.detection.material,
             "figures": dict(found.detection.figures),
         },
-        notes=[
-            *(n.sentence for n in problem.record.notes),
-            *_steps(problem),
-            *left_by_the_answer(problem, found, rms),
-        ],
+        notes=notes_of(problem, found, rms),
         augmented_fmu=augmented[0].name if augmented else "",
         augmented_files=[file.name for file in augmented],
         power=[_line(v) for v in diagnostics.power] if diagnostics else [],
@@ -169,31 +166,6 @@ def result_of(
         start_values=start_values(problem, found),
         probability={label: round(p, 4) for label, p in found.probability.items()},
     )
-
-
-def _steps(problem: Problem) -> list[str]:
-    """A note if the steps of the simulation had to be divided."""
-    if problem.steps == problem.searched:
-        return []
-    return [
-        f"the usual steps of the simulation were divided by {problem.steps.parts} for the answer, because "
-        "their integration error would have changed the fitted values; the error after holds for the divided "
-        "steps"
-    ]
-
-
-def left_by_the_answer(problem: Problem, found: Outcome, rms: Mapping[str, Array]) -> list[str]:
-    """A note on the outputs for which an answer leaves more than noise on the test part."""
-    if not found.chosen:
-        return []
-    before, after, limit = rms["before"], rms["after"], problem.policy.decision.clean * found.noise
-    return [
-        f"{output}: the answer explains {1 - (after[j] / before[j]) ** 2:.0%} of the residual's variance on "
-        f"the test part; what is left there is {after[j] / found.noise[j]:.1f} times the noise, and the "
-        "library does not explain it"
-        for j, output in enumerate(problem.record.outputs)
-        if limit[j] < after[j] < before[j]
-    ]
 
 
 def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:

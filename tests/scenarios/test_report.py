@@ -15,8 +15,9 @@ from estimator.closeloop.policy import DEFAULT
 from estimator.plant import PLANTS
 from scenarios import close_loop
 from scenarios.closing.closing import builder_for, experiment_of, pose
+from scenarios.closing.notes import left_by_the_answer
 from scenarios.closing.page import sections
-from scenarios.closing.result import Result, left_by_the_answer, start_values
+from scenarios.closing.result import Result, start_values
 from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 from tests.truth.rig import write_null_record
 

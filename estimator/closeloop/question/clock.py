@@ -14,7 +14,7 @@ from scipy.ndimage import convolve1d
 
 from estimator.noise import DIFFERENCE
 from estimator.plant import EVEN
-from estimator.record import Array, Note, Record, Run
+from estimator.record import Array, Record, Run
 
 CLOCK = (
     "clock_offset"  # its name among the unknowns, s; positive where the outputs are of later times than said
@@ -98,8 +98,8 @@ def _regressed(rough: Array, rates: Array) -> tuple[float, float]:
     return variance, error
 
 
-def clock_notes(offset: float, error: float, scatter: float) -> list[Note]:
-    """What the record shows of its times: offset of the clock with its standard error, and jitter, s."""
+def times_said(offset: float, error: float, scatter: float) -> list[str]:
+    """Sentences on an offset of the clock with its standard error, and on jitter, s, if there is any."""
     found = []
     if offset:
         side = "later" if offset > 0 else "earlier"
@@ -109,4 +109,4 @@ def clock_notes(offset: float, error: float, scatter: float) -> list[Note]:
         )
     if scatter:
         found.append(f"the times of the samples scatter by {scatter:.2g} s, which adds to the noise")
-    return [Note("clock", "", sentence) for sentence in found]
+    return found

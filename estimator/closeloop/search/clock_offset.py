@@ -1,48 +1,40 @@
-"""Whether the outputs of a record are of other times than said, whatever effect there may be beside that.
+"""Whether the outputs of a record are of other times than said, by a sample at most: more is a delay.
 
-An offset of the outputs' clock is shown if it explains more than chance would, and more than it leaves, of
-what the best effect leaves beyond noise. If it explained the smaller part, the larger one would have another
-cause, which may explain the rest as well. Before the search, effects and offset are compared by linear
-regression; after a search that explained nothing, by a fit of the best effect with the offset. The offset is
-a sample at most: more is a delay.
+Before the search, an offset of the outputs' clock is shown if it explains more than chance would, and as much
+as the best effect does: what an offset explains needs no effect. After it, an offset is shown if a fit of the
+best single effect with one explains more than chance would, and more than it leaves, of what that effect
+alone leaves beyond noise. If it explained the smaller part, the larger one would have another cause, which
+may explain the rest as well.
 """
 
-from dataclasses import replace
-
 import numpy as np
-from scipy.linalg import block_diag
 
 from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.question.clock import CLOCK, read_later
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.regressors import Calibration
-from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.search.screened import Screened
 from estimator.noise import larger
-from estimator.record import Array
 
 
 def clock_of(shown: Screened) -> float:
     """Bound of the offset of the outputs' clock, s, if the screening shows one; 0 if it does not."""
-    problem, fit, screening = shown.problem, shown.fit, shown.screening
-    if not _open(shown.baseline):
+    baseline, problem, fit = shown.baseline, shown.problem, shown.fit
+    if not _open(baseline):
         return 0.0
     outputs, step = len(problem.record.outputs), _sample(problem)
-    column = screening.by_outputs(lambda y, run: read_later(y, run.t, outputs, step))
-    sets = [((c,), g) for c, g in shown.change]
-    best = next(iter(screen(_widened(fit, column, step), sets)), None)
-    share = float(np.clip((best.start[CLOCK] if best else 0.0) / step, -1.0, 1.0))
-    moved = replace(fit, residual=fit.residual + share * column)
     calibrated = Calibration.of(fit)
-    before, after = (float(np.sum(calibrated.without(f.residual) ** 2)) for f in (fit, moved))
-    alone, beside = (
-        max((p.gain for p in some), default=0.0) for some in (shown.promises, screen(moved, sets))
-    )
-    without, together = before - alone, after - beside
-    return step if _shown(shown.baseline, without, together, len(fit.residual)) else 0.0
+    residual = calibrated.without(fit.residual)
+    change = shown.screening.by_outputs(lambda y, run: read_later(y, run.t, outputs, step))
+    along, samples = calibrated.without(change), len(residual)
+    size = float(along @ along)
+    share = float(np.clip(-(residual @ along) / size, -1.0, 1.0)) if size else 0.0
+    before, offset = (float(np.sum(x**2)) for x in (residual, residual + share * along))
+    effect = before - max((p.gain for p in shown.promises), default=0.0)
+    alone = _clear(baseline, before, offset, samples) and not _clear(baseline, offset, effect, samples)
+    return step if alone else 0.0
 
 
 def clock_beside(fitter: Fitter, best: Hypothesis) -> float:
@@ -51,8 +43,11 @@ def clock_beside(fitter: Fitter, best: Hypothesis) -> float:
     if not _open(baseline):
         return 0.0
     step = _sample(baseline.problem)
-    [found] = fitter.alone.finished(from_there([best]), [*best.others, _offset(step)])[:1] or [best]
-    return step if _shown(baseline, cost(best), cost(found), len(best.fit.residual)) else 0.0
+    asked = [*best.others, Unknown(CLOCK, 0.0, -step, step, step)]
+    [found] = fitter.alone.finished(from_there([best]), asked)[:1] or [best]
+    samples, left = len(best.fit.residual), cost(found)
+    beyond = left - samples - baseline.policy.detection.chance * float(np.sqrt(2 * samples))
+    return step if _clear(baseline, cost(best), left, samples) and cost(best) - left > beyond else 0.0
 
 
 def _open(baseline: Baseline) -> bool:
@@ -63,28 +58,10 @@ def _open(baseline: Baseline) -> bool:
     return larger(problem.record, baseline.hypothesis.residuals, chance)
 
 
-def _shown(baseline: Baseline, without: float, together: float, samples: int) -> bool:
-    """Whether sums of squares without and with an offset show it; see above."""
-    chance = baseline.policy.detection.chance
-    gained, beyond = without - together, together - samples
-    clear = gained > chance**2 * max(1.0, together / samples)
-    return clear and gained > beyond - chance * float(np.sqrt(2 * samples))
+def _clear(baseline: Baseline, before: float, after: float, samples: int) -> bool:
+    """Whether a sum of squares is smaller afterwards by more than chance would make it."""
+    return before - after > baseline.policy.detection.chance**2 * max(1.0, after / samples)
 
 
 def _sample(problem: Problem) -> float:
     return float(min(run.sample for run in problem.record.runs))
-
-
-def _offset(step: float) -> Unknown:
-    return Unknown(CLOCK, 0.0, -step, step, step)
-
-
-def _widened(fit: Fit, column: Array, step: float) -> Fit:
-    """The fit with the clock's offset as a further unknown; column: (m,), of an offset by a sample."""
-    return replace(
-        fit,
-        unknowns=(*fit.unknowns, _offset(step)),
-        values=np.append(fit.values, 0.0),
-        covariance=block_diag(fit.covariance, np.zeros((1, 1))),
-        slopes=(*fit.slopes, column / step),
-    )

@@ -1,0 +1,125 @@
+"""Errors of a record's times: an offset of the outputs' clock is fitted, jitter is noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
+
+from estimator.closeloop.pipeline import trace
+from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.question.clock import CLOCK, jitter, read_later, times_said
+from estimator.record import Record, Run
+from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.carriage import DT, NOISE, SAMPLES, T, coulomb, motion, problem, to_and_fro
+
+CHANCE = DEFAULT.detection.chance
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def still(t, q, v):
+    """No force beside those of the model."""
+    return 0.0
+
+
+def measured(resistance, offset, seed, scatter=0.0, noise=NOISE / 5):
+    """A carriage whose outputs are of times that are later by an offset and scatter, both in samples."""
+    rng, F = np.random.default_rng(seed), to_and_fro()
+    at = np.clip(T + DT * (offset + scatter * rng.standard_normal(SAMPLES)), 0.0, T[-1])
+    y = CubicSpline(T, motion(F, resistance, 0.0))(at) + noise * rng.standard_normal((SAMPLES, 2))
+    unseen = T >= 10
+    run = Run(T, F[:, None], y, (T < 10) & ~((T >= 4) & (T < 6)), (T >= 4) & (T < 6), unseen)
+    return Record((run,), ("F",), ("q", "q_dot"), noise)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(0.001, 0.125), st.floats(0.0, 6.28), st.booleans())
+def test_a_wave_is_read_as_it_is_at_later_times(offset, frequency, phase, even):
+    t = np.arange(400.0) if even else np.delete(np.arange(401.0), 200)
+    y = np.column_stack([np.sin(2 * np.pi * frequency * t + phase), t])
+    found = read_later(y, t, 1, offset)
+    inner = slice(8, 190)
+    assert_allclose(found[inner, 0], np.sin(2 * np.pi * frequency * (t + offset) + phase)[inner], atol=2e-3)
+    assert np.array_equal(found[:, 1], t)  # what is no output stays
+
+
+def test_without_an_offset_nothing_is_touched():
+    y = np.random.default_rng(0).standard_normal((50, 3))
+    assert read_later(y, np.arange(50.0), 2, 0.0) is y
+
+
+@given(SEEDS, st.floats(0.2, 0.45))
+def test_jitter_is_found_with_its_size(seed, scatter):
+    rng, t = np.random.default_rng(seed), np.arange(8000) * DT
+    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
+    late = DT * scatter * rng.standard_normal((len(t), 1))
+    std = np.array([0.01, 0.05])
+    record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
+    assert_allclose(jitter(record, [residual], CHANCE), DT * scatter, rtol=0.25)
+
+
+@given(SEEDS)
+def test_noise_alone_has_no_jitter(seed):
+    rng, t, std = np.random.default_rng(seed), np.arange(8000) * DT, np.array([0.01, 0.05])
+    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
+    record, residual = of_rates(t, rate, std * rng.standard_normal((len(t), 2)), std)
+    assert jitter(record, [residual], CHANCE) < 0.1 * DT
+
+
+def test_an_output_that_shows_no_jitter_bounds_it():
+    rng, t, std = np.random.default_rng(1), np.arange(8000) * DT, np.array([0.01, 0.05])
+    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
+    late = 0.4 * DT * rng.standard_normal((len(t), 1)) * [1.0, 0.0]
+    record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
+    assert jitter(record, [residual], CHANCE) < 0.15 * DT
+
+
+def of_rates(t, rate, residual, std):
+    """A record whose simulated outputs have these rates, and its residual."""
+    y = np.cumsum(rate, axis=0) * (t[1] - t[0]) + residual
+    every = np.ones(len(t), bool)
+    return Record((Run(t, t[:, None], y, every, ~every, ~every),), ("u",), ("a", "b"), std), residual
+
+
+@pytest.fixture(scope="module")
+def builder(tmp_path_factory):
+    return ModelBuilder("drive", tmp_path_factory.mktemp("carriage"))
+
+
+@pytest.mark.parametrize(("offset", "scatter"), [(0.7, 0.05), (-0.4, 0.3)])
+def test_a_late_clock_is_no_effect(builder, offset, scatter):
+    found = trace(problem(builder, measured(still, offset, 3, scatter)), jobs=1)
+    assert found.judgement.verdict == "no_discrepancy"
+    fit = found.base.fit
+    assert abs(fit.theta[CLOCK] - offset * DT) < 4 * fit.std[CLOCK]
+
+
+@pytest.mark.parametrize(("offset", "scatter"), [(0.7, 0.0), (-0.5, 0.1)])
+def test_an_effect_is_found_beside_a_late_clock(builder, offset, scatter):
+    found = trace(problem(builder, measured(coulomb(20.0), offset, 4, scatter)), jobs=1)
+    assert "coulomb_friction@carriage" in [m.label for m in found.judgement.members]
+    assert abs(found.chosen.theta[CLOCK] - offset * DT) < 4 * found.chosen.fit.std[CLOCK]
+
+
+def test_a_right_clock_is_not_fitted(builder):
+    found = trace(problem(builder, measured(coulomb(20.0), 0.0, 5)), jobs=1)
+    assert "coulomb_friction@carriage" in [m.label for m in found.judgement.members]
+    assert CLOCK not in found.base.fit.theta
+
+
+def test_a_clock_is_held_where_a_part_is_simulated_with_the_values_before(builder):
+    asked = problem(builder, measured(still, 0.7, 6))
+    held = replace(asked, declared={**asked.declared, CLOCK: 0.7 * DT})
+    [plain], [later] = asked.simulate({}), held.simulate({})
+    assert_allclose(later, read_later(plain, T, 2, 0.7 * DT))
+
+
+def test_what_is_said_of_the_times():
+    assert times_said(0.0, 0.0, 0.0) == []
+    assert times_said(-2e-3, 1e-5, 1e-4) == [
+        "the outputs are of times that are 0.002 ± 1e-05 s earlier than those of the inputs; this offset was "
+        "fitted with the parameters",
+        "the times of the samples scatter by 0.0001 s, which adds to the noise",
+    ]
