@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from estimator.closeloop.pipeline import trace
 from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.question import clock
 from estimator.closeloop.question.clock import CLOCK, jitter, read_later, times_said
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -58,6 +59,16 @@ def test_jitter_is_found_with_its_size(seed, scatter):
     std = np.array([0.01, 0.05])
     record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
     assert_allclose(jitter(record, [residual], CHANCE), DT * scatter, rtol=0.25)
+
+
+def test_a_long_record_is_estimated_from_some_of_its_samples(monkeypatch):
+    rng, t, std = np.random.default_rng(2), np.arange(40000) * DT, np.array([0.01, 0.05])
+    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
+    late = 0.4 * DT * rng.standard_normal((len(t), 1))
+    record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
+    monkeypatch.setattr(clock, "JITTER_SAMPLES", 9000)
+    assert_allclose(jitter(record, [residual], CHANCE), 0.4 * DT, rtol=0.15)
+    assert 8000 <= len(clock.rates(record.runs[0], residual)) <= 9000
 
 
 @given(SEEDS)

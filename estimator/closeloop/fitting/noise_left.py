@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 
-from estimator.closeloop.question.clock import jitter, slopes
+from estimator.closeloop.question.clock import jitter, rates
 from estimator.closeloop.question.problem import Problem
 from estimator.noise import Left, Noise, larger
 from estimator.record import Array
@@ -32,9 +33,15 @@ def caused(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Arr
     if not scatter:
         return found
     pairs = zip(problem.record.runs, residuals, strict=True)
-    rates = [slopes(run, r) for run, r in pairs if run.fit.any()]
-    late = [v * scatter * rng.standard_normal((len(v), 1)) for v in rates * (len(found) // len(rates) or 1)]
-    return [a + b for a, b in zip(found, late, strict=True)] if found else late
+    moved = [rates(run, r) for run, r in pairs if run.fit.any()]
+
+    def late(rate: Array, samples: int) -> Array:
+        held = np.repeat(rate, -(-samples // len(rate)), axis=0)[:samples]
+        return held * scatter * rng.standard_normal((samples, 1))
+
+    if not found:
+        return [late(rate, len(rate)) for rate in moved]
+    return [y + late(rate, len(y)) for y, rate in zip(found, cycle(moved), strict=False)]
 
 
 def _by_inputs(problem: Problem, theta: Mapping[str, float], rng: np.random.Generator) -> list[Array]:

@@ -6,7 +6,7 @@ parameter that is fitted beside the others where the record shows it. Jitter is 
 the rate of the output.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,6 +21,7 @@ CLOCK = (
 )
 NODES = np.arange(-3, 4)  # samples of the polynomial from which a value between samples is read
 TURNS = 3  # of the weighted regression, after which its weights stand still
+JITTER_SAMPLES = 1 << 17  # samples from which jitter is estimated; its size scatters by a hundredth then
 NEIGHBOURS = 3.0  # squares of third differences that share half of their samples, for each independent one
 
 
@@ -48,9 +49,16 @@ def _weights(at: float) -> Array:
     return np.array([np.prod((at - o) / (x - o)) for x, o in zip(NODES, others, strict=True)])
 
 
-def slopes(run: Run, residual: Array) -> Array:
-    """Rates of the simulated outputs (N, n_y), from the residual that the simulation leaves."""
-    return np.gradient(run.y - residual, run.t, axis=0)
+def rates(run: Run, residual: Array) -> Array:
+    """Rates of the simulated outputs (n, n_y) at JITTER_SAMPLES samples, from the residual (N, n_y)."""
+    some = slice(None, None, -(-len(run.t) // JITTER_SAMPLES))
+    return np.column_stack([rate[some] for rate in _rates(run, residual)])
+
+
+def _rates(run: Run, residual: Array) -> Iterator[Array]:
+    """The rate of each simulated output, (N,)."""
+    for y, r in zip(run.y.T, residual.T, strict=True):
+        yield np.gradient(y - r, run.t)
 
 
 def jitter(record: Record, residuals: Sequence[Array], chance: float) -> float:
@@ -64,13 +72,13 @@ def jitter(record: Record, residuals: Sequence[Array], chance: float) -> float:
     parts = [_squares(run, r) for run, r in zip(record.runs, residuals, strict=True) if run.fit.any()]
     if not len(known) or not parts:
         return 0.0
-    rough, rates = (
+    rough, moved = (
         np.concatenate(some)[:, known] / record.noise_std[known] ** 2 for some in zip(*parts, strict=True)
     )
-    whole, error = _regressed(rough.ravel(), rates.ravel())
+    whole, error = _regressed(rough.ravel(), moved.ravel())
     if not whole > chance * error:
         return 0.0
-    alone = [_regressed(rough[:, j], rates[:, j]) for j in range(len(known))]
+    alone = [_regressed(rough[:, j], moved[:, j]) for j in range(len(known))]
     most = min(run.sample for run in record.runs) / 2
     least = min([whole, most**2, *(value + chance * wide for value, wide in alone)])
     return float(np.sqrt(max(least, 0.0)))
@@ -78,11 +86,12 @@ def jitter(record: Record, residuals: Sequence[Array], chance: float) -> float:
 
 def _squares(run: Run, residual: Array) -> tuple[Array, Array]:
     """Squares of the third differences on the part to identify, as of white noise, and those of the rates."""
-    inside = np.convolve(run.fit, np.ones(len(DIFFERENCE)), "valid") == len(DIFFERENCE)
+    inside = np.flatnonzero(np.convolve(run.fit, np.ones(len(DIFFERENCE)), "valid") == len(DIFFERENCE))
+    some = inside[:: -(-len(inside) // JITTER_SAMPLES) or 1]
+    rough = [np.convolve(r, DIFFERENCE, "valid")[some] ** 2 for r in residual.T]
+    moved = [np.convolve(v**2, DIFFERENCE**2, "valid")[some] for v in _rates(run, residual)]
     size = float(DIFFERENCE @ DIFFERENCE)
-    rough = np.column_stack([np.convolve(r, DIFFERENCE, "valid") ** 2 for r in residual.T])
-    rates = np.column_stack([np.convolve(v, DIFFERENCE**2, "valid") for v in slopes(run, residual).T ** 2])
-    return rough[inside] / size, rates[inside] / size
+    return np.column_stack(rough) / size, np.column_stack(moved) / size
 
 
 def _regressed(rough: Array, rates: Array) -> tuple[float, float]:
