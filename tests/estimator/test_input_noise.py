@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from estimator.closeloop.fitting.calibrate import nearer, without_input_noise
-from estimator.closeloop.fitting.noise_left import noise_left
+from estimator.closeloop.fitting.noise_left import caused, noise_left
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_part
 from estimator.noise import Noise
@@ -191,3 +191,13 @@ def test_the_noise_that_stays_in_the_inputs_is_found_at_the_outputs(seed):
     blocks = weighed.reshape(60, -1).mean(axis=1) * np.sqrt(N / 60)
     assert np.mean(blocks**2) < 6.0  # as it is, they would have some hundred times their size
     assert np.mean((left[0] / noise.std).reshape(60, -1).mean(axis=1) ** 2) * N / 60 > 30
+
+
+def test_noise_of_inputs_and_of_times_adds_up():
+    rng = np.random.default_rng(6)
+    plain = without_input_noise(measured(rng, 0.002), {})
+    [run] = plain.record.runs
+    late = 0.4 * 0.005 * rng.standard_normal((N, 1)) * np.gradient(slow(run.u), T, axis=0)
+    both = replace(plain, record=replace(plain.record, runs=(replace(run, y=run.y + late),)))
+    alone, together = (np.mean(np.square(caused(p, {}, residuals(p)))) for p in (plain, both))
+    assert_allclose(together - alone, np.mean(late**2), rtol=0.2)
