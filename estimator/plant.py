@@ -18,7 +18,7 @@ from fmus.host.fmu import Fmu
 PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of pieces
 TOGETHER = 1 << 28  # bytes of results that are simulated at once: those of eight rows of an hour do not fit
 REFINED = 1 << 25  # bytes of refined inputs that are kept; one set of them always is
-EVEN = 1e-6  # of a sample, by which the times of a run may be unevenly spaced if a step joins several of them
+EVEN = 1e-6  # of a sample, by which evenly spaced times may differ
 
 
 class Steps(NamedTuple):
@@ -38,6 +38,12 @@ class Steps(NamedTuple):
 
 
 USUAL, JOINED = Steps(), Steps(joined=True)
+
+
+def even(t: Array) -> bool:
+    """Whether times (N,) are two or more and evenly spaced."""
+    steps = np.diff(t)
+    return len(steps) > 0 and bool(np.ptp(steps) < EVEN * steps[0])
 
 
 class Plant:
@@ -172,8 +178,7 @@ class Plant:
 
     def joins(self, runs: Sequence[Run]) -> bool:
         """Whether a step may go over several samples of these runs."""
-        steps = (np.diff(run.t) for run in runs)
-        return self.fmu.joins and all(len(s) > 0 and np.ptp(s) < EVEN * s[0] for s in steps)
+        return self.fmu.joins and all(even(run.t) for run in runs)
 
     def _given(self, run: Run, steps: Steps) -> tuple[Array, dict[str, Array], int]:
         """Times and inputs of a run as set in the FMU, and the pieces of a step; refined ones are kept."""

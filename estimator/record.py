@@ -87,6 +87,11 @@ class Record:
     notes: tuple[Note, ...] = ()
     conversions: tuple[Conversion, ...] = ()
 
+    @property
+    def sample(self) -> float:
+        """Smallest of the usual times between two samples of its runs, s."""
+        return min(run.sample for run in self.runs)
+
     def of(self, values: Sequence[Array], part: str) -> Array:
         """Values of each run (N, k) on a part, named as a mask of Run, one run after the other, (m, k)."""
         runs = zip(values, self.runs, strict=True)

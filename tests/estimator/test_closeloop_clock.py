@@ -51,21 +51,24 @@ def test_without_an_offset_nothing_is_touched():
     assert read_later(y, np.arange(50.0), 2, 0.0) is y
 
 
+def seen_with(scatter, seed, samples=8000, shown=(1.0, 1.0)):
+    """A record of waves whose times scatter, in samples, and its residual; shown: share in each output."""
+    rng, t, std = np.random.default_rng(seed), np.arange(samples) * DT, np.array([0.01, 0.05])
+    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
+    late = DT * scatter * rng.standard_normal((samples, 1)) * shown
+    residual = late * rate + std * rng.standard_normal((samples, 2))
+    y, every = np.cumsum(rate, axis=0) * DT + residual, np.ones(samples, bool)
+    return Record((Run(t, t[:, None], y, every, ~every, ~every),), ("u",), ("a", "b"), std), residual
+
+
 @given(SEEDS, st.floats(0.2, 0.45))
 def test_jitter_is_found_with_its_size(seed, scatter):
-    rng, t = np.random.default_rng(seed), np.arange(8000) * DT
-    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
-    late = DT * scatter * rng.standard_normal((len(t), 1))
-    std = np.array([0.01, 0.05])
-    record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
+    record, residual = seen_with(scatter, seed)
     assert_allclose(jitter(record, [residual], CHANCE), DT * scatter, rtol=0.25)
 
 
 def test_a_long_record_is_estimated_from_some_of_its_samples(monkeypatch):
-    rng, t, std = np.random.default_rng(2), np.arange(40000) * DT, np.array([0.01, 0.05])
-    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
-    late = 0.4 * DT * rng.standard_normal((len(t), 1))
-    record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
+    record, residual = seen_with(0.4, 2, samples=40000)
     monkeypatch.setattr(clock, "JITTER_SAMPLES", 9000)
     assert_allclose(jitter(record, [residual], CHANCE), 0.4 * DT, rtol=0.15)
     assert 8000 <= len(clock.rates(record.runs[0], residual)) <= 9000
@@ -73,25 +76,13 @@ def test_a_long_record_is_estimated_from_some_of_its_samples(monkeypatch):
 
 @given(SEEDS)
 def test_noise_alone_has_no_jitter(seed):
-    rng, t, std = np.random.default_rng(seed), np.arange(8000) * DT, np.array([0.01, 0.05])
-    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
-    record, residual = of_rates(t, rate, std * rng.standard_normal((len(t), 2)), std)
+    record, residual = seen_with(0.0, seed)
     assert jitter(record, [residual], CHANCE) < 0.1 * DT
 
 
 def test_an_output_that_shows_no_jitter_bounds_it():
-    rng, t, std = np.random.default_rng(1), np.arange(8000) * DT, np.array([0.01, 0.05])
-    rate = 2 * np.pi * np.cos(2 * np.pi * t)[:, None] * [1.0, 3.0]
-    late = 0.4 * DT * rng.standard_normal((len(t), 1)) * [1.0, 0.0]
-    record, residual = of_rates(t, rate, late * rate + std * rng.standard_normal((len(t), 2)), std)
+    record, residual = seen_with(0.4, 1, shown=(1.0, 0.0))
     assert jitter(record, [residual], CHANCE) < 0.15 * DT
-
-
-def of_rates(t, rate, residual, std):
-    """A record whose simulated outputs have these rates, and its residual."""
-    y = np.cumsum(rate, axis=0) * (t[1] - t[0]) + residual
-    every = np.ones(len(t), bool)
-    return Record((Run(t, t[:, None], y, every, ~every, ~every),), ("u",), ("a", "b"), std), residual
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +121,7 @@ def test_a_clock_is_held_where_a_part_is_simulated_with_the_values_before(builde
 def test_what_is_said_of_the_times():
     assert times_said(0.0, 0.0, 0.0) == []
     assert times_said(-2e-3, 1e-5, 1e-4) == [
-        "the outputs are of times that are 0.002 ± 1e-05 s earlier than those of the inputs; this offset was "
-        "fitted with the parameters",
+        "the outputs were sampled 0.002 ± 1e-05 s earlier than their times say, if those of the inputs are "
+        "right; this offset was fitted with the parameters",
         "the times of the samples scatter by 0.0001 s, which adds to the noise",
     ]

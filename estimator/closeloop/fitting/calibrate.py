@@ -8,9 +8,8 @@ import numpy as np
 from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.question.clock import CLOCK
 from estimator.closeloop.question.input_noise import InputNoise
-from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.question.problem import Problem, Unknown, clock_within
 from estimator.noise import Noise, noise_floor, scales
 from estimator.weighting import Weighting
 
@@ -54,7 +53,8 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
         Unknown(n, problem.declared[n], low, high, (high - low) / 10)
         for n, (low, high) in problem.calibrate.items()
     ]
-    unknowns = [*parameters, *_clock(problem), *states]
+    clock = [clock_within(problem.clock)] if problem.clock else []
+    unknowns = [*parameters, *clock, *states]
     base, noise = declared, noise_left(problem, start.theta, declared.residuals, left="effect")
     for _ in range(1 if noise.known else 2):
         found = fit(problem, unknowns, noise.weighting, base.fit.theta, gain=ROUGH)
@@ -66,12 +66,6 @@ def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:
         found = fit(problem, unknowns, noise.weighting, base.fit.theta)
         base = Hypothesis((), found, tuple(problem.residuals(found.theta)))
     return declared, base, noise
-
-
-def _clock(problem: Problem) -> list[Unknown]:
-    """The offset of the outputs' clock, if there may be one."""
-    most = problem.clock
-    return [Unknown(CLOCK, 0.0, -most, most, most)] if most else []
 
 
 def _start_unknowns(problem: Problem) -> list[Unknown]:

@@ -35,9 +35,9 @@ class Twins:
                 changes.setdefault(c.label, []).append(blake2b(g.tobytes()).digest())
                 kinds[c.label] = c.kind
                 let_go()
-        alike: dict[int, list[str]] = {}
+        alike: dict[tuple[str, tuple[bytes, ...]], list[str]] = {}
         for label, parts in changes.items():
-            alike.setdefault(hash((kinds[label], *parts)), []).append(label)
+            alike.setdefault((kinds[label], tuple(parts)), []).append(label)
         return cls({first: tuple(others) for first, *others in alike.values() if others})
 
     @property

@@ -13,16 +13,16 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import convolve1d
 
 from estimator.noise import DIFFERENCE
-from estimator.plant import EVEN
+from estimator.plant import even
 from estimator.record import Array, Record, Run
 
-CLOCK = (
-    "clock_offset"  # its name among the unknowns, s; positive where the outputs are of later times than said
-)
+CLOCK = "clock_offset"  # its name among the unknowns, s; positive where outputs are of later times than said
 NODES = np.arange(-3, 4)  # samples of the polynomial from which a value between samples is read
 TURNS = 3  # of the weighted regression, after which its weights stand still
 JITTER_SAMPLES = 1 << 17  # samples from which jitter is estimated; its size scatters by a hundredth then
-NEIGHBOURS = 3.0  # squares of third differences that share half of their samples, for each independent one
+# squares of third differences for each independent one: 2.31 by their autocorrelation where the rate is the
+# same everywhere, rounded up for one that varies
+NEIGHBOURS = 3.0
 
 
 def read_later(y: Array, t: Array, outputs: int, offset: float) -> Array:
@@ -36,10 +36,9 @@ def read_later(y: Array, t: Array, outputs: int, offset: float) -> Array:
 
 def _at(y: Array, t: Array, offset: float) -> Array:
     """Values (N, n) at times that are later by an offset, s, of about a sample at most."""
-    steps = np.diff(t)
-    step = float(np.median(steps))
-    if np.all(np.abs(steps - step) < EVEN * step):
-        return np.asarray(convolve1d(y, _weights(offset / step)[::-1], axis=0, mode="nearest"))
+    if even(t):
+        weights = _weights(offset / float(t[1] - t[0]))
+        return np.asarray(convolve1d(y, weights[::-1], axis=0, mode="nearest"))
     return np.asarray(CubicSpline(t, y)(np.clip(t + offset, t[0], t[-1])))
 
 
@@ -79,8 +78,7 @@ def jitter(record: Record, residuals: Sequence[Array], chance: float) -> float:
     if not whole > chance * error:
         return 0.0
     alone = [_regressed(rough[:, j], moved[:, j]) for j in range(len(known))]
-    most = min(run.sample for run in record.runs) / 2
-    least = min([whole, most**2, *(value + chance * wide for value, wide in alone)])
+    least = min([whole, (record.sample / 2) ** 2, *(value + chance * wide for value, wide in alone)])
     return float(np.sqrt(max(least, 0.0)))
 
 
@@ -113,8 +111,8 @@ def times_said(offset: float, error: float, scatter: float) -> list[str]:
     if offset:
         side = "later" if offset > 0 else "earlier"
         found.append(
-            f"the outputs are of times that are {abs(offset):.3g} ± {error:.1g} s {side} than those of the "
-            "inputs; this offset was fitted with the parameters"
+            f"the outputs were sampled {abs(offset):.3g} ± {error:.1g} s {side} than their times say, if "
+            "those of the inputs are right; this offset was fitted with the parameters"
         )
     if scatter:
         found.append(f"the times of the samples scatter by {scatter:.2g} s, which adds to the noise")

@@ -43,6 +43,11 @@ class Unknown:
         return self.name.endswith("_T_r")
 
 
+def clock_within(most: float) -> Unknown:
+    """The offset of the outputs' clock, by a bound at most, s."""
+    return Unknown(CLOCK, 0.0, -most, most, most)
+
+
 class Builder(Protocol):
     """Builds the FMU with effects; must be picklable, and must return quickly for effects built before."""
 

@@ -12,8 +12,8 @@ import numpy as np
 from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.question.clock import CLOCK, read_later
-from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.question.clock import read_later
+from estimator.closeloop.question.problem import clock_within
 from estimator.closeloop.screening.regressors import Calibration
 from estimator.closeloop.search.screened import Screened
 from estimator.noise import larger
@@ -24,7 +24,7 @@ def clock_of(shown: Screened) -> float:
     baseline, problem, fit = shown.baseline, shown.problem, shown.fit
     if not _open(baseline):
         return 0.0
-    outputs, step = len(problem.record.outputs), _sample(problem)
+    outputs, step = len(problem.record.outputs), problem.record.sample
     calibrated = Calibration.of(fit)
     residual = calibrated.without(fit.residual)
     change = shown.screening.by_outputs(lambda y, run: read_later(y, run.t, outputs, step))
@@ -42,10 +42,9 @@ def clock_beside(fitter: Fitter, best: Hypothesis) -> float:
     baseline = fitter.baseline
     if not _open(baseline):
         return 0.0
-    step = _sample(baseline.problem)
-    asked = [*best.others, Unknown(CLOCK, 0.0, -step, step, step)]
-    [found] = fitter.alone.finished(from_there([best]), asked)[:1] or [best]
-    samples, left = len(best.fit.residual), cost(found)
+    step = baseline.problem.record.sample
+    found = fitter.alone.finished(from_there([best]), [*best.others, clock_within(step)])
+    samples, left = len(best.fit.residual), min(map(cost, [best, *found]))
     beyond = left - samples - baseline.policy.detection.chance * float(np.sqrt(2 * samples))
     return step if _clear(baseline, cost(best), left, samples) and cost(best) - left > beyond else 0.0
 
@@ -61,7 +60,3 @@ def _open(baseline: Baseline) -> bool:
 def _clear(baseline: Baseline, before: float, after: float, samples: int) -> bool:
     """Whether a sum of squares is smaller afterwards by more than chance would make it."""
     return before - after > baseline.policy.detection.chance**2 * max(1.0, after / samples)
-
-
-def _sample(problem: Problem) -> float:
-    return float(min(run.sample for run in problem.record.runs))
