@@ -48,10 +48,8 @@ class Noise:
         white = noise_floor(record)
         if caused:
             return cls._shared(record, white, caused, scales(record, residuals, left))
-        said, size = (
-            record.noise_declared,
-            np.where(record.noise_declared, white, scales(record, residuals, left)),
-        )
+        said = record.noise_declared
+        size = np.where(said, white, scales(record, residuals, left))
         most = np.where(said, chance, np.inf if left == "noise" else -np.inf)
         correlation, fitted = [], _stretches(record, residuals)
         for j in range(len(said)):

@@ -260,6 +260,7 @@ class Chain:
                 found = self.stages.done(f"careful {turn}", partial(with_rivals, fitter, found, others))
             final = {h.key: h for h in found}
             singles, pairs = (form.ranked([final.get(h.key, h) for h in some]) for some in (singles, pairs))
+            singles, pairs = self._search(shown).simplified(singles, pairs, f"simplified {turn}")
         return (
             shown.baseline,
             list(singles),

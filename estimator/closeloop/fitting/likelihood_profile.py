@@ -112,19 +112,26 @@ def _to_limits(here: Problem, h: Hypothesis, weighting: Weighting) -> Array:
     found, names = np.zeros(len(h.fit.unknowns)), [u.name for u in h.fit.unknowns]
     for c in h.candidates:
         sizes = [names.index(u.name) for u in c.amplitudes if u.name in names]
-        for i, bound in ((names.index(u.name), b) for u in c.shape for b in (u.low, u.high)):
-            if h.fit.unknowns[i].is_onset or not np.isfinite(bound):
-                continue
-            steps = np.array([STEP * h.fit.unknowns[j].scale for j in sizes])
-            there = {**h.theta, names[i]: float(bound)}
-            moved = [{**there, names[j]: there[names[j]] + d} for j, d in zip(sizes, steps, strict=True)]
-            r, *others = in_turn(here, [there, *moved], weighting)
-            jacobian = h.fit.jacobian.copy()
-            jacobian[:, sizes] = np.array([(o - r) / d for o, d in zip(others, steps, strict=True)]).T
-            rise = _followed(jacobian, i, [r])[0] - _followed(h.fit.jacobian, i, [h.fit.residual])[0]
-            if rise < WIDTH**2 * h.fit.inflation[i]:
-                found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
+        for i in (names.index(u.name) for u in c.shape if not u.is_onset):
+            least = _followed(h.fit.jacobian, i, [h.fit.residual])[0]
+            for bound in (h.fit.unknowns[i].low, h.fit.unknowns[i].high):
+                if np.isfinite(bound):
+                    rise = _at(here, h, i, bound, sizes, weighting) - least
+                    if rise < WIDTH**2 * h.fit.inflation[i]:
+                        found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
     return found
+
+
+def _at(here: Problem, h: Hypothesis, i: int, bound: float, sizes: list[int], weighting: Weighting) -> float:
+    """Sum of squares with the i-th unknown at a bound; sizes: unknowns whose slopes are simulated there."""
+    names = [u.name for u in h.fit.unknowns]
+    steps = np.array([STEP * h.fit.unknowns[j].scale for j in sizes])
+    there = {**h.theta, names[i]: float(bound)}
+    moved = [{**there, names[j]: there[names[j]] + d} for j, d in zip(sizes, steps, strict=True)]
+    r, *others = in_turn(here, [there, *moved], weighting)
+    jacobian = h.fit.jacobian.copy()
+    jacobian[:, sizes] = np.array([(o - r) / d for o, d in zip(others, steps, strict=True)]).T
+    return float(_followed(jacobian, i, [r])[0])
 
 
 def _followed(jacobian: Array, i: int, residuals: Iterable[Array]) -> Array:

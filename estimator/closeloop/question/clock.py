@@ -20,9 +20,9 @@ CLOCK = "clock_offset"  # its name among the unknowns, s; positive where outputs
 NODES = np.arange(-3, 4)  # samples of the polynomial from which a value between samples is read
 TURNS = 3  # of the weighted regression, after which its weights stand still
 JITTER_SAMPLES = 1 << 17  # samples from which jitter is estimated; its size scatters by a hundredth then
-# squares of third differences for each independent one: 2.31 by their autocorrelation where the rate is the
-# same everywhere, rounded up for one that varies
-NEIGHBOURS = 3.0
+ALIKE = np.correlate(DIFFERENCE, DIFFERENCE, "full") / float(DIFFERENCE @ DIFFERENCE)
+# squares of third differences of white noise for each independent one, at most, whatever their weights: 2.31
+NEIGHBOURS = float(ALIKE @ ALIKE)
 
 
 def read_later(y: Array, t: Array, outputs: int, offset: float) -> Array:

@@ -224,11 +224,9 @@ class Problem:
         return start
 
     def start(self, theta: Mapping[str, float]) -> dict[str, float]:
-        """Start values of the FMU: the declared ones, and those in theta that are variables of the FMU."""
+        """Start values of the FMU: the declared values and those in theta of its variables."""
         known = self.plant.fmu.description.variables
-        every = {**self.declared, **{n: v for n, v in theta.items() if n in known}}
-        every.pop(CLOCK, None)
-        return every
+        return {n: v for n, v in {**self.declared, **theta}.items() if n in known}
 
 
 def simulate_ahead(asked: Sequence[tuple[Problem, Mapping[str, float]]]) -> None:

@@ -54,6 +54,18 @@ class Search:
         self.tell("rivals", "fitting the rivals of the best effect from its values")
         return s.stages.done("rivals", lambda: self._rivals(singles))
 
+    def simplified(
+        self, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis], stage: str
+    ) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """Both, best first, with the simpler laws of the best ones, which careful fits may have changed."""
+        ones, twos = self.screened.stages.done(stage, lambda: [self._simplified(x) for x in (singles, pairs)])
+        return ones, twos
+
+    def _simplified(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+        promises = simpler(found, [c for c, _ in self._single]) if found else []
+        more = self.fitter.finished(promises) if promises else []
+        return self._form.ranked(best_by_label([*found, *more]))
+
     def _rivals(self, singles: Sequence[Hypothesis]) -> list[Hypothesis]:
         """See `instead`; the best one and its nearest rivals are refined, before and after."""
         s, fitter = self.screened, self.fitter
