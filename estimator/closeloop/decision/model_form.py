@@ -51,12 +51,12 @@ class ModelForm(ABC):
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """Whether a richer hypothesis fits the part to identify better than it could if h were right."""
 
-    @abstractmethod
-    def another(self, began: bool) -> Check | None:
-        """The check that the residual exceeds what needs no effect: the open share, or undeclared noise.
-
-        None if the form is not open and noise is declared.
-        """
+    def beyond_others(self, began: bool) -> list[Check]:
+        """The checks that the residual exceeds what needs no effect: undeclared noise, and the open share."""
+        if self.baseline.noise.known:
+            return []
+        size = importance_as_noise(self.baseline)
+        return [Check.least("more than undeclared noise may leave", size, 1.0)]
 
     @abstractmethod
     def curve_limit(self, h: Hypothesis) -> float:
@@ -113,13 +113,6 @@ class Closed(ModelForm):
         more = becomes(richer, h) or set(h.key) < set(richer.key)
         return more and cost(h) - cost(richer) > self.noticed(h)
 
-    def another(self, began: bool) -> Check | None:
-        """See ModelForm."""
-        if self.baseline.noise.known:
-            return None
-        size = importance_as_noise(self.baseline)
-        return Check.least("more than undeclared noise may leave", size, 1.0)
-
     def curve_limit(self, h: Hypothesis) -> float:
         """See ModelForm; more than chance, and most of what the law leaves beyond noise."""
         limits = self.baseline.policy.decision
@@ -175,10 +168,11 @@ class Open(ModelForm):
         """See ModelForm; never, because the gain may come from the open form."""
         return False
 
-    def another(self, began: bool) -> Check | None:
+    def beyond_others(self, began: bool) -> list[Check]:
         """See ModelForm."""
         size = importance(self.baseline, 0.0, began)
-        return Check.least("more than another form of the model leaves", size, 1.0)
+        form = Check.least("more than another form of the model leaves", size, 1.0)
+        return [form, *super().beyond_others(began)]
 
     def curve_limit(self, h: Hypothesis) -> float:
         """See ModelForm; a share of what the law explains, since correct laws leave some of the open form."""

@@ -173,10 +173,9 @@ def judge(
 
 def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     """The judgement if no hypothesis accounts for the residual."""
-    another = form_of(baseline).another(began)
-    checks = () if another is None else (another,)
-    if another is not None and not another.passed:
-        return Judgement(checks, (), f"{NO_EFFECT[another.name]}, and no effect explains most of it")
+    checks = tuple(form_of(baseline).beyond_others(began))
+    if failed := next((c for c in checks if not c.passed), None):
+        return Judgement(checks, (), f"{NO_EFFECT[failed.name]}, and no effect explains most of it")
     if _noise_alone(baseline, "fit"):
         reason = "the part to identify shows only noise: the discrepancy begins after it"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")

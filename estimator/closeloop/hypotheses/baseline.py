@@ -83,15 +83,16 @@ class Baseline:
     def seen_by_several(self, h: Hypothesis) -> bool | None:
         """Whether what h leaves depends between outputs, as noise of sensors does not.
 
-        None where that says nothing: fewer than two outputs have noise that is not declared, or the form is
-        open, whose error several outputs see too.
+        None where that says nothing: fewer than two outputs have noise that is not declared, or it does and
+        the form is open, whose error several outputs see too.
         """
         unsaid = ~self.noise.declared
-        if np.sum(unsaid) < 2 or self.problem.form_error:
+        if np.sum(unsaid) < 2:
             return None
         parts = [r[:, unsaid] for r in h.residuals]
         limits = self.policy.detection
-        return chance_of_independence(parts, limits.lags) < limits.level
+        depends = chance_of_independence(parts, limits.lags) < limits.level
+        return None if depends and self.problem.form_error else depends
 
     def beyond_noise(self, h: Hypothesis, part: Part = "choose") -> float:
         """Sum of squares on a part minus its expectation for pure noise."""
