@@ -223,3 +223,18 @@ def test_a_law_that_is_denied_gives_way_to_the_right_one(builder):
     assert again[0].label == singles[0].label
     assert set(new) == {h.label for h in singles}
     assert all(new[h.label] is h or cost(new[h.label]) < cost(h) for h in singles)
+
+
+def test_the_limit_of_the_best_law_is_fitted_if_nobody_has(builder):
+    here = problem(builder, record(to_and_fro(2.0), coulomb(30.0), 3))
+    o = looked_at("one", here, ("stribeck_friction",)).found
+    shown = screened(o.baseline, o.forces, Progress(lambda _: None), Stages())
+    search = Search(shown, Fitter(o.baseline), Progress(lambda _: None))
+    singles, pairs = search.simplified(o.singles, [], "simplified")
+    assert not pairs
+    found = {h.label: h for h in singles}
+    assert [h.label for h in o.singles] == ["stribeck_friction@carriage"]
+    simple = found["coulomb_friction@carriage"]
+    assert cost(simple) < cost(found["stribeck_friction@carriage"]) + 10
+    assert simple.theta["coulomb_friction_carriage_F_c"] == pytest.approx(30.0, rel=0.02)
+    assert search.simplified(singles, [], "simplified")[0] == singles  # what was fitted is not fitted again

@@ -347,6 +347,20 @@ def test_what_no_effect_explains_may_be_noise_that_is_not_declared(rms, declared
     assert judge(b, [], [], 8).after(DETECTED).verdict == verdict
 
 
+@pytest.mark.parametrize("form", [0.0, FORM])
+@pytest.mark.parametrize(("common", "verdict"), [(0.0, "no_discrepancy"), (0.3, "unexplained")])
+def test_what_is_independent_between_outputs_is_noise_whatever_the_form(form, common, verdict):
+    """An error of the model's form is seen by several outputs, as the effect of a machine is."""
+    noise = np.random.default_rng(4).standard_normal((len(T), 2))
+    noise[:, 1] += common * noise[:, 0]
+    one = left(1.0, 1.0)
+    base = replace(one, residuals=(2 * FORM * SIGNAL * noise,))
+    b = baseline(asked(form), base, NOISE)
+    unsaid = replace(b, noise=replace(b.noise, declared=np.zeros(2, bool)))
+    assert judge(unsaid, [], [], 8).after(DETECTED).verdict == verdict
+    assert judge(b, [], [], 8).after(DETECTED).verdict == "unexplained"  # noise is declared to be smaller
+
+
 @given(st.permutations((0.0, 0.2, 0.2, 0.6)))
 def test_a_class_is_listed_with_its_most_probable_member_first(shares):
     kinds = ("constant_force", "viscous_damping", "coulomb_friction", "cubic_stiffness")

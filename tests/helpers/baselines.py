@@ -23,9 +23,7 @@ def fit_with(
     return Fit(tuple(unknowns), values, covariance, residual, tuple(jacobian.T))
 
 
-def baseline(
-    problem: Any, base: Hypothesis = NOTHING, noise: Array | float = 1.0, known: bool = True
-) -> Baseline:
-    """A baseline with noise of this size (n_y,), declared or not."""
+def baseline(problem: Any, base: Hypothesis = NOTHING, noise: Array | float = 1.0) -> Baseline:
+    """A baseline with declared noise of this size (n_y,)."""
     std = np.atleast_1d(np.asarray(noise, dtype=float))
     return Baseline(problem, base, Noise(std, Weighting.white(std), np.ones(len(std), bool)))
