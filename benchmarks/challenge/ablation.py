@@ -61,10 +61,12 @@ class _Again:
     """What the chain found in a record, judged again; simulations are made once for all policies."""
 
     found: Outcome
-    curves: dict[int, float] = field(default_factory=dict)
+    curves: dict[int, tuple[float, float]] = field(default_factory=dict)
     _curvature = staticmethod(law_form.curvature)
 
-    def curvature(self, baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> float:
+    def curvature(
+        self, baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]
+    ) -> tuple[float, float]:
         """See law_form.curvature."""
         if id(h) not in self.curves:
             self.curves[id(h)] = self._curvature(baseline, h, forces)

@@ -464,22 +464,22 @@ class DecisionPolicy:
         "share that a free curve beside the law must explain, so that it is rejected",
         CHALLENGE,
     )
-    open_curve_explained: float = limit(
-        2.5e-3,
-        "share of what the law explains",
-        "reduction by a free curve, from which on a law may be rejected if the model form is open",
-        CHALLENGE,
-    )
     rounded: float = limit(
         1e-4,
         "share of what a law explains",
         "smallest misfit of a smooth curve that imitates a law with a corner",
         CHALLENGE,
     )
+    imitated: float = limit(
+        2.5e-3,
+        "share of what a law explains",
+        "the same for a law with few unknowns",
+        CHALLENGE,
+    )
     plain_law: int = limit(
         2,
         "unknowns",
-        "a law with no more unknowns is imitated less closely: `open_curve_explained` replaces `rounded`",
+        "a law with no more unknowns is imitated less closely: `imitated` replaces `rounded`",
         CHALLENGE,
     )
     fastest: float = limit(

@@ -13,7 +13,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.screening.candidates import physical_candidates
-from estimator.closeloop.screening.free_form import FREE_FORMS
+from estimator.closeloop.screening.free_form import FREE_FORMS, offered
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.screen import Screening, screen
 from fmus.effects import EFFECTS
@@ -49,7 +49,8 @@ def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) 
     wrong = doubted(baseline, h, forces)
     if wrong or len(h.candidates) > 1:
         return Check.most(FORCE_FOLLOWS, len(wrong), 0)
-    return Check.most(FORCE_FOLLOWS, curvature(baseline, h, forces), form_of(baseline).curve_limit(h))
+    own, elsewhere = curvature(baseline, h, forces)
+    return Check.most(FORCE_FOLLOWS, own, form_of(baseline).curve_limit(h, elsewhere))
 
 
 def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
@@ -85,7 +86,7 @@ def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate) -> bool:
         return False
     alone = len(h.candidates) == 1
     explained = cost(baseline.hypothesis) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
-    near = limits.open_curve_explained if len(c.unknowns) <= limits.plain_law else limits.rounded
+    near = limits.imitated if len(c.unknowns) <= limits.plain_law else limits.rounded
     return near * explained > limits.noticed
 
 
@@ -100,18 +101,32 @@ def over_what(c: Candidate) -> str:
     return EFFECTS[c.kind].over if c.kind in EFFECTS else ""
 
 
-def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> float:
-    """Reduction of the sum of squares by a free curve over a single law's motion, by linear regression.
+def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> tuple[float, float]:
+    """Reductions of the sum of squares by a free curve beside a single law, by linear regression.
 
-    It is zero for an effect that is no law over a motion.
+    The first is that by a curve over the law's own motion, zero for an effect that is no law over a motion.
+    The second is the largest by a curve over another motion. Curves that reduce it alike are the same curve,
+    at two ports that move alike.
     """
     location, over = motion(h)
-    mine = [(kind, location) for kind, law in FREE_FORMS.items() if law.against == over]
+    every = offered(baseline.problem, forces)
+    mine = [(kind, at) for kind, at in every if at == location and FREE_FORMS[kind].against == over]
     if not mine:
-        return 0.0
+        return 0.0, 0.0
+    own = max(_reductions(baseline, h, forces, mine), default=0.0)
+    if form_of(baseline).exact or own <= baseline.policy.decision.noticed:
+        return own, 0.0
+    others = _reductions(baseline, h, forces, [pair for pair in every if pair not in mine])
+    return own, max((g for g in others if not np.isclose(g, own)), default=0.0)
+
+
+def _reductions(
+    baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce], asked: Sequence[tuple[str, str]]
+) -> list[float]:
+    """Reductions by a free curve of each of the kinds at their locations, beside the laws of h."""
     problem = baseline.problem
-    curves = physical_candidates(mine, problem.builder.outside(), problem.record, forces)
+    curves = physical_candidates(asked, problem.builder.outside(), problem.record, forces)
     screening = Screening(built(problem, h.candidates), h.fit, baseline.noise.weighting)
     change = screening.changes(curves)
     found = screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)])
-    return max((p.gain for p in found), default=0.0)
+    return [p.gain for p in found]

@@ -59,8 +59,11 @@ class ModelForm(ABC):
         return [Check.least("more than undeclared noise may leave", size, 1.0)]
 
     @abstractmethod
-    def curve_limit(self, h: Hypothesis) -> float:
-        """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected."""
+    def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
+        """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected.
+
+        elsewhere: the largest by a curve over another motion.
+        """
 
     def noticed(self, h: Hypothesis) -> float:
         """Reduction of the sum of squares by a richer hypothesis, from which on h is incomplete."""
@@ -113,7 +116,7 @@ class Closed(ModelForm):
         more = becomes(richer, h) or set(h.key) < set(richer.key)
         return more and cost(h) - cost(richer) > self.noticed(h)
 
-    def curve_limit(self, h: Hypothesis) -> float:
+    def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
         """See ModelForm; more than chance, and most of what the law leaves beyond noise."""
         limits = self.baseline.policy.decision
         return max(limits.noticed, limits.second_share * h.fit.beyond_noise)
@@ -174,11 +177,13 @@ class Open(ModelForm):
         form = Check.least("more than another form of the model leaves", size, 1.0)
         return [form, *super().beyond_others(began)]
 
-    def curve_limit(self, h: Hypothesis) -> float:
-        """See ModelForm; a share of what the law explains, since correct laws leave some of the open form."""
-        limits = self.baseline.policy.decision
-        explained = cost(self.baseline.hypothesis) - cost(h)
-        return max(limits.noticed, limits.open_curve_explained * explained)
+    def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
+        """See ModelForm; the most that a curve over another motion explains, or chance.
+
+        An error of the form is as like a curve elsewhere as like one over this motion. The force that a wrong
+        law leaves is a curve over its own motion, and less like any other.
+        """
+        return max(self.baseline.policy.decision.noticed, elsewhere)
 
 
 def form_of(baseline: Baseline) -> ModelForm:
