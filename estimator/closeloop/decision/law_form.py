@@ -11,11 +11,9 @@ from estimator.closeloop.evidence import Check, Judgement, Name
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
-from estimator.closeloop.hypotheses.promise import built
-from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.curves import reductions
 from estimator.closeloop.screening.free_form import FREE_FORMS, offered
 from estimator.closeloop.screening.missing_force import MissingForce
-from estimator.closeloop.screening.screen import Screening, screen
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import ForceLaw
 
@@ -105,28 +103,18 @@ def curvature(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce])
     """Reductions of the sum of squares by a free curve beside a single law, by linear regression.
 
     The first is that by a curve over the law's own motion, zero for an effect that is no law over a motion.
-    The second is the largest by a curve over another motion. Curves that reduce it alike are the same curve,
-    at two ports that move alike.
+    The second is the largest by a curve at another port. Curves that reduce it alike are the same curve, at
+    two ports that move alike.
     """
     location, over = motion(h)
     every = offered(baseline.problem, forces)
     mine = [(kind, at) for kind, at in every if at == location and FREE_FORMS[kind].against == over]
     if not mine:
         return 0.0, 0.0
-    own = max(_reductions(baseline, h, forces, mine), default=0.0)
+    problem, weighting = baseline.problem, baseline.noise.weighting
+    own = max(reductions(problem, weighting, h, forces, mine), default=0.0)
     if form_of(baseline).exact or own <= baseline.policy.decision.noticed:
         return own, 0.0
-    others = _reductions(baseline, h, forces, [pair for pair in every if pair not in mine])
+    elsewhere = [(kind, at) for kind, at in every if at != location]
+    others = reductions(problem, weighting, h, forces, elsewhere)
     return own, max((g for g in others if not np.isclose(g, own)), default=0.0)
-
-
-def _reductions(
-    baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce], asked: Sequence[tuple[str, str]]
-) -> list[float]:
-    """Reductions by a free curve of each of the kinds at their locations, beside the laws of h."""
-    problem = baseline.problem
-    curves = physical_candidates(asked, problem.builder.outside(), problem.record, forces)
-    screening = Screening(built(problem, h.candidates), h.fit, baseline.noise.weighting)
-    change = screening.changes(curves)
-    found = screen(screening.fit, [((k,), g) for k, g in zip(curves, change, strict=True)])
-    return [p.gain for p in found]

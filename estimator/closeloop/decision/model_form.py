@@ -62,7 +62,7 @@ class ModelForm(ABC):
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
         """Reduction of the sum of squares by a free curve beside a law, above which the law is rejected.
 
-        elsewhere: the largest by a curve over another motion.
+        elsewhere: the largest by a curve at another port.
         """
 
     def noticed(self, h: Hypothesis) -> float:
@@ -178,10 +178,10 @@ class Open(ModelForm):
         return [form, *super().beyond_others(began)]
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """See ModelForm; the most that a curve over another motion explains, or chance.
+        """See ModelForm; the most that a curve elsewhere explains, or chance.
 
-        An error of the form is as like a curve elsewhere as like one over this motion. The force that a wrong
-        law leaves is a curve over its own motion, and less like any other.
+        An error of the form is as like a curve elsewhere as like one over this motion. What a wrong law
+        leaves is a force at its own port, and less like any other.
         """
         return max(self.baseline.policy.decision.noticed, elsewhere)
 
