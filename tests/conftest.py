@@ -1,5 +1,6 @@
 """FMUs built once for all tests, and examples without a time limit."""
 
+import os
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -36,9 +37,11 @@ def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Contact tables are kept for the session alone, not among the user's."""
+    """What is computed once is kept for this run alone, by all of its processes together."""
+    own = tmp_path_factory.getbasetemp()
+    whole = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("XDG_CACHE_HOME", str(whole / "cache"))
         yield
 
 

@@ -25,11 +25,6 @@ SEARCHES = ("rigid", "quasi_elastic")
 SHIFTS = np.linspace(-0.0045, 0.0045, 91)
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 def table_of(y, difference):
     return pd.DataFrame({"r_left": R0 + difference / 2, "r_right": R0 - difference / 2}, index=y)
 

@@ -22,8 +22,7 @@ PAIR = Pair(exact_profile("S1002"), exact_profile("60E1"))
 
 
 @pytest.fixture
-def tables(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
+def tables():
     return {s: contact_table(search=s, N=70e3, shifts=SHIFTS) for s in ("rigid", "quasi_elastic")}
 
 

@@ -35,11 +35,6 @@ CONTRACT = ["r_left", "r_right", "delta_left", "delta_right", "phi", "a_left", "
 SHIFTS = np.linspace(-0.015, 0.015, 61)
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 @pytest.mark.parametrize("search", SEARCHES)
 def test_mirror_of_the_table(search):
     table = contact_table(search=search, shifts=SHIFTS)

@@ -21,11 +21,6 @@ PAIRS = {
 MISPRINTS = {("WheelARailA", 1.7), ("WheelARailA", -1.7), ("WheelAmodRailA", 1.7)}  # 0.572, as at 1.8 mm
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 def read(name):
     file = DATA / f"{name}.csv"
     if not file.is_file():

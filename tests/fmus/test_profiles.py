@@ -31,11 +31,6 @@ EDGES = {
 TREAD = np.linspace(-0.020, 0.035, 400)  # m, without the step of curvature at -26 mm
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 def benchmark(name):
     file = DATA / BENCHMARK[name]
     if not file.is_file():

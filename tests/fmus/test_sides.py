@@ -19,11 +19,6 @@ NORM = {"rail": "EN15302_RailA", "cant": 0.0, "gauge": 1.43516, "search": "rigid
 SHIFTS = np.linspace(-0.006, 0.006, 25)
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 @pytest.mark.parametrize("roll", [True, False])
 @pytest.mark.parametrize("search", ["rigid", "quasi_elastic"])
 def test_like_sides_given_as_a_pair_are_one(search, roll):

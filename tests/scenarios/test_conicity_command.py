@@ -16,11 +16,6 @@ from tests.helpers.profile_files import points_of, write_points
 A, B, RAIL = "EN15302_WheelA", "EN15302_WheelB", "EN15302_RailA"
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 def conicity(out, *arguments):
     return run_safely(["conicity", *map(str, arguments), "--out", str(out)])
 

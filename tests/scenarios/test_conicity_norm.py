@@ -35,11 +35,6 @@ def wrong(path, kind):
 """
 
 
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-
-
 def no_reader(path, kind):
     raise AssertionError("is not read here")
 
