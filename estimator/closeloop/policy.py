@@ -467,19 +467,19 @@ class DecisionPolicy:
     rounded: float = limit(
         1e-4,
         "share of what a law explains",
-        "smallest misfit of a smooth curve that imitates a law with a corner",
+        "smallest misfit of a smooth curve that imitates a law with a corner, if the law has many unknowns",
         CHALLENGE,
     )
     imitated: float = limit(
         2.5e-3,
         "share of what a law explains",
-        "the same for a law with few unknowns",
+        "smallest misfit of a smooth curve that imitates a law with a corner, if the law has few unknowns",
         CHALLENGE,
     )
     plain_law: int = limit(
         2,
         "unknowns",
-        "a law with no more unknowns is imitated less closely: `imitated` replaces `rounded`",
+        "largest number of unknowns of a law for which `imitated` holds; above it, `rounded` does",
         CHALLENGE,
     )
     fastest: float = limit(

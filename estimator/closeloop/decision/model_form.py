@@ -51,7 +51,7 @@ class ModelForm(ABC):
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """Whether a richer hypothesis fits the part to identify better than it could if h were right."""
 
-    def beyond_others(self, began: bool) -> list[Check]:
+    def calls_for_effect(self, began: bool) -> list[Check]:
         """The checks that the residual exceeds what needs no effect: undeclared noise, and the open share."""
         if self.baseline.noise.known:
             return []
@@ -171,11 +171,11 @@ class Open(ModelForm):
         """See ModelForm; never, because the gain may come from the open form."""
         return False
 
-    def beyond_others(self, began: bool) -> list[Check]:
+    def calls_for_effect(self, began: bool) -> list[Check]:
         """See ModelForm."""
         size = importance(self.baseline, 0.0, began)
         form = Check.least("more than another form of the model leaves", size, 1.0)
-        return [form, *super().beyond_others(began)]
+        return [form, *super().calls_for_effect(began)]
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
         """See ModelForm; the most that a curve elsewhere explains, or chance.

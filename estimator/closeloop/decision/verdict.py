@@ -173,7 +173,7 @@ def judge(
 
 def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     """The judgement if no hypothesis accounts for the residual."""
-    checks = tuple(form_of(baseline).beyond_others(began))
+    checks = tuple(form_of(baseline).calls_for_effect(began))
     if failed := next((c for c in checks if not c.passed), None):
         return Judgement(checks, (), f"{NO_EFFECT[failed.name]}, and no effect explains most of it")
     if _noise_alone(baseline, "fit"):
