@@ -1,5 +1,6 @@
 """Problems of tests, which are not simulated by an FMU."""
 
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,6 +28,12 @@ class OneByOne:
     def identify_residuals(self, thetas):
         """See Problem."""
         return None
+
+    def in_steps(self, steps):
+        """See Problem."""
+        again = copy(self)
+        object.__setattr__(again, "steps", steps)
+        return again
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 Hypotheses are searched in the longest steps that move no unknown of any hypothesis. For an FMU of ours, these
 join several samples and know the inputs within a step, which is more accurate than steps of one sample over
-which inputs are held, and takes less time.
+which inputs are held, and takes less time. The effects around a foreign FMU read its ports once in a sample.
 
 An effect can make the equations stiffer than those of the FMU without it. Friction that is rounded over a
 millimetre per second does so. With the usual step, the integration then adds an error of its own, and the fit
@@ -22,28 +22,41 @@ from estimator.closeloop.hypotheses.fitted import relaxed
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
-from estimator.plant import JOINED, USUAL
+from estimator.plant import JOINED, USUAL, Steps
+from estimator.record import Array
 from estimator.weighting import Weighting
 
 
-def in_joined_steps(problem: Problem) -> Problem:
-    """The problem in steps over several samples; the problem itself if its FMU has no such steps."""
-    joins = problem.plant.joins(problem.record.runs)
-    return replace(problem, steps=JOINED, searched=JOINED) if joins else problem
+def in_long_steps(problem: Problem) -> Problem:
+    """The problem in the longest steps that its FMU has: over several samples, or coupled once in a sample.
+
+    The problem itself if these are the usual ones.
+    """
+    if problem.plant.joins(problem.record.runs):
+        return replace(problem, steps=JOINED, searched=JOINED)
+    sample = min(run.sample for run in problem.record.runs)
+    if not 0 < problem.builder.coupling < sample:
+        return problem
+    rare = Steps(coupled=sample)
+    return replace(problem, steps=rare, searched=rare)
 
 
-def joined_steps_hold(joined: Problem, base: Hypothesis, weighting: Weighting) -> bool:
-    """Whether steps over several samples are exact on a record, and what is left does not come from them.
+def long_steps_hold(long: Problem, base: Hypothesis, weighting: Weighting) -> bool:
+    """Whether such steps are exact on a record, and what is left does not come from them.
 
     base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
-    it is long, whatever the slopes of the unknown are. How long it is, steps of half the length show.
+    it is long, whatever the slopes of the unknown are. How long it is, shorter steps show.
     """
-    here, halved = (
-        weighted(p, base.theta, weighting) for p in (joined, replace(joined, steps=JOINED.halved))
-    )
-    if not float(np.linalg.norm(here - halved)) <= joined.policy.search.moved_by_steps:
+    here, shorter = (weighted(p, base.theta, weighting) for p in (long, in_shorter_steps(long)))
+    if not float(np.linalg.norm(here - shorter)) <= long.policy.search.moved_by_steps:
         return False
-    return not inputs_held(joined, base, weighting)
+    return not (long.steps.joined and inputs_held(long, base, weighting))
+
+
+def in_shorter_steps(problem: Problem) -> Problem:
+    """The problem in steps of half the length; a foreign FMU is first coupled as often as usual."""
+    steps = problem.steps
+    return problem.in_steps(steps._replace(coupled=0.0) if steps.coupled else steps.halved)
 
 
 def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
@@ -55,22 +68,36 @@ def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
     with the effects of h, which was fitted in its steps.
     """
     theta, policy = h.theta, joined.policy
-    here, held = (
-        relaxed(h.fit, weighted(p, theta, weighting)) for p in (joined, replace(joined, steps=USUAL))
-    )
+    here, held = (relaxed(h.fit, weighted(p, theta, weighting)) for p in (joined, joined.in_steps(USUAL)))
     apart, gained = float(np.linalg.norm(held - here)), float(here @ here - held @ held)
     beyond = float(here @ here) - len(here) - policy.detection.chance * np.sqrt(2 * len(here))
     return gained / 2 > policy.decision.telling * apart and gained > policy.decision.most * beyond
 
 
 def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting) -> Problem:
-    """The problem with its steps halved until this would no longer move an unknown of the hypotheses.
+    """The problem with its steps shortened until this would no longer move an unknown of the hypotheses.
 
     How far an unknown would move follows from the slopes of its fit, without another fit.
     """
     for h in some:
         problem = _resolved(problem, h, weighting)
     return problem
+
+
+def error_of_steps(problem: Problem, h: Hypothesis, weighting: Weighting) -> Array:
+    """Error (n,) of each fitted value that comes from the steps of the simulation, as shorter ones show it.
+
+    problem: with the effects of h. Steps of half the length halve an error of first order, so that there is
+    twice as much of it as they take away; in steps over several samples it is of fourth order. Zero if the
+    record rejects shorter steps, because they change what the FMU receives.
+    """
+    shorter = in_shorter_steps(problem)
+    now, before = weighted(shorter, h.theta, weighting), h.fit.residual
+    again = relaxed(h.fit, now)
+    if is_worse(again, before, problem):
+        return np.zeros(len(h.fit.unknowns))
+    order = 4 if problem.steps.joined else 1
+    return h.fit.moved_by(before - now) / (1 - 0.5**order)
 
 
 def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
@@ -88,19 +115,28 @@ def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
     if before.steps.joined:
         if not inputs_held(built(before, best.candidates), best, weighting):
             return resolved(before, some, weighting)
-        fitter = fitter.asked(replace(before, steps=USUAL))
+        fitter = fitter.asked(before.in_steps(USUAL))
         before, best = fitter.baseline.problem, in_divided_steps(fitter, best)
     finer = resolved(before, some, weighting)
     if finer.steps == before.steps:
         return before
+    # a foreign FMU receives the same inputs, however often it is coupled
+    undivided = before.in_steps(finer.steps._replace(parts=before.steps.parts))
+    if finer.steps == undivided.steps:
+        return finer
     again = in_divided_steps(fitter.asked(finer), best)
-    return before if rejected(fitter.baseline, best, again) else finer
+    return undivided if rejected(fitter.baseline, best, again) else finer
 
 
 def rejected(baseline: Baseline, h: Hypothesis, again: Hypothesis) -> bool:
     """Whether the record rejects other steps: h fitted again in these fits worse than it could by chance."""
-    apart = float(np.linalg.norm(again.fit.residual - h.fit.residual))
-    return (cost(again) - cost(h)) / 2 > baseline.policy.decision.telling * apart
+    return is_worse(again.fit.residual, h.fit.residual, baseline.problem)
+
+
+def is_worse(now: Array, before: Array, problem: Problem) -> bool:
+    """Whether a weighted residual (m,) of other steps is larger than the one before by more than chance."""
+    apart = float(np.linalg.norm(now - before))
+    return float(now @ now - before @ before) / 2 > problem.policy.decision.telling * apart
 
 
 def in_divided_steps(fitter: Fitter, h: Hypothesis) -> Hypothesis:
@@ -118,10 +154,10 @@ def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
     residual = weighted(here, h.theta, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
     while problem.steps.parts < limits.parts_of_a_step:
-        halved = replace(problem, steps=problem.steps.halved)
-        now = weighted(built(halved, h.candidates), h.theta, weighting)
+        shorter = in_shorter_steps(problem)
+        now = weighted(built(shorter, h.candidates), h.theta, weighting)
         moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
         if np.all(np.abs(moved) <= limits.moved_by_steps * error):
             break
-        problem, residual = halved, now
+        problem, residual = shorter, now
     return problem

@@ -86,9 +86,22 @@ class Fit:
     @cached_property
     def inflation(self) -> Array:
         """Variance of each value over its variance for white residuals, (n,), at least 1."""
-        scale, jacobian = np.array([u.scale for u in self.unknowns]), self.jacobian
-        width = np.array([u.high - u.low for u in self.unknowns])
+        scale, width = self._scales
+        jacobian = self.jacobian
         return _inflation(self.residual, jacobian, scale, _inverse(jacobian, scale, width)[0])
+
+    @property
+    def _scales(self) -> tuple[Array, Array]:
+        """Scale of each unknown, and the distance between its bounds, (n,) each."""
+        found = np.array([(u.scale, u.high - u.low) for u in self.unknowns]).reshape(-1, 2)
+        return found[:, 0], found[:, 1]
+
+    def moved_by(self, change: Array) -> Array:
+        """How far a change (m,) of the residual moves each value, (n,), by the slopes."""
+        scale, width = self._scales
+        inverse, _ = _inverse(self.jacobian, scale, width)
+        along = np.array([float(column @ change) for column in self.slopes])
+        return np.asarray(-(inverse @ (along * scale)) * scale)
 
     @property
     def std(self) -> dict[str, float]:

@@ -63,6 +63,13 @@ class Builder(Protocol):
     def isolation(self) -> Isolation | None:
         """Limits of the process in which the FMUs run; None: the process that uses them."""
 
+    @property
+    def coupling(self) -> float:
+        """Longest time between two readings of the ports by effects, s; 0 if these are part of the FMU."""
+
+    def coupled_every(self, step: float) -> Builder:
+        """The same with effects that read the ports every so many s."""
+
     def outside(self) -> Outside:
         """Ports, parameters and inputs of the FMU at which effects can be placed."""
 
@@ -106,7 +113,7 @@ class Problem:
 
     def plant_with(self, outputs: tuple[str, ...]) -> Plant:
         """The same with other outputs."""
-        builder = self.builder
+        builder = self.builder.coupled_every(self.steps.coupled) if self.steps.coupled else self.builder
         return PLANTS.get(builder(self.effects), self.record.inputs, outputs, builder.isolation)
 
     @property
@@ -188,6 +195,10 @@ class Problem:
     def with_effects(self, effects: Sequence[tuple[str, str]]) -> Problem:
         """The same problem for the FMU with these effects built in."""
         return replace(self, effects=tuple(effects))
+
+    def in_steps(self, steps: Steps) -> Problem:
+        """The same problem, simulated in other steps."""
+        return replace(self, steps=steps)
 
     def beginning(self, share: float) -> Problem:
         """The same problem, restricted to the first share of the part to identify of each run."""
