@@ -90,14 +90,14 @@ class Chain:
             early or Judgement(tuple(before), (), ""), diagnostics,
         )  # fmt: skip
         if early:
-            return self._over_forms(found)
+            return self._over_forms(found, shown)
         singles, pairs = self._search(shown).run()
         leading = [*singles[:1], *pairs[:1]]
         if again := self._late(shown, leading) or self._moved(shown.problem, leading):
             return again.run()
         found = self._answer(found, shown, before, singles, pairs)
         again = self._as_usual(shown.problem, found)
-        return again.run() if again else self._over_forms(found)
+        return again.run() if again else self._over_forms(found, shown)
 
     def _late(self, shown: Screened, leading: Sequence[Hypothesis]) -> "Chain | None":
         """The same with an offset of the outputs' clock, if the best single effect lacks one.
@@ -134,12 +134,15 @@ class Chain:
         self.tell("steps", "no effect explains in long steps: beginning anew with the usual ones")
         return replace(self, stages=self.stages.under("usual"), long=False)
 
-    def _over_forms(self, found: Outcome) -> Outcome:
-        """The outcome; without an answer, the errors of the calibrated FMU hold over all plausible forms."""
+    def _over_forms(self, found: Outcome, shown: Screened) -> Outcome:
+        """The outcome with errors that hold over all plausible forms of the model."""
+        shown = replace(shown, baseline=found.baseline)
+        members = tuple(shown.over_form(m) for m in found.judgement.members)
+        found = replace(found, judgement=replace(found.judgement, members=members))
         if found.chosen:
             return found
         fitter = self.fitter(found.baseline, self.jobs)
-        base = self.stages.done("forms", lambda: over_forms(fitter, found.base))
+        base = shown.over_form(self.stages.done("forms", lambda: over_forms(fitter, found.base)))
         return replace(found, baseline=replace(found.baseline, hypothesis=base))
 
     def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:

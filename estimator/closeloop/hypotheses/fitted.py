@@ -86,19 +86,19 @@ class Fit:
     @cached_property
     def inflation(self) -> Array:
         """Variance of each value over its variance for white residuals, (n,), at least 1."""
-        scale, width = self._scales
+        scale, width = self.scales
         jacobian = self.jacobian
         return _inflation(self.residual, jacobian, scale, _inverse(jacobian, scale, width)[0])
 
     @property
-    def _scales(self) -> tuple[Array, Array]:
+    def scales(self) -> tuple[Array, Array]:
         """Scale of each unknown, and the distance between its bounds, (n,) each."""
         found = np.array([(u.scale, u.high - u.low) for u in self.unknowns]).reshape(-1, 2)
         return found[:, 0], found[:, 1]
 
     def moved_by(self, change: Array) -> Array:
         """How far a change (m,) of the residual moves each value, (n,), by the slopes."""
-        scale, width = self._scales
+        scale, width = self.scales
         inverse, _ = _inverse(self.jacobian, scale, width)
         along = np.array([float(column @ change) for column in self.slopes])
         return np.asarray(-(inverse @ (along * scale)) * scale)
@@ -143,10 +143,15 @@ def stacked(columns: Sequence[Array]) -> Array:
 
 def _inverse(jacobian: Array, scale: Array, width: Array) -> tuple[Array, Array]:
     """Covariance (n, n) for white residuals, in scales, and the information that the bounds add, (n,)."""
-    prior = 12 * (scale / np.minimum(width, WIDE * scale)) ** 2
+    prior = information_of_bounds(scale, width)
     parts = (jacobian[rows] * scale for rows in blocks(len(jacobian), 8 * len(scale)))
     information = sum((j.T @ j for j in parts), np.zeros((len(scale),) * 2))
     return np.asarray(pinvh(information + np.diag(prior))), prior
+
+
+def information_of_bounds(scale: Array, width: Array) -> Array:
+    """Information (n,), in scales, of a uniform prior between bounds of this distance; see `sandwich`."""
+    return np.asarray(12 * (scale / np.minimum(width, WIDE * scale)) ** 2)
 
 
 def sandwich(residual: Array, jacobian: Array, scale: Array, width: Array) -> Array:

@@ -215,6 +215,21 @@ class Screening:
         parts = [(measured(y, run) - y)[run.fit] for y, run in runs if run.fit.any()]
         return self._weighted(np.concatenate(parts))
 
+    def weighted_as(self, weighting: Weighting, change: Array) -> Array | None:
+        """A change (m, k) of the residual with other weights; None if averages of samples do not tell it."""
+        if weighting is self.weighting:
+            return change
+        outputs = len(weighting)
+        if weighting.is_white and self.weighting.is_white:
+            by_sample = change.reshape(-1, outputs, change.shape[1])
+            return np.asarray(
+                (by_sample * (self.weighting.size / weighting.size)[:, None]).reshape(change.shape)
+            )
+        if self.group > 1:
+            return None
+        columns = (self.weighting.back(g.reshape(-1, outputs), self._stretches) for g in change.T)
+        return np.column_stack([weighting.of(y, self._stretches).ravel() for y in columns])
+
     def _weighted(self, change: Array) -> Array:
         """The change of the residual of `fit` by a change (m, n_y) of the outputs on the part to identify."""
         weighted = self.weighting.of(change, self._stretches).ravel()

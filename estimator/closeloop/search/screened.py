@@ -1,7 +1,7 @@
 """Screens all candidates against the residual of the calibrated FMU."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.detection.importance import could_be_form
+from estimator.closeloop.fitting.form_left import over_form
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose
@@ -19,6 +20,7 @@ from estimator.closeloop.hypotheses.twins import Twins
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.screening.grouped import grouped_fit
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.regressors import Calibration, alike
 from estimator.closeloop.screening.screen import Screening, screen
@@ -83,6 +85,21 @@ class Screened:
     def began(self) -> bool:
         """Whether a residual that could be a form error begins during the record."""
         return self.open_to_form and self.came() is not None
+
+    def over_form(self, h: Hypothesis) -> Hypothesis:
+        """The hypothesis with errors that allow for what the form lacks, see `form_left`.
+
+        They stay as they are where the screening cannot be weighted as the hypothesis is.
+        """
+        first: dict[str, Array] = {}
+        for c, g in self.change:
+            if not c.is_fault:
+                first.setdefault(c.label, g)
+        noise = self.baseline.noise
+        responses = [self.screening.weighted_as(noise.weighting, g) for g in first.values()]
+        known = [g for g in responses if g is not None]
+        seen = grouped_fit(h.fit, len(noise.std), self.screening.group)
+        return replace(h, fit=over_form(h.fit, seen, known, noise.known))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual, and leaves noise as far as that can be told.
