@@ -49,6 +49,12 @@ class Outcome:
         return self.judgement.members[0] if self.judgement.members else None
 
     @property
+    def rejected(self) -> list[Hypothesis]:
+        """The fitted hypotheses that are not in the answer: pairs, then single ones, best first each."""
+        answer = {m.key for m in self.judgement.members}
+        return [h for h in (*self.pairs, *self.singles) if h.key not in answer]
+
+    @property
     def probability(self) -> dict[str, float]:
         """Probability of each answer; see `probabilities`."""
         fits = [h for h in (*self.singles, *self.pairs) if h.candidates]

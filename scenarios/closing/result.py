@@ -215,7 +215,8 @@ def best_wrong(found: Outcome) -> Hypothesis | None:
     such a law contains the right effect, so its error says nothing about a wrong one.
     """
     members = found.judgement.members
-    return next((h for h in found.singles if h not in members and not _nested(h, members)), None)
+    singles = (h for h in found.rejected if len(h.candidates) == 1)
+    return next((h for h in singles if not _nested(h, members)), None)
 
 
 def _nested(h: Hypothesis, members: Sequence[Hypothesis]) -> bool:
@@ -276,14 +277,13 @@ def _figure(h: Hypothesis, name: str) -> Figure:
 def alternatives(problem: Problem, found: Outcome) -> list[Alternative]:
     """Rejected hypotheses, best first; the names of a pair of effects are joined by '+'."""
     best = found.chosen or found.base
-    rejected = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
     rows = [
         Alternative(
             "+".join(c.kind for c in h.candidates),
             "+".join(c.location for c in h.candidates),
             -found.baseline.lead(best, h)[0],
         )
-        for h in rejected
+        for h in found.rejected
     ]
     return sorted(rows, key=lambda r: -r.score)
 

@@ -48,7 +48,7 @@ def covered(lacking: float, records: int = 120) -> tuple[float, float]:
     inside = []
     for seed in range(records):
         fit, responses, true = fitted(lacking, np.random.default_rng(seed))
-        again = over_form(fit, fit, responses, declared=True)
+        again = over_form(fit, fit, responses, declared=True, trusted=0.15)
         inside.append([abs(f.values - true) < 1.96 * np.sqrt(np.diag(f.covariance)) for f in (fit, again)])
     before, after = np.mean(inside, axis=(0, 2))
     return float(before), float(after)
@@ -72,15 +72,17 @@ def test_without_such_effects_intervals_stay_as_they_are():
 def test_it_depends_on_no_size_of_a_response_and_on_no_unit(seed, lacking):
     rng = np.random.default_rng(seed)
     fit, responses, _ = fitted(lacking, rng)
-    found = over_form(fit, fit, responses, declared=True).covariance
+    found = over_form(fit, fit, responses, declared=True, trusted=0.15).covariance
     others = [g * f for g, f in zip(responses, rng.uniform(-9, 9, len(responses)), strict=True)]
-    assert over_form(fit, fit, others, declared=True).covariance == pytest.approx(found, rel=1e-6)
+    assert over_form(fit, fit, others, declared=True, trusted=0.15).covariance == pytest.approx(
+        found, rel=1e-6
+    )
     assert np.all(np.diag(found) >= np.diag(fit.covariance))
 
 
 def test_a_fit_without_unknowns_or_without_responses_stays_as_it_is():
     fit, responses, _ = fitted(5.0, np.random.default_rng(1))
     nothing = Fit((), np.zeros(0), np.zeros((0, 0)), fit.residual, ())
-    assert over_form(nothing, nothing, responses, declared=True) is nothing
-    assert over_form(fit, fit, [], declared=True) is fit
-    assert over_form(fit, fit, [0 * g for g in responses], declared=True) is fit
+    assert over_form(nothing, nothing, responses, declared=True, trusted=0.15) is nothing
+    assert over_form(fit, fit, [], declared=True, trusted=0.15) is fit
+    assert over_form(fit, fit, [0 * g for g in responses], declared=True, trusted=0.15) is fit

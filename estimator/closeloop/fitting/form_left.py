@@ -17,17 +17,17 @@ from estimator.closeloop.hypotheses.fitted import Fit, information_of_bounds
 from estimator.record import Array
 from fmus.aside import blocks
 
-SHORT = 1e-6  # noise units: a shorter response is none
-ROUNDING = 1e-8  # of the largest eigenvalue, below which one is not told from zero
+NO_LENGTH = 1e-6  # noise units: a shorter response is none
 VARIANCES = np.geomspace(1e-4, 1e10, 281)  # of the factors, squared units of the noise, that are tried
 
 
-def over_form(fit: Fit, seen: Fit, responses: Sequence[Array], declared: bool) -> Fit:
+def over_form(fit: Fit, seen: Fit, responses: Sequence[Array], declared: bool, trusted: float) -> Fit:
     """The fit with a covariance that includes how far the form may have moved its values.
 
     seen: the same fit with the samples (m,) of the responses, (m, k) each; declared: whether the noise is, so
-    that no less than it can be noise in the residual. The fit stays as it is if the residual does not show
-    that the form lacks something.
+    that no less than it can be noise in the residual; trusted: share by which linear responses may be wrong,
+    below which what is left of them is nothing. The fit stays as it is if the residual does not show that the
+    form lacks something.
     """
     if not seen.unknowns or not responses:
         return fit
@@ -35,7 +35,7 @@ def over_form(fit: Fit, seen: Fit, responses: Sequence[Array], declared: bool) -
     if not len(along):
         return fit
     values, vectors = np.linalg.eigh(left)
-    told = values > ROUNDING * values[-1]
+    told = values > trusted**2
     values, squares = values[told], (vectors[:, told].T @ along) ** 2 / values[told]
     mean = float(seen.residual @ seen.residual) / len(seen.residual)
     variance = _variance(values, squares, max(mean, 1.0) if declared else mean)
@@ -56,7 +56,7 @@ def _split(seen: Fit, responses: Sequence[Array]) -> tuple[Array, Array, Array]:
         part = np.column_stack([*slopes, *(g[rows] for g in responses), seen.residual[rows]])
         products += part.T @ part
     own, length = products[:n, :n], np.sqrt(np.diag(products)[n:-1])
-    some = np.flatnonzero(length > SHORT) + n
+    some = np.flatnonzero(length > NO_LENGTH) + n
     unit = np.sqrt(np.diag(products)[some])
     shared = products[:n, some] / unit
     moved = np.linalg.pinv(own + np.diag(information_of_bounds(scale, bounds)), hermitian=True) @ shared
@@ -70,10 +70,11 @@ def _variance(values: Array, squares: Array, noise: float) -> float:
     """The variance of the factors with the largest marginal likelihood; 0 if it is no better than none.
 
     values: eigenvalues (k,) of the parts of the responses that are left; squares: (k,) of the residual along
-    them, independent and of the variance noise + value * variance. One more unknown has to be worth one unit
-    (H. Akaike, IEEE Trans. Automatic Control 19 (1974), 716-723).
+    them, independent and of the variance noise + value * variance. The unknown has to be worth its price by
+    the criterion of G. Schwarz, Annals of Statistics 6 (1978), 461-464.
     """
     spread = noise + np.multiply.outer([0.0, *VARIANCES], values)
     surprise = 0.5 * np.sum(np.log(spread) + squares / spread, axis=1)
     best = int(np.argmin(surprise))
-    return float(VARIANCES[best - 1]) if surprise[0] - surprise[best] > 1 else 0.0
+    worth = surprise[0] - surprise[best] > np.log(max(len(values), 1)) / 2
+    return float(VARIANCES[best - 1]) if worth else 0.0

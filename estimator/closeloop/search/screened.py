@@ -99,7 +99,8 @@ class Screened:
         responses = [self.screening.weighted_as(noise.weighting, g) for g in first.values()]
         known = [g for g in responses if g is not None]
         seen = grouped_fit(h.fit, len(noise.std), self.screening.group)
-        return replace(h, fit=over_form(h.fit, seen, known, noise.known))
+        trusted = self.problem.policy.interval.bent
+        return replace(h, fit=over_form(h.fit, seen, known, noise.known, trusted))
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual, and leaves noise as far as that can be told.

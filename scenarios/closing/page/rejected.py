@@ -34,8 +34,7 @@ class Rejected:
 def rejected(problem: Problem, found: Outcome) -> list[Rejected]:
     """All rejected hypotheses in the order of their score on the part to choose, best first."""
     best = found.chosen or found.base
-    others = [h for h in (*found.pairs, *found.singles) if h not in found.judgement.members]
-    others.sort(key=lambda h: found.baseline.lead(best, h)[0])
+    others = sorted(found.rejected, key=lambda h: found.baseline.lead(best, h)[0])
     return [_row(problem, found, h) for h in others]
 
 
