@@ -20,7 +20,12 @@ from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.refined import arrived
-from estimator.closeloop.fitting.resolution import in_fine_steps, in_long_steps, long_steps_hold
+from estimator.closeloop.fitting.resolution import (
+    in_fine_steps,
+    in_long_steps,
+    long_steps_hold,
+    over_steps,
+)
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -135,9 +140,9 @@ class Chain:
         return replace(self, stages=self.stages.under("usual"), long=False)
 
     def _over_forms(self, found: Outcome, shown: Screened) -> Outcome:
-        """The outcome with errors that hold over all plausible forms of the model."""
+        """The outcome with errors that allow for the steps of the simulation and the form of the model."""
         shown = replace(shown, baseline=found.baseline)
-        members = tuple(shown.over_form(m) for m in found.judgement.members)
+        members = tuple(shown.over_form(over_steps(found.baseline, m)) for m in found.judgement.members)
         found = replace(found, judgement=replace(found.judgement, members=members))
         if found.chosen:
             return found

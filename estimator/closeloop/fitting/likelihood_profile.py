@@ -16,7 +16,7 @@ from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.profile_trace import WIDTH, ends
 from estimator.closeloop.fitting.refined import from_declared, lower, refined
-from estimator.closeloop.fitting.resolution import error_of_steps, in_divided_steps
+from estimator.closeloop.fitting.resolution import in_divided_steps
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.fitting.slopes_within_error import within_error
 from estimator.closeloop.fitting.transition import unresolved, with_duration
@@ -34,8 +34,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     """The hypothesis with the standard errors of its reported parameters widened to the likelihood profile.
 
     These are the parameters of its laws and the calibrated ones. Its covariance is that of slopes within the
-    errors (see `within_error`), and the wider side of each interval counts; the error that is left of the
-    steps of the simulation is added. If the profile finds a lower sum
+    errors (see `within_error`), and the wider side of each interval counts. If the profile finds a lower sum
     of squares, the hypothesis is fitted again from there, and its former values count as a place in the
     interval. Onset times are evaluated on a grid, because the sum of squares has many local minima over them.
     """
@@ -57,8 +56,7 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     open_by_shape = unresolved(h)
     wide = np.hypot(wide, [open_by_shape.get(u.name, 0.0) for u in h.fit.unknowns])
     factors = np.divide(wide, error, out=np.ones_like(error), where=error > 0)
-    by_steps = error_of_steps(built(problem, h.candidates), h, weighting)
-    covariance = h.fit.covariance * np.outer(factors, factors) + np.outer(by_steps, by_steps)
+    covariance = h.fit.covariance * np.outer(factors, factors)
     return over_forms(fitter, replace(h, fit=replace(h.fit, covariance=covariance)))
 
 

@@ -26,6 +26,8 @@ from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array
 from estimator.weighting import Weighting
 
+SKIPPED = 10.0  # usual couplings that a long step may go over; laws that answer late find other answers
+
 
 def in_long_steps(problem: Problem) -> Problem:
     """The problem in the longest steps that its FMU has: over several samples, or coupled once in a sample.
@@ -35,7 +37,7 @@ def in_long_steps(problem: Problem) -> Problem:
     if problem.plant.joins(problem.record.runs):
         return replace(problem, steps=JOINED, searched=JOINED)
     sample = min(run.sample for run in problem.record.runs)
-    if not 0 < problem.builder.coupling < sample:
+    if not problem.builder.coupling < sample <= SKIPPED * problem.builder.coupling:
         return problem
     rare = Steps(coupled=sample)
     return replace(problem, steps=rare, searched=rare)
@@ -82,6 +84,12 @@ def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting)
     for h in some:
         problem = _resolved(problem, h, weighting)
     return problem
+
+
+def over_steps(baseline: Baseline, h: Hypothesis) -> Hypothesis:
+    """The hypothesis with the error that the steps of the simulation leave in its covariance."""
+    error = error_of_steps(built(baseline.problem, h.candidates), h, baseline.noise.weighting)
+    return replace(h, fit=replace(h.fit, covariance=h.fit.covariance + np.outer(error, error)))
 
 
 def error_of_steps(problem: Problem, h: Hypothesis, weighting: Weighting) -> Array:
