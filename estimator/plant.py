@@ -25,14 +25,11 @@ class Steps(NamedTuple):
     """The steps of a simulation: parts into which each usual step is divided, and what acts over them.
 
     joined: whether a step goes over four parts and knows its inputs within them, for which the FMU must be
-    one of ours, see `Fmu.simulate_rows`. If not, the mean of its inputs acts over each part. coupled: the
-    longest time between two readings of a foreign FMU's ports, s, 0 for the usual one; it is a matter of the
-    build that a plant runs, see `Problem.plant`.
+    one of ours, see `Fmu.simulate_rows`. If not, the mean of its inputs acts over each part.
     """
 
     parts: int = 1
     joined: bool = False
-    coupled: float = 0.0
 
     @property
     def halved(self) -> "Steps":

@@ -22,8 +22,8 @@ from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.refined import arrived
 from estimator.closeloop.fitting.resolution import (
     in_fine_steps,
-    in_long_steps,
-    long_steps_hold,
+    in_joined_steps,
+    joined_steps_hold,
     over_steps,
 )
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
@@ -74,7 +74,6 @@ class Chain:
     stages: Stages
     fitter: Callable[[Baseline, int], Fitter]
     moved: bool = False  # whether the part to choose was moved away from the moment of an effect
-    long: bool = True  # whether steps may be longer than the usual ones
 
     def run(self) -> Outcome:
         """Calibrate, detect, search, decide, and check the answer on the test part."""
@@ -100,9 +99,7 @@ class Chain:
         leading = [*singles[:1], *pairs[:1]]
         if again := self._late(shown, leading) or self._moved(shown.problem, leading):
             return again.run()
-        found = self._answer(found, shown, before, singles, pairs)
-        again = self._as_usual(shown.problem, found)
-        return again.run() if again else self._over_forms(found, shown)
+        return self._over_forms(self._answer(found, shown, before, singles, pairs), shown)
 
     def _late(self, shown: Screened, leading: Sequence[Hypothesis]) -> "Chain | None":
         """The same with an offset of the outputs' clock, if the best single effect lacks one.
@@ -132,13 +129,6 @@ class Chain:
                 return replace(self, problem=other, stages=self.stages.under("moved"), moved=True)
         return None
 
-    def _as_usual(self, searched: Problem, found: Outcome) -> "Chain | None":
-        """The same in usual steps, where a foreign FMU was coupled too rarely to show its effect."""
-        if not searched.steps.coupled or found.judgement.verdict != "unexplained":
-            return None
-        self.tell("steps", "no effect explains in long steps: beginning anew with the usual ones")
-        return replace(self, stages=self.stages.under("usual"), long=False)
-
     def _over_forms(self, found: Outcome, shown: Screened) -> Outcome:
         """The outcome with errors that allow for the steps of the simulation and the form of the model."""
         shown = replace(shown, baseline=found.baseline)
@@ -151,13 +141,13 @@ class Chain:
         return replace(found, baseline=replace(found.baseline, hypothesis=base))
 
     def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
-        """The problem and what `calibrate` finds, in the longest steps if these hold."""
-        long = in_long_steps(self.problem) if self.long else self.problem
-        found = self._in_steps(long, self.stages)
+        """The problem and what `calibrate` finds, in steps that join several samples if these hold."""
+        joined = in_joined_steps(self.problem)
+        found = self._in_steps(joined, self.stages)
         problem, _, base, noise = found
-        if long is self.problem or long_steps_hold(problem, base, noise.weighting):
+        if joined is self.problem or joined_steps_hold(problem, base, noise.weighting):
             return found
-        self.tell("steps", "calibrating in shorter steps")
+        self.tell("steps", "calibrating in steps of one sample")
         return self._in_steps(self.problem, self.stages.under("held"))
 
     def _in_steps(self, problem: Problem, stages: Stages) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
@@ -216,7 +206,7 @@ class Chain:
             words = self.stages.done("next experiment", lambda: next_experiment(baseline, members, twins))
             judgement = replace(judgement, next_experiment=words)
         found = replace(found, judgement=judgement)
-        if judgement.verdict != "unexplained" or shown.problem.steps.coupled:
+        if judgement.verdict != "unexplained":
             return found
         self.tell("free form", "fitting a force of free form")
         fitter = self.fitter(baseline, self.jobs)

@@ -20,7 +20,7 @@ def notes_of(problem: Problem, found: Outcome, rms: Mapping[str, Array]) -> list
 
 def _steps(problem: Problem) -> list[str]:
     """A note if the steps of the simulation had to be divided."""
-    if problem.steps.parts == problem.searched.parts:
+    if problem.steps == problem.searched:
         return []
     return [
         f"the usual steps of the simulation were divided by {problem.steps.parts} for the answer, because "

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,22 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.model_form import gap_closed
-from estimator.closeloop.evidence import Verdict
 from estimator.closeloop.fitting.fit import fit
-from estimator.closeloop.fitting.fitter import Fitter
-from estimator.closeloop.fitting.resolution import in_long_steps
 from estimator.closeloop.hypotheses.fitted import sandwich
-from estimator.closeloop.pipeline import Chain
-from estimator.closeloop.progress import Progress
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.levers import Course, shifts
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.pushes import pushed
 from estimator.closeloop.screening.screen import screen
 from estimator.noise import correlation_time, noise_floor
-from estimator.plant import USUAL, Steps
 from estimator.record import Record, Run
 from estimator.sensor_faults import FAULTS, faulty
 from estimator.weighting import Weighting
@@ -84,31 +75,6 @@ def test_several_simulations_are_each_as_one(drive: ForeignBuilder, tmp_path: Pa
         here = replace(asked, builder=builder)
         for found, theta in zip(here.several_residuals(thetas), thetas, strict=True):
             assert_allclose(found, here.residuals(theta), rtol=1e-12, atol=1e-15)
-
-
-def test_a_foreign_fmu_that_is_coupled_rarely_moves_alone_as_before_and_with_an_effect_nearly_so(
-    drive,
-) -> None:
-    asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(3))
-    damped = asked.with_effects([("viscous_damping", "carriage")])
-    rare = in_long_steps(asked).steps
-    assert rare == Steps(coupled=pytest.approx(DT))
-    [alone], [now] = asked.simulate({}), asked.in_steps(rare).simulate({})
-    assert_allclose(now, alone, rtol=1e-9, atol=1e-12)
-    theta = {"viscous_damping_carriage_c": 200.0}  # as much as the drive has itself
-    [often], [now] = damped.simulate(theta), damped.in_steps(rare).simulate(theta)
-    assert 0 < np.max(np.abs(now - often)) < 0.02 * np.max(np.abs(often - alone))
-
-
-@pytest.mark.parametrize("verdict", get_args(Verdict))
-@pytest.mark.parametrize("rare", [False, True])
-def test_what_no_effect_explains_in_long_steps_is_sought_in_the_usual_ones(drive, verdict, rare) -> None:
-    asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(3))
-    chain = Chain(asked, Progress(lambda _: None), 1, 0, Stages(), Fitter)
-    searched = in_long_steps(asked) if rare else asked
-    again = chain._as_usual(searched, SimpleNamespace(judgement=SimpleNamespace(verdict=verdict)))
-    assert (again is not None) is (rare and verdict == "unexplained")
-    assert again is None or (again.long, again.problem.steps) == (False, USUAL)
 
 
 def test_the_missing_force_is_recovered_within_its_own_error(drive: ForeignBuilder) -> None:

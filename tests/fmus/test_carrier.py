@@ -73,17 +73,6 @@ def test_both_containers_move_alike(base, kind, tmp_path):
         assert np.max(np.abs(off[:, 0] - found[:, 0])) > 1e-4  # the effect acts
 
 
-@pytest.mark.parametrize("step", [1e-4, 2e-2])
-def test_both_containers_read_the_ports_as_often_as_asked_for(base, step, tmp_path):
-    effects, values = EFFECTS["laws at a port"]
-    native = build_carrier(base, (PORT,), effects, tmp_path / "native.fmu", step)
-    python = build_coupled(base, (PORT,), effects, tmp_path / "python.fmu", step=step)
-    found = motion(native, values)
-    assert found == pytest.approx(motion(python, values), rel=1e-12, abs=1e-15)
-    usual = motion(build_carrier(base, (PORT,), effects, tmp_path / "usual.fmu"), values)
-    assert 0 < np.max(np.abs(found - usual)) < 0.05 * np.max(np.abs(usual))
-
-
 @pytest.mark.parametrize("velocity", ["q_dot", "q_ddot"])
 def test_a_motion_that_an_input_changes_at_once_is_read_after_it(base, velocity, tmp_path):
     """The carrier reads the motion once a step only where no input acts on it directly."""

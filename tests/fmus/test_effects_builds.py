@@ -15,6 +15,7 @@ from fmus.errors import BadInput
 from fmus.export.around.outside import Outside
 from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
 from fmus.export.builders.pythonfmu import build_python
+from fmus.export.container import coupled
 from fmus.export.container.coupled import build_coupled
 from fmus.host.archive import describe
 from fmus.host.description import PortNames
@@ -145,11 +146,12 @@ def test_an_effect_that_is_off_changes_no_run(text, drive, own):
         ("viscous_damping@carriage", 1, 2e-3),
     ],
 )
-def test_the_coupling_error_falls_by_its_order(text, order, step, drive, own, tmp_path):
+def test_the_coupling_error_falls_by_its_order(text, order, step, drive, own, tmp_path, monkeypatch):
     expected, error = run(own(text), started(text)), []
     for dt in (step, step / 2):
+        monkeypatch.setattr(coupled, "COUPLING_STEP", dt)
         kind, location = text.split("@")
-        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{dt}.fmu", step=dt)
+        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{dt}.fmu")
         error.append(np.abs(run(made, started(text)) - expected).max())
     assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.2)
 

@@ -48,16 +48,15 @@ def _split(seen: Fit, responses: Sequence[Array]) -> tuple[Array, Array, Array]:
     How far each of K responses moves each of n values, (n, K); products of the parts that are left with each
     other, (K, K); and with the residual, (K,).
     """
-    n, width = len(seen.unknowns), sum(g.shape[1] for g in responses)
-    scale, bounds = seen.scales
-    products = np.zeros((n + width + 1,) * 2)
+    n, (scale, bounds) = len(seen.unknowns), seen.scales
+    products = np.zeros((n + sum(g.shape[1] for g in responses) + 1,) * 2)
     for rows in blocks(len(seen.residual), 8 * len(products)):
         slopes = (column[rows] * s for column, s in zip(seen.slopes, scale, strict=True))
         part = np.column_stack([*slopes, *(g[rows] for g in responses), seen.residual[rows]])
         products += part.T @ part
-    own, length = products[:n, :n], np.sqrt(np.diag(products)[n:-1])
-    some = np.flatnonzero(length > NO_LENGTH) + n
-    unit = np.sqrt(np.diag(products)[some])
+    own, length = products[:n, :n], np.sqrt(np.diag(products))
+    some = n + np.flatnonzero(length[n:-1] > NO_LENGTH)
+    unit = length[some]
     shared = products[:n, some] / unit
     moved = np.linalg.pinv(own + np.diag(information_of_bounds(scale, bounds)), hermitian=True) @ shared
     left = products[np.ix_(some, some)] / np.outer(unit, unit) - shared.T @ moved - moved.T @ shared

@@ -2,7 +2,7 @@
 
 Hypotheses are searched in the longest steps that move no unknown of any hypothesis. For an FMU of ours, these
 join several samples and know the inputs within a step, which is more accurate than steps of one sample over
-which inputs are held, and takes less time. The effects around a foreign FMU read its ports once in a sample.
+which inputs are held, and takes less time.
 
 An effect can make the equations stiffer than those of the FMU without it. Friction that is rounded over a
 millimetre per second does so. With the usual step, the integration then adds an error of its own, and the fit
@@ -22,43 +22,32 @@ from estimator.closeloop.hypotheses.fitted import relaxed
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
-from estimator.plant import JOINED, USUAL, Steps
+from estimator.plant import JOINED, USUAL
 from estimator.record import Array
 from estimator.weighting import Weighting
 
-SKIPPED = 10.0  # usual couplings that a long step may go over; laws that answer late find other answers
+
+def in_joined_steps(problem: Problem) -> Problem:
+    """The problem in steps over several samples; the problem itself if its FMU has no such steps."""
+    joins = problem.plant.joins(problem.record.runs)
+    return replace(problem, steps=JOINED, searched=JOINED) if joins else problem
 
 
-def in_long_steps(problem: Problem) -> Problem:
-    """The problem in the longest steps that its FMU has: over several samples, or coupled once in a sample.
-
-    The problem itself if these are the usual ones.
-    """
-    if problem.plant.joins(problem.record.runs):
-        return replace(problem, steps=JOINED, searched=JOINED)
-    sample = min(run.sample for run in problem.record.runs)
-    if not problem.builder.coupling < sample <= SKIPPED * problem.builder.coupling:
-        return problem
-    rare = Steps(coupled=sample)
-    return replace(problem, steps=rare, searched=rare)
-
-
-def long_steps_hold(long: Problem, base: Hypothesis, weighting: Weighting) -> bool:
-    """Whether such steps are exact on a record, and what is left does not come from them.
+def joined_steps_hold(joined: Problem, base: Hypothesis, weighting: Weighting) -> bool:
+    """Whether steps over several samples are exact on a record, and what is left does not come from them.
 
     base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
-    it is long, whatever the slopes of the unknown are. How long it is, shorter steps show.
+    it is long, whatever the slopes of the unknown are. How long it is, steps of half the length show.
     """
-    here, shorter = (weighted(p, base.theta, weighting) for p in (long, in_shorter_steps(long)))
-    if not float(np.linalg.norm(here - shorter)) <= long.policy.search.moved_by_steps:
+    here, halved = (weighted(p, base.theta, weighting) for p in (joined, in_halved_steps(joined)))
+    if not float(np.linalg.norm(here - halved)) <= joined.policy.search.moved_by_steps:
         return False
-    return not (long.steps.joined and inputs_held(long, base, weighting))
+    return not inputs_held(joined, base, weighting)
 
 
-def in_shorter_steps(problem: Problem) -> Problem:
-    """The problem in steps of half the length; a foreign FMU is first coupled as often as usual."""
-    steps = problem.steps
-    return problem.in_steps(steps._replace(coupled=0.0) if steps.coupled else steps.halved)
+def in_halved_steps(problem: Problem) -> Problem:
+    """The problem in steps of half the length."""
+    return problem.in_steps(problem.steps.halved)
 
 
 def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
@@ -77,7 +66,7 @@ def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
 
 
 def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting) -> Problem:
-    """The problem with its steps shortened until this would no longer move an unknown of the hypotheses.
+    """The problem with its steps halved until this would no longer move an unknown of the hypotheses.
 
     How far an unknown would move follows from the slopes of its fit, without another fit.
     """
@@ -93,14 +82,14 @@ def over_steps(baseline: Baseline, h: Hypothesis) -> Hypothesis:
 
 
 def error_of_steps(problem: Problem, h: Hypothesis, weighting: Weighting) -> Array:
-    """Error (n,) of each fitted value that comes from the steps of the simulation, as shorter ones show it.
+    """Error (n,) of each fitted value that comes from the steps of the simulation, as halved ones show it.
 
     problem: with the effects of h. Steps of half the length halve an error of first order, so that there is
     twice as much of it as they take away; in steps over several samples it is of fourth order. Zero if the
-    record rejects shorter steps, because they change what the FMU receives.
+    record rejects halved steps, because they change what the FMU receives.
     """
-    shorter = in_shorter_steps(problem)
-    now, before = weighted(shorter, h.theta, weighting), h.fit.residual
+    halved = in_halved_steps(problem)
+    now, before = weighted(halved, h.theta, weighting), h.fit.residual
     again = relaxed(h.fit, now)
     if is_worse(again, before, problem):
         return np.zeros(len(h.fit.unknowns))
@@ -128,12 +117,8 @@ def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
     finer = resolved(before, some, weighting)
     if finer.steps == before.steps:
         return before
-    # a foreign FMU receives the same inputs, however often it is coupled
-    undivided = before.in_steps(finer.steps._replace(parts=before.steps.parts))
-    if finer.steps == undivided.steps:
-        return finer
     again = in_divided_steps(fitter.asked(finer), best)
-    return undivided if rejected(fitter.baseline, best, again) else finer
+    return before if rejected(fitter.baseline, best, again) else finer
 
 
 def rejected(baseline: Baseline, h: Hypothesis, again: Hypothesis) -> bool:
@@ -162,10 +147,10 @@ def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
     residual = weighted(here, h.theta, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
     while problem.steps.parts < limits.parts_of_a_step:
-        shorter = in_shorter_steps(problem)
-        now = weighted(built(shorter, h.candidates), h.theta, weighting)
+        halved = in_halved_steps(problem)
+        now = weighted(built(halved, h.candidates), h.theta, weighting)
         moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
         if np.all(np.abs(moved) <= limits.moved_by_steps * error):
             break
-        problem, residual = shorter, now
+        problem, residual = halved, now
     return problem

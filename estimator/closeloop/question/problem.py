@@ -63,13 +63,6 @@ class Builder(Protocol):
     def isolation(self) -> Isolation | None:
         """Limits of the process in which the FMUs run; None: the process that uses them."""
 
-    @property
-    def coupling(self) -> float:
-        """Longest time between two readings of the ports by effects, s; 0 if these are part of the FMU."""
-
-    def coupled_every(self, step: float) -> Builder:
-        """The same with effects that read the ports every so many s."""
-
     def outside(self) -> Outside:
         """Ports, parameters and inputs of the FMU at which effects can be placed."""
 
@@ -113,7 +106,7 @@ class Problem:
 
     def plant_with(self, outputs: tuple[str, ...]) -> Plant:
         """The same with other outputs."""
-        builder = self.builder.coupled_every(self.steps.coupled) if self.steps.coupled else self.builder
+        builder = self.builder
         return PLANTS.get(builder(self.effects), self.record.inputs, outputs, builder.isolation)
 
     @property
