@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.effects.input_effect import WHOLE, InputEffect
+from fmus.effects.timing import over_samples
 from fmus.variables import Expr, Parameter, State
 
 LAGS = (0.02, 0.1, 0.5)  # s, of actuators on vehicles and rigs
@@ -43,4 +44,4 @@ class ActuatorLag(InputEffect):
     @classmethod
     def guesses(cls, t: NDArray[np.float64], u: NDArray[np.float64]) -> list[dict[str, float]]:
         """See InputEffect.guesses: time constants over the decades, at rest at the first sample."""
-        return [{"T": T, "u_0": float(u[0])} for T in LAGS]
+        return [{"T": T, "u_0": float(u[0])} for T in over_samples(LAGS, t)]

@@ -63,9 +63,13 @@ class FlexibleMode(ForceLaw):
 
     @classmethod
     def shapes(cls, t: Array, q: Array, v: Array, force: Array) -> list[dict[str, float]]:
-        """See ForceLaw.shapes: lines of the force's spectrum over time, and frequencies between them."""
+        """See ForceLaw.shapes: lines of the force's spectrum over time, and frequencies between them.
+
+        None where the samples are too far apart to show a mode.
+        """
         highest = min(PER_SAMPLE / float(np.median(np.diff(t))), HIGHEST)
-        grid = np.geomspace(LOWEST, highest, int(np.log(highest / LOWEST) / np.log(APART)) + 1)
+        count = int(np.log(max(highest / LOWEST, 1.0)) / np.log(APART))
+        grid = np.geomspace(LOWEST, highest, count + 1) if count else np.array([])
         found = [f for f in frequencies(t, v, force) if LOWEST < f < highest]
         more = {"D": cls.D.start, "v_0": float(v[0])}
         return [{"f": float(f), **more} for f in (*found, *grid)]

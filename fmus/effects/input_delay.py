@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.effects.input_effect import WHOLE, InputEffect
+from fmus.effects.timing import over_samples
 from fmus.variables import Expr, Parameter, State
 
 DELAYS = (0.03, 0.1, 0.3)  # s
@@ -69,5 +70,5 @@ class InputDelay(InputEffect):
 
     @classmethod
     def guesses(cls, t: NDArray[np.float64], u: NDArray[np.float64]) -> list[dict[str, float]]:
-        """See InputEffect.guesses: delays over the decades, at rest at the first sample."""
-        return [{"T": T, "u_0": float(u[0])} for T in DELAYS]
+        """See InputEffect.guesses: delays over a decade, at rest at the first sample."""
+        return [{"T": T, "u_0": float(u[0])} for T in over_samples(DELAYS, t)]

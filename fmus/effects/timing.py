@@ -1,11 +1,20 @@
 """A change at a time, rounded so that integrators and fits can follow it."""
 
 import casadi as cs
+import numpy as np
+from numpy.typing import NDArray
 
 from fmus.variables import Expr, Parameter
 
 RISE = 0.02  # s, of a change at a time: two samples of a usual record, four steps of the stiff model
 SHORTEST, LONGEST = 1e-4, 1.0  # s, limits of how long a change may take
+USUAL = 0.01  # s, between samples; times that are tried are longer where these are further apart
+
+
+def over_samples(times: tuple[float, ...], t: NDArray[np.float64]) -> list[float]:
+    """Times to try, s, for samples at t (N,): longer in proportion where these are far apart."""
+    longer = max(1.0, float(np.median(np.diff(t))) / USUAL)
+    return [longer * time for time in times]
 
 
 def start_time() -> Parameter:

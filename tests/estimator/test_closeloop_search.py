@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label
@@ -26,7 +27,7 @@ from estimator.closeloop.screening.linear import (
 )
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration
-from estimator.closeloop.screening.screen import screen
+from estimator.closeloop.screening.screen import Screening, screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search import search
 from estimator.closeloop.search.lookalikes import lookalikes
@@ -35,9 +36,11 @@ from estimator.closeloop.search.onset import ONSET_BLOCKS, onset
 from estimator.closeloop.search.simpler import from_the_start, in_groups
 from estimator.plant import between
 from estimator.record import Record, Run
+from estimator.weighting import Weighting
 from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.models import MODELS
 from tests.helpers.baselines import baseline, fit_with
+from tests.helpers.foreign import GOOD
 from tests.helpers.native import native
 from tests.helpers.problems import Always, OneByOne, record_with
 
@@ -134,6 +137,21 @@ def test_what_a_parameter_changes_is_what_a_simulation_says(lever, share):
     moved = plant.simulate(rest, {**start, lever: value * (1 - h)})
     exact = (plant.simulate(rest, start) - moved) / (h * value)
     assert np.linalg.norm(linear - exact) < 0.03 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize(("largest", "followed"), [(1e9, True), (0.5, True), (1e-4, False)])
+def test_a_change_that_an_fmu_cannot_follow_is_told_by_a_small_share_of_it(foreign, largest, followed):
+    """x' = -k x + u, which refuses inputs above a limit, pushed by 1; any share tells as it is linear."""
+    step = f"if abs(self.u) > {largest}:\n    return False\n{GOOD}"
+    t = np.arange(0.0, 4.0, 0.02)
+    every = np.ones(len(t), bool)
+    run = Run(t, np.zeros((len(t), 1)), np.zeros((len(t), 1)), every, ~every, ~every)
+    record = Record((run,), ("u",), ("x",), np.ones(1))
+    problem, weighting = Problem(Always(foreign(step)), record, {"x": 0.0}, {}), Weighting.white(np.ones(1))
+    screening = Screening(problem, fit(problem, [Unknown("k", 2.0, 1.0, 3.0, 0.1)], weighting), weighting)
+    change = screening._simulated({"u": np.ones(len(screening.samples))})
+    expected = -(1 - 0.96 ** np.arange(len(t))) / 2 if followed else np.zeros(len(t))
+    assert_allclose(change, expected, atol=1e-9)
 
 
 def test_another_form_of_a_law_is_no_effect_that_is_looked_for():

@@ -194,3 +194,19 @@ def test_a_line_is_found_beside_slow_noise_of_more_power(f, seed):
     force = 5.0 * slow / slow.std() + np.sin(2 * np.pi * f * t)
     found = frequencies(t, rng.standard_normal(len(t)), force)
     assert min(abs(x - f) for x in found) < 0.01
+
+
+@pytest.mark.parametrize("kind", sorted(EFFECTS))
+@pytest.mark.parametrize("dt", [1e-5, 1e-3, 0.1, 4.0, 3600.0])
+def test_what_is_tried_is_allowed_however_far_apart_the_samples_are(kind, dt):
+    effect, t = EFFECTS[kind], np.arange(600) * dt
+    w = 2 * np.pi / (100 * dt)
+    q, v = np.sin(w * t), w * np.cos(w * t)
+    asked = {"port": (q, v, -v - q**3), "input": (q,)}
+    shapes = effect.guesses(t, *asked.get(effect.acts_on, ()))
+    assert shapes or kind == "flexible_mode"  # which samples of a second do not show
+    for name, value in (item for shape in shapes for item in shape.items()):
+        p = getattr(effect, name)
+        assert np.isfinite(value)
+        assert p.min is None or value >= p.min
+        assert p.max is None or value <= p.max

@@ -23,6 +23,7 @@ class OneByOne:
 
     at_once = 1
     steps = searched = USUAL
+    coupling = 0.0  # s, as of an FMU of ours
     other_forms = ()
 
     def identify_residuals(self, thetas):
@@ -42,6 +43,11 @@ class Always:
 
     fmu: Path
     isolation = None
+    coupling = 0.0
+
+    def coupled_every(self, step: float) -> "Always":
+        """See Builder."""
+        return self
 
     def __call__(self, effects: tuple[tuple[str, str], ...]) -> Path:
         """See Builder."""

@@ -38,6 +38,7 @@ from estimator.weighting import Weighting
 from fmus.aside import all_set_aside, by_rows, set_aside
 from fmus.effects.site import SPEED
 from fmus.export.around.outside import Around, around
+from fmus.host.fmu import FmuError
 
 USABLE = 1e-9  # share of a regressor's length after projection, below which it is not used
 
@@ -57,6 +58,7 @@ CHANGES_AT_ONCE = 32  # largest number of responses that are computed together
 TOGETHER = 1 << 27  # bytes of the outputs that belong to them
 
 
+SHARES_TRIED = (1.0, 1e-3)  # of a change, of which the first is simulated that the FMU can follow
 RUNAWAY = 1e9  # weighted residual above which the linearised response is taken as diverged
 
 
@@ -187,14 +189,27 @@ class Screening:
         return self._local
 
     def _simulated(self, change: Mapping[str, Array]) -> Array:
-        """The same change of the residual, by a simulation with the changed inputs and parameters."""
+        """The same change of the residual, by a simulation with the changed inputs and parameters.
+
+        An FMU may not be able to follow a change. A small share of it then tells the response to all of it;
+        a change of which it cannot follow even that has none.
+        """
+        for share in SHARES_TRIED:
+            try:
+                with np.errstate(over="ignore", invalid="ignore"):  # of a change that grows without limit
+                    return self._simulated_share(change, share) / share
+            except FmuError:
+                continue
+        return np.zeros_like(self._weighted(self._unchanged[self.problem.record.runs[0].fit]))
+
+    def _simulated_share(self, change: Mapping[str, Array], share: float) -> Array:
         problem = self.problem
         run, plant, start = problem.record.runs[0], problem.plant, problem.start(self.theta)
         known = plant.fmu.description.variables
         push = {}
         for name, samples in change.items():
             rest = 0.0 if name in plant.inputs else start.get(name, known[name].start or 0.0)
-            push[name] = rest + np.interp(np.arange(len(run.t)), self.samples, samples)
+            push[name] = rest + share * np.interp(np.arange(len(run.t)), self.samples, samples)
         moved = plant.simulate(run, start, push=push, steps=problem.steps) - self._unchanged
         return self._weighted(moved[run.fit])
 
