@@ -16,7 +16,6 @@ from fmus.export.around.effects_alone import EffectsAlone, Plugs
 from fmus.export.builders.hypotheses import Effects, ForeignBuilder
 from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
-from fmus.export.container.coupled import COUPLING_STEP
 from fmus.export.provenance import Origin
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription
@@ -45,7 +44,7 @@ def export_augmented(
     Raises BadInput if an effect changes a parameter during the run, as SSP cannot connect to parameters.
     """
     t = record.runs[0].t
-    step = coupling_step(t)
+    step = coupling_step(t, builder.coupling)
     model = builder.alone(effects, starts, step)
     with tempfile.TemporaryDirectory(prefix="railfmi_augmented_") as work:
         folder = Path(work)
@@ -60,10 +59,10 @@ def export_augmented(
         return export_ssp(file, out, kind)
 
 
-def coupling_step(t: Array) -> float:
+def coupling_step(t: Array, longest: float) -> float:
     """Longest whole part of a sampling step, s, over which the FMU that carries the effects couples too."""
     sample = float(f"{np.median(np.diff(t)):.9g}")
-    return sample / ceil(sample / COUPLING_STEP - 1e-9)
+    return sample / ceil(sample / longest - 1e-9)
 
 
 def _built(model: EffectsAlone, folder: Path, origin: Origin) -> tuple[Path, Kind]:

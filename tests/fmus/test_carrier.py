@@ -73,6 +73,37 @@ def test_both_containers_move_alike(base, kind, tmp_path):
         assert np.max(np.abs(off[:, 0] - found[:, 0])) > 1e-4  # the effect acts
 
 
+@pytest.mark.parametrize("step", [1e-4, 2e-2])
+def test_both_containers_read_the_ports_as_often_as_asked_for(base, step, tmp_path):
+    effects, values = EFFECTS["laws at a port"]
+    native = build_carrier(base, (PORT,), effects, tmp_path / "native.fmu", step)
+    python = build_coupled(base, (PORT,), effects, tmp_path / "python.fmu", step=step)
+    found = motion(native, values)
+    assert found == pytest.approx(motion(python, values), rel=1e-12, abs=1e-15)
+    usual = motion(build_carrier(base, (PORT,), effects, tmp_path / "usual.fmu"), values)
+    assert 0 < np.max(np.abs(found - usual)) < 0.05 * np.max(np.abs(usual))
+
+
+def test_a_short_step_leaves_the_coupling_as_accurate_as_it_was(base, tmp_path):
+    """Steps of 20 ms, with and without a last thousandth of its own, against readings every 0.1 ms."""
+    effects, damping = (("viscous_damping", "carriage"),), {"viscous_damping_carriage_c": 300.0}
+    t, start = np.arange(0.0, 2.0, 0.02), {"q": 0.01, "M": 90.0, **damping}
+    short = np.append(np.column_stack([t[:-1], t[1:] - 2e-5]).ravel(), t[-1])
+
+    def moved(path: Path, times: np.ndarray) -> np.ndarray:
+        force = np.interp(times, t, 100 * np.sin(4 * t))
+        with Fmu(path) as fmu:
+            return fmu.simulate(times, {"F": force}, ("q", "q_dot"), start)
+
+    exact = moved(build_carrier(base, (PORT,), effects, tmp_path / "fine.fmu", 1e-4), t)
+    native = build_carrier(base, (PORT,), effects, tmp_path / "native.fmu", 1.0)
+    python = build_coupled(base, (PORT,), effects, tmp_path / "python.fmu", step=1.0)
+    even, uneven = moved(native, t), moved(native, short)[::2]
+    assert np.all(np.abs(uneven - exact).max(axis=0) < 1.5 * np.abs(even - exact).max(axis=0))
+    assert np.all(np.abs(even - exact).max(axis=0) < 0.02 * np.abs(exact).max(axis=0))
+    assert moved(python, short) == pytest.approx(moved(native, short), rel=1e-12, abs=1e-15)
+
+
 @pytest.mark.parametrize("velocity", ["q_dot", "q_ddot"])
 def test_a_motion_that_an_input_changes_at_once_is_read_after_it(base, velocity, tmp_path):
     """The carrier reads the motion once a step only where no input acts on it directly."""

@@ -2,7 +2,6 @@
 
 from functools import cache
 
-import casadi as cs
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -15,13 +14,12 @@ from fmus.errors import BadInput
 from fmus.export.around.outside import Outside
 from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
 from fmus.export.builders.pythonfmu import build_python
-from fmus.export.container import coupled
 from fmus.export.container.coupled import build_coupled
 from fmus.host.archive import describe
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 from fmus.host.grading.check import grade
-from tests.helpers.everything import EVERY_EFFECT, FALLBACK, FORCE_LAWS
+from tests.helpers.everything import EVERY_EFFECT, FALLBACK
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
 T = np.linspace(0, 3, 301)
@@ -39,15 +37,6 @@ SHARP = {  # shapes that ask more of the coupling than those that `typical` take
 }
 # those that need a model which says what makes a component
 COMPONENTS = {kind for kind in EVERY_EFFECT if EFFECTS[kind].acts_on == "component"}
-
-
-def by_velocity(kind):
-    """Whether a force goes by the velocity: held over a step, it lags behind that by half a step."""
-    effect, q, v = EFFECTS[kind], cs.SX.sym("q"), cs.SX.sym("v")
-    if kind not in FORCE_LAWS:
-        return False
-    values = {p.name: cs.SX.sym(p.name) for p in effect.parameters("translation")}
-    return bool(cs.depends_on(cs.SX(effect(values).force(q, v)), v))
 
 
 def middle(guesses):
@@ -126,9 +115,7 @@ def test_around_a_foreign_fmu_an_effect_does_what_it_does_in_our_own(text, drive
     bare, inside, outside = run(drive, {}), run(own(text), started(text)), run(around(text), started(text))
     size = np.abs(inside - bare).max(axis=0)
     assert np.all(size > 1e-4)  # m, m/s: the case shows
-    # of coupling steps of 1 ms: second order, but where a force held over a step goes by the velocity
-    tolerance = 3e-3 if by_velocity(text.partition("@")[0]) else 5e-5
-    assert np.all(np.abs(outside - inside).max(axis=0) < tolerance * size)
+    assert np.all(np.abs(outside - inside).max(axis=0) < 5e-5 * size)  # of coupling steps of 1 ms
     assert_allclose(run(around(text), {}), bare, atol=1e-12)  # off: the same steps, in shorter ones
 
 
@@ -138,27 +125,28 @@ def test_an_effect_that_is_off_changes_no_run(text, drive, own):
 
 
 @pytest.mark.parametrize(
-    ("text", "order", "step"),
+    ("text", "step"),
     [
-        ("hysteresis@carriage", 2, 2e-3),
-        ("input_delay@F", 2, 1e-3),  # its fastest motion takes 11 ms
-        ("step_force@carriage", 2, 2e-3),
-        ("viscous_damping@carriage", 1, 2e-3),
+        ("hysteresis@carriage", 2e-3),
+        ("input_delay@F", 1e-3),  # its fastest motion takes 11 ms
+        ("step_force@carriage", 2e-3),
+        ("viscous_damping@carriage", 2e-3),
+        ("quadratic_damping@carriage", 2e-3),
     ],
 )
-def test_the_coupling_error_falls_by_its_order(text, order, step, drive, own, tmp_path, monkeypatch):
+def test_the_coupling_error_is_of_second_order(text, step, drive, own, tmp_path):
     expected, error = run(own(text), started(text)), []
     for dt in (step, step / 2):
-        monkeypatch.setattr(coupled, "COUPLING_STEP", dt)
         kind, location = text.split("@")
-        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{dt}.fmu")
+        made = build_coupled(drive, [PORT], [(kind, location)], tmp_path / f"{dt}.fmu", step=dt)
         error.append(np.abs(run(made, started(text)) - expected).max())
-    assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.2)
+    assert np.log2(error[0] / error[1]) == pytest.approx(2.0, abs=0.2)
 
 
 @pytest.mark.parametrize("build", ["own", "around"])
 @pytest.mark.parametrize("text", CASES)
-def test_a_restart_from_the_middle_repeats_the_rest_exactly(text, build, request):
+def test_a_restart_from_the_middle_repeats_the_rest(text, build, request):
+    """Exactly, but for the first coupling step around a foreign FMU, for which no acceleration is known."""
     path, start, middle = request.getfixturevalue(build)(text), started(text), 170
     with Fmu(path) as fmu:
         states = fmu.description.states
@@ -166,7 +154,8 @@ def test_a_restart_from_the_middle_repeats_the_rest_exactly(text, build, request
         there = dict(zip(states, whole[middle].tolist(), strict=True))
         rest = {n: u[middle:] for n, u in INPUTS.items()}
         again = fmu.simulate(T[middle:], rest, states, start | there)
-    assert_array_equal(again, whole[middle:])
+    away = np.abs(again - whole[middle:]).max(axis=0)
+    assert np.all(away <= (1e-5 * np.ptp(whole, axis=0) if build == "around" else 0.0))
 
 
 @pytest.mark.parametrize("text", ["hysteresis@carriage", "parameter_step@M", "input_delay@F"])

@@ -95,7 +95,7 @@ def experiment(folder):
 
 def handed_over(builder, folder, effects, values, told=lambda _: None):
     folder.mkdir(exist_ok=True)
-    problem = SimpleNamespace(declared={"M": 97.0, "q": 0.1}, record=a_record())
+    problem = SimpleNamespace(declared={"M": 97.0, "q": 0.1}, record=a_record(), coupling=COUPLING_STEP)
     return augment(builder, experiment(folder), problem, found(effects, values), folder, told)
 
 
@@ -267,7 +267,7 @@ def test_what_an_effect_reads_and_sets_is_said(base):
 
 @given(st.floats(1e-5, 2.0))
 def test_the_coupling_step_divides_the_sampling_step(dt):
-    step = coupling_step(dt * np.arange(5))
+    step = coupling_step(dt * np.arange(5), COUPLING_STEP)
     assert step <= COUPLING_STEP * (1 + 1e-9)
     assert dt / step == pytest.approx(round(dt / step), rel=1e-8)
 

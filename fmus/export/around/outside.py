@@ -185,8 +185,9 @@ class Laws:
     """Effects around a carried FMU, from its motion m = (q, v) at each port and the table's settable part z.
 
     states, parameters: what the effects bring; told: names of the inputs and parameters that the FMU is
-    given by the laws. push(m, z, dt) -> their values for a step: in its middle, each port moved on by its
-    velocity. go_on(m0, m1, z, dt) -> the states after it, the motion linear over the step.
+    given by the laws. push(m0, m, z, dt) -> their values for a step: in its middle, each port moved on by its
+    velocity and its acceleration since m0. dt: length of the step and time from m0 to m, s, inf if there is
+    no m0. go_on(m0, m1, z, dt) -> the states after a step, the motion linear over it.
     """
 
     states: list[State]
@@ -210,20 +211,21 @@ def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Seque
     )
     z, rest = cs.vertcat(unseen, x, foreign, own), cs.vertcat(foreign, own)
     m0, m1, dt = (
-        cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 1))
+        cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 2))
     )
-    half = moved_on(m0, dt / 2)
+    half = moved_on(m1, dt[0] / 2, (m1 - m0) / dt[1])
 
     def rates(m: Expr, state: Expr) -> Expr:
         return made.rates(m, state, rest)
 
-    middle = made.values(half, runge_kutta(rates, x, dt / 2, straight(m0, half)), rest)
+    middle = made.values(half, runge_kutta(rates, x, dt[0] / 2, straight(m1, half)), rest)
+    after = runge_kutta(rates, x, dt[0], straight(m0, m1))
     return Laws(
         made.states,
         made.parameters,
         made.told,
-        cs.Function("push", [m0, z, dt], [cs.cse(middle)]),
-        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(runge_kutta(rates, x, dt, straight(m0, m1)))]),
+        cs.Function("push", [m0, m1, z, dt], [cs.cse(middle)]),
+        cs.Function("go_on", [m0, m1, z, dt], [cs.cse(after)]),
     )
 
 
@@ -232,10 +234,17 @@ def straight(w0: Expr, w1: Expr) -> tuple[Expr, Expr, Expr]:
     return w0, (w0 + w1) / 2, w1
 
 
-def moved_on(motion: Expr, dt: Expr) -> Expr:
-    """Displacement and velocity of each port after dt with that velocity."""
-    parts = [(motion[i] + dt * motion[i + 1], motion[i + 1]) for i in range(0, motion.numel(), 2)]
-    return cs.vertcat(*(part for pair in parts for part in pair))
+def moved_on(motion: Expr, dt: Expr, slopes: Expr | None = None) -> Expr:
+    """Displacement and velocity of each port after dt with that velocity.
+
+    slopes: of the motion, of which those of the velocities are used; without them the velocity stays.
+    """
+    found: list[Expr] = []
+    for i in range(0, motion.numel(), 2):
+        q, v = motion[i], motion[i + 1]
+        a = slopes[i + 1] if slopes is not None else 0.0
+        found += [q + dt * v + dt**2 / 2 * a, v + dt * a]
+    return cs.vertcat(*found)
 
 
 @cache

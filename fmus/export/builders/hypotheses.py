@@ -18,7 +18,7 @@ from fmus.export.builders.native.build import build_native
 from fmus.export.builders.native.working import build_working
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.container.carrier import build_carrier
-from fmus.export.container.coupled import build_coupled
+from fmus.export.container.coupled import COUPLING_STEP, build_coupled
 from fmus.export.provenance import Origin
 from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import describe
@@ -39,6 +39,7 @@ class ModelBuilder:
     folder: Path
     quick: ClassVar[bool] = True  # with effects as without
     isolation: ClassVar[Isolation | None] = None  # our own models run where they are used
+    coupling: ClassVar[float] = 0.0  # effects are part of the equations
 
     @property
     def form(self) -> Mapping[str, tuple[float, float]]:
@@ -65,6 +66,10 @@ class ModelBuilder:
     def ports(self) -> tuple[PortNames, ...]:
         """The model's locations by the names of their probes."""
         return _ports(self.model)
+
+    def coupled_every(self, step: float) -> "ModelBuilder":
+        """The same, for there is nothing to couple."""
+        return self
 
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
@@ -111,7 +116,7 @@ class ForeignBuilder:
     """A foreign FMU for co-simulation with effects around it; kept in a folder.
 
     isolation: how its builds run, see Archive; carried: the FMU for model exchange alone that is inside of
-    `fmu`, if there is one, see `co_simulated`.
+    `fmu`, if there is one, see `co_simulated`; coupling: longest time between two readings of the ports, s.
     """
 
     fmu: Path
@@ -119,6 +124,7 @@ class ForeignBuilder:
     folder: Path
     isolation: Isolation | None = None
     carried: Path | None = None
+    coupling: float = COUPLING_STEP
     quick: ClassVar[bool] = False
     form: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     form_choices: ClassVar[Mapping[str, tuple[float, ...]]] = MappingProxyType({})
@@ -136,6 +142,10 @@ class ForeignBuilder:
         """
         return offers(Outside(describe(self.fmu), self.ports))
 
+    def coupled_every(self, step: float) -> "ForeignBuilder":
+        """The same with effects that read the ports every so many s."""
+        return replace(self, coupling=step)
+
     def outside(self) -> Outside:
         """The FMU without effects as a site for them, seen from outside."""
         return Outside(_described(self(())), self.ports)
@@ -149,10 +159,10 @@ class ForeignBuilder:
         if not self.ports and not effects:
             return self.fmu
         return _once(
-            self.folder,
+            self.folder if self.coupling == COUPLING_STEP else self.folder / f"every {self.coupling:g} s",
             effects,
-            lambda path: build_carrier(self.fmu, self.ports, effects, path),
-            lambda path: build_coupled(self.fmu, self.ports, effects, path),
+            lambda path: build_carrier(self.fmu, self.ports, effects, path, self.coupling),
+            lambda path: build_coupled(self.fmu, self.ports, effects, path, step=self.coupling),
             self.fmu.name,  # by which messages call it
         )
 
@@ -162,8 +172,9 @@ class ForeignBuilder:
         """Write the FMU with effects around it and start values that were found, for use elsewhere."""
         target = out / f"{self.fmu.stem}_augmented.fmu"
         return build_coupled(
-            self.fmu, self.ports, effects, target, starts=starts, origin=origin, source=self.carried
-        )
+            self.fmu, self.ports, effects, target, starts=starts, origin=origin, source=self.carried,
+            step=self.coupling,
+        )  # fmt: skip
 
     def alone(self, effects: Effects, starts: Mapping[str, float], step: float) -> EffectsAlone:
         """The effects as a model of their own, to be connected to the FMU every `step`, s.

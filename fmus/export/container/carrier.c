@@ -82,7 +82,9 @@ typedef struct {
     bool touched[N_VALUES]; /* settable variables whose value the carried FMU must be told */
     bool failed, running, entered, stepped, seen; /* seen: the motion is that of now */
     double start, time; /* s, beginning of the simulation and of its last step */
-    double before[AT_LEAST_1(N_MOTION)], motion[AT_LEAST_1(N_MOTION)], told[AT_LEAST_1(N_TOLD)];
+    double last, since; /* s, length of the last step; time from `earlier` to `motion`, HUGE_VAL for none */
+    double earlier[AT_LEAST_1(N_MOTION)], before[AT_LEAST_1(N_MOTION)], motion[AT_LEAST_1(N_MOTION)];
+    double told[AT_LEAST_1(N_TOLD)];
     double memory[AT_LEAST_1(N_MEMORY)];
     const double *arg[AT_LEAST_1(WORK_ARG)];
     double *res[AT_LEAST_1(WORK_RES)];
@@ -203,9 +205,11 @@ static int see(Instance *m) {
 /* Set what the laws give, for the middle of a step of length dt. */
 static int by_the_laws(Instance *m, double dt) {
     if (!N_TOLD) return 0;
-    m->arg[0] = m->motion;
-    m->arg[1] = m->values;
-    m->arg[2] = &dt;
+    double lengths[] = {dt, m->since};
+    m->arg[0] = m->earlier;
+    m->arg[1] = m->motion;
+    m->arg[2] = m->values;
+    m->arg[3] = lengths;
     m->res[0] = m->told;
     if (push(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
     return set_base(m, TOLD, N_TOLD, m->told);
@@ -213,10 +217,11 @@ static int by_the_laws(Instance *m, double dt) {
 
 static int remember(Instance *m, double dt) {
     if (!N_MEMORY) return 0;
+    double lengths[] = {dt, m->since};
     m->arg[0] = m->before;
     m->arg[1] = m->motion;
     m->arg[2] = m->values;
-    m->arg[3] = &dt;
+    m->arg[3] = lengths;
     m->res[0] = m->memory;
     if (go_on(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
     memcpy(m->values + FIRST_MEMORY, m->memory, N_MEMORY * sizeof(double));
@@ -250,7 +255,9 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 static void begin(Instance *m) {
     memcpy(m->values, START, sizeof START);
     memset(m->touched, 0, sizeof m->touched);
+    memset(m->earlier, 0, sizeof m->earlier);
     memset(m->motion, 0, sizeof m->motion);
+    m->since = HUGE_VAL;
     m->failed = m->running = m->stepped = m->seen = false;
 #if BASE_EXCHANGE
     *m->why = '\0';
@@ -349,6 +356,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Instance *m = c;
     int status = pass_on(m, INPUTS);
+    m->since = HUGE_VAL;
     if (status <= WARNING) status = get_base(m, MOTION, N_MOTION, m->motion);
     if (status <= WARNING) status = by_the_laws(m, 0.0);
     if (status <= WARNING) status = leave_base(m);
@@ -415,7 +423,10 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
             return refuse(m, fmi2Error, "%s = %g is outside %g to %g", NAMES[i], value[k], LEAST[i], MOST[i]);
         m->values[i] = value[k];
         if (!at_once) m->touched[i] = true;
-        if (!INPUTS[i]) m->seen = false;
+        if (!INPUTS[i]) {
+            m->seen = false;
+            m->since = HUGE_VAL; /* it moves otherwise than before */
+        }
         if (!PASSED[i]) laws = true;
         if (!at_once || !PASSED[i]) continue;
         if (passed == N_SET) { /* one of them is set twice */
@@ -434,6 +445,18 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return answer(m, status, __func__);
 }
 
+/* The accelerations after a step of length dt from `before` on: those over this step, but over the step before
+   too where this one is much shorter, for a difference over little time is inaccurate. */
+static void went(Instance *m, double dt) {
+    if (m->since < HUGE_VAL && dt < m->last / 2) {
+        m->since += dt;
+    } else {
+        memcpy(m->earlier, m->before, sizeof m->before);
+        m->since = dt;
+    }
+    m->last = dt;
+}
+
 /* Coupling steps, as many as `duration` needs; the status of the first call that was refused. */
 static int advance(Instance *m, double t, double duration) {
     bool single = duration <= LONGEST_STEP * (1 + TIME_TOLERANCE / 2); /* as the general case finds, slowly */
@@ -443,8 +466,9 @@ static int advance(Instance *m, double t, double duration) {
         status = by_the_laws(m, dt);
         if (status <= WARNING) status = step_base(m, t + k * dt, dt);
         m->seen = false;
-        if (!N_MEMORY && (!N_TOLD || k + 1 == steps)) continue; /* nobody asks how it moves */
         memcpy(m->before, m->motion, sizeof m->motion);
+        went(m, dt);
+        if (!N_MEMORY && (!N_TOLD || k + 1 == steps)) continue; /* nobody asks yet how it moves */
         if (status <= WARNING) status = see(m);
         if (status <= WARNING) status = remember(m, dt);
     }

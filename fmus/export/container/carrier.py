@@ -24,7 +24,7 @@ from fmus.export.builders.native.code import STANDARD, Work
 from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description import flag, text
 from fmus.export.builders.native.libraries import library
-from fmus.export.container.coupled import carrying
+from fmus.export.container.coupled import COUPLING_STEP, carrying
 from fmus.files import write_at_once
 from fmus.host.archive import Archive
 from fmus.host.description import FmuDescription, PortNames
@@ -35,24 +35,25 @@ LARGEST = sys.float_info.max
 LINKED = {".so": ("-ldl",)}  # for libraries of a platform that load others
 ABILITIES = {
     "needsExecutionTool": "true",
-    "canHandleVariableCommunicationStepSize": "true",
     "canNotUseMemoryManagementFunctions": "true",
 }
 
 
 def build_carrier(
-    base: Path, ports: Sequence[PortNames], effects: Sequence[tuple[str, str]], out: Path
-) -> Path:
+    base: Path, ports: Sequence[PortNames], effects: Sequence[tuple[str, str]], out: Path,
+    step: float = COUPLING_STEP,
+) -> Path:  # fmt: skip
     """Write an FMU with `base` inside and effects (kind, location) around it to `out`, and return it.
 
-    BadInput where there is no compiler, or the base has no library for this platform.
+    step: the longest time between two readings of a port, s. BadInput where there is no compiler, or the base
+    has no library for this platform.
     """
     with Archive(base) as archive:
         description, inside = archive.description, archive.folder
         where, fmi = host(), int(archive.description.fmi_version[0])
         carried = f"binaries/{where.folder(fmi)}/{description.identifier}{where.suffix}"
         made = laws(description, ports, effects)
-        card = carrying(description, ports, effects, made, {})
+        card = carrying(description, ports, effects, made, {}, step)
         code = _sources(card, made, description, carried)
         files = identified(code | {"modelDescription.xml": _described(card, description)})
         built = library({name: files.pop(name) for name in code}, "carrier.c", LINKED.get(where.suffix, ()))
@@ -145,7 +146,10 @@ def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
         "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=NO_TOKEN,
         description=card["description"], variableNamingConvention="structured",
     )  # fmt: skip
-    once = {"canBeInstantiatedOnlyOncePerProcess": flag(description.once_per_process)}
+    once = {
+        "canBeInstantiatedOnlyOncePerProcess": flag(description.once_per_process),
+        "canHandleVariableCommunicationStepSize": flag(description.variable_step),
+    }
     SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **once, **ABILITIES})
     if card["units"]:
         units = SubElement(root, "UnitDefinitions")

@@ -32,18 +32,20 @@ def build_coupled(
     starts: Mapping[str, float] | None = None,
     origin: Origin | None = None,
     source: Path | None = None,
+    step: float = COUPLING_STEP,
 ) -> Path:
     """Write an FMU with `base` inside and effects (kind, location) around it; returns its path.
 
     A location is the name of a port, of an input or of a tunable parameter.
     starts: start values that replace those of the carried FMU and of the effects; origin: what they rest on;
-    source: the FMU that the record of provenance names, where `base` was made from another one.
+    source: the FMU that the record of provenance names, where `base` was made from another one; step: the
+    longest time between two readings of a port, s.
     """
     description = describe(base)
     if description.exchange is not None:
         raise BadInput(f"{base}: is for model exchange alone; carry it by one for co-simulation first")
     made = laws(description, ports, effects)
-    card = carrying(description, ports, effects, made, starts or {})
+    card = carrying(description, ports, effects, made, starts or {}, step)
     table, names = card["variables"], [f"{kind}@{location}" for kind, location in effects]
     functions = {"push": made.push, "go_on": made.go_on}
     files = {**equations_files(functions), "base.fmu": base.read_bytes()}
@@ -61,8 +63,9 @@ def carrying(
     effects: Sequence[tuple[str, str]],
     made: Laws,
     starts: Mapping[str, float],
+    step: float,
 ) -> dict[str, Any]:
-    """The card of a build: its variables, and what it sets and reads in the carried FMU."""
+    """The card of a build: its variables, and what it sets and reads in the carried FMU every `step`, s."""
     groups = _groups(description)
     rows = [[_foreign_row(v) for v in group] for group in groups]
     rows[0] += [row(s) for s in made.states]
@@ -74,7 +77,7 @@ def carrying(
     restarted = [order.index(n) for n in starts if n in description.variables]
     return {
         "description": f"{description.name} with {', '.join(names) or 'no effect'}",
-        "step_size": COUPLING_STEP,
+        "step_size": step,
         "sizes": [len(group) for group in rows],
         "units": unit_table(r["unit"] for r in table if r["unit"]),
         "variables": table,

@@ -49,11 +49,13 @@ class Slave(common.Slave):
         self.base, self.running = _instance(), False
         self.start_time = 0.0
         sizes = [EQUATIONS.sizes(name) for name in ("push", "go_on")]
-        self.before, self.motion = (array("d", bytes(8 * sizes[0][0][0])) for _ in range(2))
+        self.earlier, self.before, self.motion = (array("d", bytes(8 * sizes[0][0][0])) for _ in range(3))
         self.told, self.memory = (array("d", bytes(8 * found[0])) for _, found in sizes)
-        self.dt = array("d", [0.0])
+        # lengths of the step and, s, of the time from `earlier` to `motion`, endless if there is none
+        self.dt, self.last = array("d", [0.0, math.inf]), 0.0
         settable = memoryview(self.values)[: common.SETTABLE]
-        self.work_out = EQUATIONS.on_memory("push", (self.motion, settable, self.dt), (self.told,))
+        known = (self.earlier, self.motion, settable, self.dt)
+        self.work_out = EQUATIONS.on_memory("push", known, (self.told,))
         known = (self.before, self.motion, settable, self.dt)
         self.remember = EQUATIONS.on_memory("go_on", known, (self.memory,))
         self.read = self.base.getter(_references(BASE["motion"]), self.motion)
@@ -91,6 +93,7 @@ class Slave(common.Slave):
         """The carried FMU may step."""
         self._pass_on(set(INPUTS))
         self.read()
+        self.dt[1] = math.inf
         self._by_the_laws()
         self.base.leave()
         self.running = True
@@ -111,6 +114,8 @@ class Slave(common.Slave):
     @common.caught
     def _changed(self, indices: set[int]) -> None:
         self._pass_on(indices)
+        if not indices <= {*INPUTS}:
+            self.dt[1] = math.inf  # it moves otherwise than before
         if not indices <= PASSED:
             self.read()
             self._by_the_laws()
@@ -132,6 +137,7 @@ class Slave(common.Slave):
                 self.tell()
             self.base.step(current_time + k * dt, dt)
             self.before[:] = self.motion
+            self._went(dt)
             self.read()
             if self.memory:
                 self.remember()
@@ -142,6 +148,18 @@ class Slave(common.Slave):
             return True
         self.log(f"the carried FMU is no longer finite after t = {current_time:g} s", Fmi2Status.discard)
         return False
+
+    def _went(self, dt: float) -> None:
+        """Take accelerations over the step from `before` on, of length dt.
+
+        Over the step before too if this one is much shorter: a difference over little time is inaccurate.
+        """
+        if math.isfinite(self.dt[1]) and dt < self.last / 2:
+            self.dt[1] += dt
+        else:
+            self.earlier[:] = self.before
+            self.dt[1] = dt
+        self.last = dt
 
     def _by_the_laws(self) -> None:
         """Set what the laws set, for the instant."""
