@@ -19,17 +19,28 @@ PIECE, MOST = 1e-3, 10  # length of the pieces of a step, s; largest number of p
 TOGETHER = 1 << 28  # bytes of results that are simulated at once: those of eight rows of an hour do not fit
 REFINED = 1 << 25  # bytes of refined inputs that are kept; one set of them always is
 EVEN = 1e-6  # of a sample, by which evenly spaced times may differ
+LAST = 1e-3  # of a sample, length of a part in which nothing but the inputs changes
 
 
 class Steps(NamedTuple):
     """The steps of a simulation: parts into which each usual step is divided, and what acts over them.
 
     joined: whether a step goes over four parts and knows its inputs within them, for which the FMU must be
-    one of ours, see `Fmu.simulate_rows`. If not, the mean of its inputs acts over each part.
+    one of ours, see `Fmu.simulate_rows`. If not, the mean of its inputs acts over each part. coupled: the
+    longest time between two readings of a foreign FMU's ports, s, 0 for the usual one; it is a matter of the
+    build that a plant runs, see `Problem.plant`. settled: whether a short part at the end of each usual step
+    shows outputs the inputs of the sample; many an FMU computes outputs in a step, from what acts over it.
     """
 
     parts: int = 1
     joined: bool = False
+    coupled: float = 0.0
+    settled: bool = False
+
+    @property
+    def held(self) -> "Steps":
+        """Steps of one sample, over which inputs are held."""
+        return self._replace(joined=False, settled=False)
 
     @property
     def halved(self) -> "Steps":
@@ -182,14 +193,15 @@ class Plant:
 
     def _given(self, run: Run, steps: Steps) -> tuple[Array, dict[str, Array], int]:
         """Times and inputs of a run as set in the FMU, and the pieces of a step; refined ones are kept."""
-        pieces, inputs = self._pieces(run.t) * steps.parts, dict(zip(self.inputs, run.u.T, strict=True))
+        parts, inputs = self._pieces(run.t) * steps.parts, dict(zip(self.inputs, run.u.T, strict=True))
+        pieces = parts + steps.settled
         if pieces == 1:
             return run.t, inputs, 1
-        key = self._digest(run), pieces
+        key = self._digest(run), parts, steps.settled
         if key not in self._fine:
             while len(self._fine) >= max(1, REFINED // (8 * len(run.t) * pieces * (1 + len(inputs)))):
                 self._fine.popitem(last=False)
-            self._fine[key] = between(run.t, inputs, pieces)
+            self._fine[key] = between(run.t, inputs, parts, steps.settled)
         self._fine.move_to_end(key)
         return *self._fine[key], pieces
 
@@ -217,13 +229,16 @@ class Plant:
         return self.fmu.read(self.states), y
 
 
-def between(t: Array, inputs: Mapping[str, Array], pieces: int) -> tuple[Array, dict[str, Array]]:
-    """Times and inputs with each step divided into pieces, ((N - 1) pieces + 1,).
+def between(
+    t: Array, inputs: Mapping[str, Array], parts: int, settled: bool = False
+) -> tuple[Array, dict[str, Array]]:
+    """Times and inputs with each step divided into equal parts, ((N - 1) parts + 1,).
 
-    An input whose rate is given as NAME_dot is interpolated by a cubic, any other linearly.
+    settled: whether a short one at the end of each step is added to them. An input whose rate is given as
+    NAME_dot is interpolated by a cubic, any other linearly.
     """
-    share = np.arange(pieces) / pieces
-    fine = np.append((t[:-1, None] + np.diff(t)[:, None] * share).ravel(), t[-1])
+    begin = np.append(np.arange(parts) / parts, [1 - LAST] * settled)
+    fine = np.append((t[:-1, None] + np.diff(t)[:, None] * begin).ravel(), t[-1])
     found = {name: np.interp(fine, t, samples) for name, samples in inputs.items()}
     for name in inputs:
         if f"{name}_dot" in inputs:

@@ -15,15 +15,16 @@ from estimator.closeloop.decision.verdict import confirmed_on_test, judge, proba
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
-from estimator.closeloop.fitting.calibrate import calibrate, nearer, without_input_noise
+from estimator.closeloop.fitting.calibrate import calibrate, explains_most, nearer, without_input_noise
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.refined import arrived
 from estimator.closeloop.fitting.resolution import (
     in_fine_steps,
-    in_joined_steps,
-    joined_steps_hold,
+    in_long_steps,
+    in_settled_steps,
+    long_steps_hold,
     over_steps,
 )
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
@@ -141,14 +142,26 @@ class Chain:
         return replace(found, baseline=replace(found.baseline, hypothesis=base))
 
     def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
-        """The problem and what `calibrate` finds, in steps that join several samples if these hold."""
-        joined = in_joined_steps(self.problem)
-        found = self._in_steps(joined, self.stages)
+        """The problem and what `calibrate` finds, in the longest steps if these hold."""
+        long = in_long_steps(self.problem)
+        found = self._in_steps(long, self.stages)
         problem, _, base, noise = found
-        if joined is self.problem or joined_steps_hold(problem, base, noise.weighting):
-            return found
-        self.tell("steps", "calibrating in steps of one sample")
-        return self._in_steps(self.problem, self.stages.under("held"))
+        if long is self.problem or long_steps_hold(problem, base, noise.weighting):
+            return self._settled(*found)
+        self.tell("steps", "calibrating in shorter steps")
+        return self._settled(*self._in_steps(self.problem, self.stages.under("held")))
+
+    def _settled(
+        self, problem: Problem, declared: Hypothesis, base: Hypothesis, noise: Noise
+    ) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
+        """The same with outputs that see the inputs of their sample, unless these were held over it."""
+        other = in_settled_steps(problem, base.theta, noise.weighting)
+        if other is None:
+            return problem, declared, base, noise
+        self.tell("steps", "calibrating with outputs that see the inputs of their sample")
+        again = self.stages.done("settled", lambda: calibrate(other))
+        held = explains_most(problem, base, again[1])
+        return (problem, declared, base, noise) if held else (other, *again)
 
     def _in_steps(self, problem: Problem, stages: Stages) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
         """The same in the steps of a problem, with smoothed inputs if the FMU is nearer with these.

@@ -238,7 +238,7 @@ def augment(
     build. The second file is the native build for our models, and for a foreign FMU an SSP package of that
     FMU and the effects. If the second cannot be built, `tell` gets the reason.
     """
-    best = found.built_in or found.base
+    best, builder = found.built_in or found.base, builder.coupled_every(problem.coupling)
     effects = tuple((c.kind, c.location) for c in best.candidates if not c.is_fault)
     starts, origin = {**problem.declared, **best.theta}, origin_of(e, best, found.judgement.verdict)
     files = [builder.final(effects, starts, folder, origin)]

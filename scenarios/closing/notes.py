@@ -19,13 +19,19 @@ def notes_of(problem: Problem, found: Outcome, rms: Mapping[str, Array]) -> list
 
 
 def _steps(problem: Problem) -> list[str]:
-    """A note if the steps of the simulation had to be divided."""
-    if problem.steps == problem.searched:
-        return []
+    """Notes if the steps of the simulation had to be divided, or to end with the inputs of a sample."""
+    settled = (
+        "the FMU computes its outputs in a step, from what acts over it; so the last thousandth of each step "
+        "was simulated with the inputs of the sample at its end, and the error after holds for this"
+    )
+    notes = [settled] if problem.steps.settled else []
+    if problem.steps.parts == problem.searched.parts:
+        return notes
     return [
+        *notes,
         f"the usual steps of the simulation were divided by {problem.steps.parts} for the answer, because "
         "their integration error would have changed the fitted values; the error after holds for the divided "
-        "steps"
+        "steps",
     ]
 
 

@@ -177,7 +177,7 @@ def start_values(problem: Problem, found: Outcome) -> dict[str, dict[str, Any]]:
     "not settable": the FMU accepts no start value.
     "not exact": the FMU does not state that the start value is exactly that of the state.
     """
-    fitted, known = found.base.fit, describe(problem.builder(())).variables
+    fitted, known = found.base.fit, describe(problem.fmu).variables
     best = found.built_in or found.base
     table: dict[str, dict[str, Any]] = {}
     for name in problem.free_states:

@@ -185,7 +185,7 @@ def _pictures(problem: Problem, simulated: Array, folder: Path) -> tuple[Path, .
 def _drawn(problem: Problem, simulated: Array) -> Iterator[Plot]:
     """Measured and simulated outputs over the first part of the record."""
     record, run = problem.record, problem.record.runs[0]
-    units = {v.name: v.unit for v in describe(problem.builder(())).variables.values()}
+    units = {v.name: v.unit for v in describe(problem.fmu).variables.values()}
     units |= {c.variable: c.model_unit for c in record.conversions}
     head = slice(max(2, int(SHOWN * run.t.size)))
     for ending, some in sheets(list(enumerate(record.outputs)), PANELS):

@@ -15,10 +15,12 @@ from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
 from estimator.closeloop.fitting.resolution import (
+    FEWEST,
     error_of_steps,
     in_fine_steps,
-    in_joined_steps,
-    joined_steps_hold,
+    in_halved_steps,
+    in_long_steps,
+    long_steps_hold,
     resolved,
 )
 from estimator.closeloop.fitting.slopes import FINE_STEP, STEP
@@ -167,7 +169,7 @@ class Stiff(OneByOne):
         every = np.ones(len(t), bool)
         return record_with(
             runs=(Run(t, t[:, None], t[:, None], every, ~every, ~every),),
-            noise_declared=np.array([True]), outputs=("y",),
+            noise_declared=np.array([True]), outputs=("y",), sample=1 / 399,
         )  # fmt: skip
 
     def with_effects(self, effects):
@@ -193,12 +195,15 @@ def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
 
 
 @dataclass(frozen=True)
-class FirstOrder(Stiff):
-    """The same with an error of first order."""
+class Rarely(Stiff):
+    """The same with an error of first order, also from how rarely the FMU is coupled."""
+
+    coupling = 0.03
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         [run] = self.record.runs
-        return run.y - (theta["slope"] + self.error / self.steps.parts) * run.t[:, None]
+        error = self.error * (100 * self.steps.coupled or 1 / self.steps.parts)
+        return run.y - (theta["slope"] + error) * run.t[:, None]
 
 
 @settings(deadline=None, max_examples=30)
@@ -206,10 +211,22 @@ class FirstOrder(Stiff):
 def test_the_error_that_the_steps_leave_is_part_of_the_error(size, parts):
     """It is exact for an error of first order, and the truth is one such error away."""
     weighting, slope = Weighting.white(SIZE), Unknown("slope", 1.0, -10.0, 10.0, 1.0)
-    [alone] = fit(FirstOrder(0.0), [slope], weighting).std.values()
-    problem = FirstOrder(size * alone, steps=Steps(parts))
+    [alone] = fit(Rarely(0.0), [slope], weighting).std.values()
+    problem = Rarely(size * alone, steps=Steps(parts))
     h = Hypothesis((), fit(problem, [slope], weighting), ())
-    assert error_of_steps(problem, h, weighting) == pytest.approx([h.theta["slope"] - 1.0], abs=1e-3 * alone)
+    error = error_of_steps(problem, in_halved_steps(problem), h, weighting)
+    assert error == pytest.approx([h.theta["slope"] - 1.0], abs=1e-3 * alone)
+
+
+def test_an_fmu_that_was_coupled_rarely_is_first_coupled_more_often():
+    weighting, slope = Weighting.white(SIZE), Unknown("slope", 1.0, -10.0, 10.0, 1.0)
+    problem = Rarely(0.02 * fit(Rarely(0.0), [slope], weighting).std["slope"], steps=Steps(coupled=0.1))
+    for times, steps in ((4, Steps(coupled=0.1)), (6, Steps(coupled=0.05)), (10, USUAL), (60, Steps(2))):
+        more = replace(problem, error=times * problem.error)
+        h = Hypothesis((), fit(more, [slope], weighting), ())
+        assert resolved(more, [h], weighting).steps == steps
+        if steps.parts == 1:  # else it is fitted again
+            assert in_fine_steps(Fitter(baseline(more, h, SIZE)), [h]).steps == steps
 
 
 @dataclass(frozen=True)
@@ -256,6 +273,7 @@ class Joining(Stiff):
 
     fmu_joins: bool = True
     searched: Steps = USUAL
+    coupling: float = 0.0
 
     @property
     def plant(self):
@@ -269,15 +287,24 @@ class Joining(Stiff):
 
 def hold(problem: Joining) -> bool:
     """Whether steps over several samples hold on the record of a problem, once it is fitted in them."""
-    weighting, joined = Weighting.white(SIZE), in_joined_steps(problem)
+    weighting, joined = Weighting.white(SIZE), in_long_steps(problem)
     assert (joined.steps, joined.searched) == (JOINED, JOINED)
     found = fit(joined, [Unknown("slope", 1.0, -10.0, 10.0, 1.0)], weighting)
-    return joined_steps_hold(joined, Hypothesis((), found, ()), weighting)
+    return long_steps_hold(joined, Hypothesis((), found, ()), weighting)
 
 
 def test_an_fmu_that_cannot_join_samples_keeps_its_steps():
     problem = Joining(0.0, fmu_joins=False)
-    assert in_joined_steps(problem) is problem
+    assert in_long_steps(problem) is problem
+
+
+def test_a_foreign_fmu_is_coupled_a_few_times_in_a_sample_if_it_would_be_coupled_more_often():
+    often = 1 / 399 / FEWEST
+    few = Steps(coupled=pytest.approx(often))
+    long = in_long_steps(Joining(0.0, fmu_joins=False, coupling=often / 2))
+    assert (long.steps, long.searched) == (few, few)
+    often = Joining(0.0, fmu_joins=False, coupling=2 * often)
+    assert in_long_steps(often) is often
 
 
 @settings(deadline=None, max_examples=30)
@@ -318,13 +345,13 @@ def test_steps_go_over_several_samples_unless_the_record_was_clearly_made_with_h
 @pytest.mark.parametrize("recorded", [True, False])
 def test_what_a_model_lacks_does_not_decide_about_the_steps_but_its_answer_does(recorded):
     """What is lacking looks as if inputs were held, and is much larger than what these make."""
-    problem = in_joined_steps(Interpolating(0.0, size=30.0, recorded=recorded, lacking=10.0))
+    problem = in_long_steps(Interpolating(0.0, size=30.0, recorded=recorded, lacking=10.0))
     fitter, weighting = Refitter(baseline(problem, noise=SIZE)), Weighting.white(SIZE)
     c = Candidate("viscous_damping", "here", (Unknown("slope", 1.0, -10.0, 10.0, 1.0),))
     without, found = (
         Hypothesis(some, fit(built(problem, some), c.unknowns, weighting), ()) for some in ((), (c,))
     )
-    assert joined_steps_hold(problem, without, weighting)
+    assert long_steps_hold(problem, without, weighting)
     assert in_fine_steps(fitter, [without]).steps == JOINED
     assert in_fine_steps(fitter, [found]).steps == (JOINED if recorded else USUAL)
 

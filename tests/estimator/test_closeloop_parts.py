@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.fitting.fit import fit
+from estimator.closeloop.fitting.resolution import FEWEST, in_long_steps
 from estimator.closeloop.hypotheses.fitted import sandwich
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.levers import Course, shifts
@@ -18,6 +19,7 @@ from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.pushes import pushed
 from estimator.closeloop.screening.screen import screen
 from estimator.noise import correlation_time, noise_floor
+from estimator.plant import Steps
 from estimator.record import Record, Run
 from estimator.sensor_faults import FAULTS, faulty
 from estimator.weighting import Weighting
@@ -75,6 +77,20 @@ def test_several_simulations_are_each_as_one(drive: ForeignBuilder, tmp_path: Pa
         here = replace(asked, builder=builder)
         for found, theta in zip(here.several_residuals(thetas), thetas, strict=True):
             assert_allclose(found, here.residuals(theta), rtol=1e-12, atol=1e-15)
+
+
+def test_a_foreign_fmu_that_is_coupled_rarely_moves_alone_as_before_and_with_an_effect_nearly_so(
+    drive,
+) -> None:
+    asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(3))
+    damped = asked.with_effects([("viscous_damping", "carriage")])
+    rare = in_long_steps(asked).steps
+    assert rare == Steps(coupled=pytest.approx(DT / FEWEST))
+    [alone], [now] = asked.simulate({}), asked.in_steps(rare).simulate({})
+    assert_allclose(now, alone, rtol=1e-9, atol=1e-12)
+    theta = {"viscous_damping_carriage_c": 200.0}  # as much as the drive has itself
+    [often], [now] = damped.simulate(theta), damped.in_steps(rare).simulate(theta)
+    assert 0 < np.max(np.abs(now - often)) < 1e-4 * np.max(np.abs(often - alone))
 
 
 def test_the_missing_force_is_recovered_within_its_own_error(drive: ForeignBuilder) -> None:

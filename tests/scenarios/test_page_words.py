@@ -39,9 +39,7 @@ def test_the_report_has_the_units_that_an_experiment_declares(monkeypatch):
     )
     conversions = [Conversion("omega", "speed", "rpm", "rad/s", 0.1, 0.0)]
     conversions += [Conversion("i", "current", "mA", "kA", 1e-6, 0.0)]
-    problem = SimpleNamespace(
-        builder=lambda _: None, effects=(), record=SimpleNamespace(conversions=conversions)
-    )
+    problem = SimpleNamespace(fmu=None, effects=(), record=SimpleNamespace(conversions=conversions))
     words = glossary(problem, [])
     assert words.unit("omega") == "rad/s"
     assert words.unit("i") == "A"  # what the FMU says has the last word

@@ -34,9 +34,19 @@ def without_input_noise(problem: Problem, theta: Mapping[str, float]) -> Problem
 
 def nearer(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
     """Whether the first of two hypotheses leaves less on the part to identify, in units of the noise."""
-    record, white = problem.record, noise_floor(problem.record)
-    a, b = (float(np.sum((record.of(h.residuals, "fit") / white) ** 2)) for h in (one, other))
-    return a < b
+    return _left(problem, one)[0] < _left(problem, other)[0]
+
+
+def explains_most(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether most of what the second of two hypotheses leaves beyond noise is not left by the first."""
+    (less, _), (more, expected) = _left(problem, one), _left(problem, other)
+    return more - less > problem.policy.decision.most * max(more - expected, 0.0)
+
+
+def _left(problem: Problem, h: Hypothesis) -> tuple[float, int]:
+    """Sum of squares on the part to identify, in units of the noise, and what it is for noise alone."""
+    left = problem.record.of(h.residuals, "fit") / noise_floor(problem.record)
+    return float(np.sum(left**2)), left.size
 
 
 def calibrate(problem: Problem) -> tuple[Hypothesis, Hypothesis, Noise]:

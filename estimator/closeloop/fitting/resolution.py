@@ -2,14 +2,15 @@
 
 Hypotheses are searched in the longest steps that move no unknown of any hypothesis. For an FMU of ours, these
 join several samples and know the inputs within a step, which is more accurate than steps of one sample over
-which inputs are held, and takes less time.
+which inputs are held, and takes less time. The effects around a foreign FMU read its ports a few times in a
+sample.
 
 An effect can make the equations stiffer than those of the FMU without it. Friction that is rounded over a
 millimetre per second does so. With the usual step, the integration then adds an error of its own, and the fit
 changes its parameters to make up for that error. A simulation with halved steps shows how large it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,27 +23,53 @@ from estimator.closeloop.hypotheses.fitted import relaxed
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
-from estimator.plant import JOINED, USUAL
+from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array
 from estimator.weighting import Weighting
 
-
-def in_joined_steps(problem: Problem) -> Problem:
-    """The problem in steps over several samples; the problem itself if its FMU has no such steps."""
-    joins = problem.plant.joins(problem.record.runs)
-    return replace(problem, steps=JOINED, searched=JOINED) if joins else problem
+FEWEST = 4  # readings of a port in a sample; with fewer, laws that are stiff, as stops are, would be unstable
 
 
-def joined_steps_hold(joined: Problem, base: Hypothesis, weighting: Weighting) -> bool:
-    """Whether steps over several samples are exact on a record, and what is left does not come from them.
+def in_long_steps(problem: Problem) -> Problem:
+    """The problem in the longest steps of its FMU: over several samples, or with few readings of its ports.
+
+    The problem itself if these are the usual ones.
+    """
+    if problem.plant.joins(problem.record.runs):
+        return replace(problem, steps=JOINED, searched=JOINED)
+    rarely = problem.record.sample / FEWEST
+    if not 0 < problem.coupling < rarely:
+        return problem
+    few = Steps(coupled=rarely)
+    return replace(problem, steps=few, searched=few)
+
+
+def long_steps_hold(long: Problem, base: Hypothesis, weighting: Weighting) -> bool:
+    """Whether such steps are exact on a record, and what is left does not come from them.
 
     base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
-    it is long, whatever the slopes of the unknown are. How long it is, steps of half the length show.
+    it is long, whatever the slopes of the unknown are. How long it is, shorter steps show.
     """
-    here, halved = (weighted(p, base.theta, weighting) for p in (joined, in_halved_steps(joined)))
-    if not float(np.linalg.norm(here - halved)) <= joined.policy.search.moved_by_steps:
+    shorter = in_halved_steps(long) if long.steps.joined else long.in_steps(USUAL)
+    here, there = (weighted(p, base.theta, weighting) for p in (long, shorter))
+    if not float(np.linalg.norm(here - there)) <= long.policy.search.moved_by_steps:
         return False
-    return not inputs_held(joined, base, weighting)
+    return not inputs_held(long, base, weighting)
+
+
+def in_settled_steps(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Problem | None:
+    """The problem with outputs that are read with the inputs of their sample, whatever acted over the step.
+
+    None for an FMU that computes its outputs when they are asked for. They change less by a short part at the
+    end of each step than by halving the whole of it, which halves a delay of outputs in a step.
+    """
+    if not problem.coupling or not problem.plant.fmu.description.variable_step:
+        return None
+    steps = problem.steps._replace(settled=True)
+    found = replace(problem, steps=steps, searched=steps)
+    here, *others = (weighted(p, theta, weighting) for p in (problem, found, in_halved_steps(problem)))
+    settled, halved = (float(np.linalg.norm(other - here)) for other in others)
+    return found if settled > max(halved, problem.policy.search.moved_by_steps) else None
 
 
 def in_halved_steps(problem: Problem) -> Problem:
@@ -50,23 +77,37 @@ def in_halved_steps(problem: Problem) -> Problem:
     return problem.in_steps(problem.steps.halved)
 
 
-def inputs_held(joined: Problem, h: Hypothesis, weighting: Weighting) -> bool:
+def coupled_more_often(problem: Problem) -> Problem:
+    """The problem with effects that read the ports of a foreign FMU twice as often, up to the usual.
+
+    The problem itself if they are read as usual. What the FMU receives does not change by it.
+    """
+    half = problem.steps.coupled / 2
+    return problem.in_steps(problem.steps._replace(coupled=half if half > problem.coupling else 0.0))
+
+
+SHORTEN = (coupled_more_often, in_halved_steps)
+
+
+def inputs_held(problem: Problem, h: Hypothesis, weighting: Weighting) -> bool:
     """Whether a record says that its inputs were held over a sample, where steps take them as continuous.
 
     It then fits better in steps of one sample, by more than chance; how well it would after another fit
     follows from the slopes of this one. As what a hypothesis lacks may look like held inputs, these must also
-    be most of what it leaves beyond noise. Else a hypothesis that leaves less can tell. joined: the problem
-    with the effects of h, which was fitted in its steps.
+    be most of what it leaves beyond noise. Else a hypothesis that leaves less can tell. problem: with the
+    effects of h, which was fitted in its steps.
     """
-    theta, policy = h.theta, joined.policy
-    here, held = (relaxed(h.fit, weighted(p, theta, weighting)) for p in (joined, joined.in_steps(USUAL)))
+    policy, as_held = problem.policy, problem.in_steps(problem.steps.held)
+    if as_held.steps == problem.steps:
+        return False
+    here, held = (relaxed(h.fit, weighted(p, h.theta, weighting)) for p in (problem, as_held))
     apart, gained = float(np.linalg.norm(held - here)), float(here @ here - held @ held)
     beyond = float(here @ here) - len(here) - policy.detection.chance * np.sqrt(2 * len(here))
     return gained / 2 > policy.decision.telling * apart and gained > policy.decision.most * beyond
 
 
 def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting) -> Problem:
-    """The problem with its steps halved until this would no longer move an unknown of the hypotheses.
+    """The problem with its steps shortened until this would no longer move an unknown of the hypotheses.
 
     How far an unknown would move follows from the slopes of its fit, without another fit.
     """
@@ -77,19 +118,23 @@ def resolved(problem: Problem, some: Sequence[Hypothesis], weighting: Weighting)
 
 def over_steps(baseline: Baseline, h: Hypothesis) -> Hypothesis:
     """The hypothesis with the error that the steps of the simulation leave in its covariance."""
-    error = error_of_steps(built(baseline.problem, h.candidates), h, baseline.noise.weighting)
-    return replace(h, fit=replace(h.fit, covariance=h.fit.covariance + np.outer(error, error)))
+    problem, covariance = built(baseline.problem, h.candidates), h.fit.covariance
+    for shorten in SHORTEN:
+        error = error_of_steps(problem, shorten(problem), h, baseline.noise.weighting)
+        covariance = covariance + np.outer(error, error)
+    return replace(h, fit=replace(h.fit, covariance=covariance))
 
 
-def error_of_steps(problem: Problem, h: Hypothesis, weighting: Weighting) -> Array:
-    """Error (n,) of each fitted value that comes from the steps of the simulation, as halved ones show it.
+def error_of_steps(problem: Problem, shorter: Problem, h: Hypothesis, weighting: Weighting) -> Array:
+    """Error (n,) of each fitted value that comes from the steps of the simulation, as shorter ones show it.
 
     problem: with the effects of h. Steps of half the length halve an error of first order, so that there is
     twice as much of it as they take away; in steps over several samples it is of fourth order. Zero if the
-    record rejects halved steps, because they change what the FMU receives.
+    record rejects shorter steps, because they change what the FMU receives.
     """
-    halved = in_halved_steps(problem)
-    now, before = weighted(halved, h.theta, weighting), h.fit.residual
+    if shorter.steps == problem.steps:
+        return np.zeros(len(h.fit.unknowns))
+    now, before = weighted(shorter, h.theta, weighting), h.fit.residual
     again = relaxed(h.fit, now)
     if is_worse(again, before, problem):
         return np.zeros(len(h.fit.unknowns))
@@ -109,16 +154,20 @@ def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
     """
     before, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     best = min(some, key=cost)
-    if before.steps.joined:
-        if not inputs_held(built(before, best.candidates), best, weighting):
-            return resolved(before, some, weighting)
-        fitter = fitter.asked(before.in_steps(USUAL))
+    if inputs_held(built(before, best.candidates), best, weighting):
+        fitter = fitter.asked(before.in_steps(before.steps.held))
         before, best = fitter.baseline.problem, in_divided_steps(fitter, best)
+    elif before.steps.joined:
+        return resolved(before, some, weighting)
     finer = resolved(before, some, weighting)
     if finer.steps == before.steps:
         return before
+    # a foreign FMU receives the same inputs, however often it is coupled
+    undivided = before.in_steps(finer.steps._replace(parts=before.steps.parts))
+    if finer.steps == undivided.steps:
+        return finer
     again = in_divided_steps(fitter.asked(finer), best)
-    return before if rejected(fitter.baseline, best, again) else finer
+    return undivided if rejected(fitter.baseline, best, again) else finer
 
 
 def rejected(baseline: Baseline, h: Hypothesis, again: Hypothesis) -> bool:
@@ -146,11 +195,13 @@ def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
     h = within_error(here, h, weighting)
     residual = weighted(here, h.theta, weighting)
     error = np.sqrt(np.diag(h.fit.covariance))
-    while problem.steps.parts < limits.parts_of_a_step:
-        halved = in_halved_steps(problem)
-        now = weighted(built(halved, h.candidates), h.theta, weighting)
-        moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
-        if np.all(np.abs(moved) <= limits.moved_by_steps * error):
-            break
-        problem, residual = halved, now
+    for shorten in SHORTEN:
+        while (shorter := shorten(problem)).steps != problem.steps:
+            if shorter.steps.parts > limits.parts_of_a_step:
+                break
+            now = weighted(built(shorter, h.candidates), h.theta, weighting)
+            moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
+            if np.all(np.abs(moved) <= limits.moved_by_steps * error):
+                break
+            problem, residual = shorter, now
     return problem

@@ -21,6 +21,8 @@ from fmus.export.around.outside import Outside
 from fmus.host.apart.isolation import Isolation
 from fmus.host.description import PortNames
 
+READINGS = 10  # of a port in a sample, if they are not more often than a builder couples at most
+
 
 @dataclass(frozen=True)
 class Unknown:
@@ -62,6 +64,13 @@ class Builder(Protocol):
     @property
     def isolation(self) -> Isolation | None:
         """Limits of the process in which the FMUs run; None: the process that uses them."""
+
+    @property
+    def coupling(self) -> float:
+        """Longest time between two readings of the ports by effects, s; 0 if these are part of the FMU."""
+
+    def coupled_every(self, step: float) -> Builder:
+        """The same with effects that read the ports every so many s."""
 
     def outside(self) -> Outside:
         """Ports, parameters and inputs of the FMU at which effects can be placed."""
@@ -106,8 +115,18 @@ class Problem:
 
     def plant_with(self, outputs: tuple[str, ...]) -> Plant:
         """The same with other outputs."""
-        builder = self.builder
-        return PLANTS.get(builder(self.effects), self.record.inputs, outputs, builder.isolation)
+        return PLANTS.get(self.fmu, self.record.inputs, outputs, self.builder.isolation)
+
+    @property
+    def fmu(self) -> Path:
+        """The FMU with the effects, as it is simulated."""
+        return self.builder.coupled_every(self.steps.coupled or self.coupling)(self.effects)
+
+    @property
+    def coupling(self) -> float:
+        """Usual time between two readings of the ports by effects, s; 0 if these are part of the FMU."""
+        often = self.builder.coupling
+        return max(often, self.record.sample / READINGS) if often else 0.0
 
     @property
     def at_once(self) -> int:

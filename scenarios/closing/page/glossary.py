@@ -59,10 +59,10 @@ def glossary(problem: Problem, hypotheses: Iterable[Hypothesis]) -> Glossary:
 
     Where the FMU states no unit, a variable has the one that the experiment declares.
     """
-    variables = dict(describe(problem.builder(problem.effects)).variables)
+    variables = dict(describe(problem.fmu).variables)
     for h in hypotheses:
         here = built(problem, h.candidates)
-        variables |= describe(here.builder(here.effects)).variables
+        variables |= describe(here.fmu).variables
     stated = {c.variable: c.model_unit for c in problem.record.conversions if c.model_unit}
     return Glossary({n: v if v.unit else replace(v, unit=stated.get(n)) for n, v in variables.items()})
 
