@@ -98,7 +98,7 @@ def test_a_late_clock_is_no_effect(builder, offset, scatter):
     assert abs(fit.theta[CLOCK] - offset * DT) < 4 * fit.std[CLOCK]
 
 
-@pytest.mark.parametrize(("offset", "scatter"), [(0.7, 0.0), (-0.5, 0.1)])
+@pytest.mark.parametrize(("offset", "scatter"), [pytest.param(0.7, 0.0, marks=pytest.mark.slow), (-0.5, 0.1)])
 def test_an_effect_is_found_beside_a_late_clock(builder, offset, scatter):
     found = trace(problem(builder, measured(coulomb(20.0), offset, 4, scatter)), jobs=1)
     assert "coulomb_friction@carriage" in [m.label for m in found.judgement.members]

@@ -26,6 +26,7 @@ G, E, NU = 9.81, 2 * 8e10 * 1.28, 0.28
 APART = {"wheel": "EN15302_WheelH", "rail": "EN15302_RailA", "cant": 0.0}  # tread and flange, with a wide gap
 NEAR = {"wheel": "EN15302_WheelH"}  # the same wheel on 60E1, with half of that gap
 PAIRS = {"apart": APART, "near": NEAR, "in one": {}}
+SLOW = pytest.param("near", marks=pytest.mark.slow)  # tables of its own, between those of the others
 LOADS = ("Y_1_right", "Q_1_right", "T_gamma_1_right")
 
 
@@ -63,7 +64,7 @@ def test_the_load_is_divided_at_the_height_where_both_carry_it(Q, tread, flange,
     assert_allclose(got, carried(height), rtol=1e-4, atol=1e-4 * Q)
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", ["apart", SLOW, "in one"])
 @pytest.mark.parametrize("y", [-3e-3, 0.0, 2e-3, 4e-3, 5e-3])
 def test_away_from_the_flange_both_forms_agree(pair, y):
     one, two = at(pair, y, 1), at(pair, y, 2)
@@ -79,7 +80,7 @@ def test_what_no_gap_parts_is_one_contact(y):
         assert two[name] == pytest.approx(one[name], rel=0.02), name
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", ["apart", SLOW, "in one"])
 def test_forces_change_steadily_on_the_way_to_the_flange(pair):
     """In steps of 1 um no force makes a jump, only as much as a steep flank asks for."""
     way = np.arange(5.6e-3, 7.0e-3, 1e-6)
@@ -89,7 +90,7 @@ def test_forces_change_steadily_on_the_way_to_the_flange(pair):
         assert np.abs(np.diff(values)).max() < most * np.ptp(values), name
 
 
-@pytest.mark.parametrize("pair", ["apart", "near"])
+@pytest.mark.parametrize("pair", ["apart", SLOW])
 def test_both_parts_carry_where_their_distances_are_near(pair):
     way = np.arange(5.6e-3, 7.0e-3, 1e-5)
     share = [o["T_gamma_flange_1_right"] / o["T_gamma_1_right"] for o in (at(pair, y) for y in way)]
@@ -99,7 +100,7 @@ def test_both_parts_carry_where_their_distances_are_near(pair):
     assert np.diff(share).min() > -0.02
 
 
-@pytest.mark.parametrize("pair", ["apart", "near"])
+@pytest.mark.parametrize("pair", ["apart", SLOW])
 def test_loads_are_those_of_two_ellipses_found_by_looking_at_every_place(pair):
     """Hertz's springs at the nearest places of tread and flange, with curvatures over 1 mm there."""
     given = {"wheel": "S1002", "rail": "60E1", "cant": 1 / 40} | PAIRS[pair]
