@@ -28,7 +28,7 @@ class Steps(NamedTuple):
     joined: whether a step goes over four parts and knows its inputs within them, for which the FMU must be
     one of ours, see `Fmu.simulate_rows`. If not, the mean of its inputs acts over each part. coupled: the
     longest time between two readings of a foreign FMU's ports, s, 0 for the usual one; it is a matter of the
-    build that a plant runs, see `Problem.plant`. settled: whether a short part at the end of each usual step
+    build that a plant runs, see `Problem.fmu`. settled: whether a short part at the end of each usual step
     shows outputs the inputs of the sample; many an FMU computes outputs in a step, from what acts over it.
     """
 

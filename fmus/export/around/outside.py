@@ -185,9 +185,9 @@ class Laws:
     """Effects around a carried FMU, from its motion m = (q, v) at each port and the table's settable part z.
 
     states, parameters: what the effects bring; told: names of the inputs and parameters that the FMU is
-    given by the laws. push(m0, m, z, dt) -> their values for a step: in its middle, each port moved on by its
-    velocity and its acceleration since m0. dt: length of the step and time from m0 to m, s, inf if there is
-    no m0. go_on(m0, m1, z, dt) -> the states after a step, the motion linear over it.
+    given by the laws. push(m0, m, z, dt, since) -> their values for a step: in its middle, each port moved
+    on by its velocity and its acceleration since m0. dt: length of the step, s; since: time from m0 to m, s,
+    inf if there is no m0. go_on(m0, m1, z, dt) -> the states after a step, the motion linear over it.
     """
 
     states: list[State]
@@ -210,21 +210,20 @@ def laws(description: FmuDescription, ports: Sequence[PortNames], effects: Seque
         )
     )
     z, rest = cs.vertcat(unseen, x, foreign, own), cs.vertcat(foreign, own)
-    m0, m1, dt = (
-        cs.SX.sym(name, n) for name, n in (("m0", 2 * len(ports)), ("m1", 2 * len(ports)), ("dt", 2))
-    )
-    half = moved_on(m1, dt[0] / 2, (m1 - m0) / dt[1])
+    m0, m1 = (cs.SX.sym(name, 2 * len(ports)) for name in ("m0", "m1"))
+    dt, since = cs.SX.sym("dt"), cs.SX.sym("since")
+    half = moved_on(m1, dt / 2, (m1 - m0) / since)
 
     def rates(m: Expr, state: Expr) -> Expr:
         return made.rates(m, state, rest)
 
-    middle = made.values(half, runge_kutta(rates, x, dt[0] / 2, straight(m1, half)), rest)
-    after = runge_kutta(rates, x, dt[0], straight(m0, m1))
+    middle = made.values(half, runge_kutta(rates, x, dt / 2, straight(m1, half)), rest)
+    after = runge_kutta(rates, x, dt, straight(m0, m1))
     return Laws(
         made.states,
         made.parameters,
         made.told,
-        cs.Function("push", [m0, m1, z, dt], [cs.cse(middle)]),
+        cs.Function("push", [m0, m1, z, dt, since], [cs.cse(middle)]),
         cs.Function("go_on", [m0, m1, z, dt], [cs.cse(after)]),
     )
 

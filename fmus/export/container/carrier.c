@@ -205,11 +205,11 @@ static int see(Instance *m) {
 /* Set what the laws give, for the middle of a step of length dt. */
 static int by_the_laws(Instance *m, double dt) {
     if (!N_TOLD) return 0;
-    double lengths[] = {dt, m->since};
     m->arg[0] = m->earlier;
     m->arg[1] = m->motion;
     m->arg[2] = m->values;
-    m->arg[3] = lengths;
+    m->arg[3] = &dt;
+    m->arg[4] = &m->since;
     m->res[0] = m->told;
     if (push(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
     return set_base(m, TOLD, N_TOLD, m->told);
@@ -217,11 +217,10 @@ static int by_the_laws(Instance *m, double dt) {
 
 static int remember(Instance *m, double dt) {
     if (!N_MEMORY) return 0;
-    double lengths[] = {dt, m->since};
     m->arg[0] = m->before;
     m->arg[1] = m->motion;
     m->arg[2] = m->values;
-    m->arg[3] = lengths;
+    m->arg[3] = &dt;
     m->res[0] = m->memory;
     if (go_on(m->arg, m->res, m->iw, m->w, 0)) return (int)fmi2Error;
     memcpy(m->values + FIRST_MEMORY, m->memory, N_MEMORY * sizeof(double));

@@ -51,13 +51,13 @@ class Slave(common.Slave):
         sizes = [EQUATIONS.sizes(name) for name in ("push", "go_on")]
         self.earlier, self.before, self.motion = (array("d", bytes(8 * sizes[0][0][0])) for _ in range(3))
         self.told, self.memory = (array("d", bytes(8 * found[0])) for _, found in sizes)
-        # lengths of the step and, s, of the time from `earlier` to `motion`, endless if there is none
-        self.dt, self.last = array("d", [0.0, math.inf]), 0.0
+        self.dt, self.last = array("d", [0.0]), 0.0  # s, lengths of this step and of the last one
+        self.since = array("d", [math.inf])  # s, from `earlier` to `motion`; endless if there is no `earlier`
         settable = memoryview(self.values)[: common.SETTABLE]
-        known = (self.earlier, self.motion, settable, self.dt)
-        self.work_out = EQUATIONS.on_memory("push", known, (self.told,))
-        known = (self.before, self.motion, settable, self.dt)
-        self.remember = EQUATIONS.on_memory("go_on", known, (self.memory,))
+        seen = (self.earlier, self.motion, settable, self.dt, self.since)
+        passed = (self.before, self.motion, settable, self.dt)
+        self.work_out = EQUATIONS.on_memory("push", seen, (self.told,))
+        self.remember = EQUATIONS.on_memory("go_on", passed, (self.memory,))
         self.read = self.base.getter(_references(BASE["motion"]), self.motion)
         self.tell = self.base.setter(_references(TOLD), self.told)
         parts = (range(MEMORY.start), OUTPUTS)
@@ -93,7 +93,7 @@ class Slave(common.Slave):
         """The carried FMU may step."""
         self._pass_on(set(INPUTS))
         self.read()
-        self.dt[1] = math.inf
+        self.since[0] = math.inf
         self._by_the_laws()
         self.base.leave()
         self.running = True
@@ -115,7 +115,7 @@ class Slave(common.Slave):
     def _changed(self, indices: set[int]) -> None:
         self._pass_on(indices)
         if not indices <= {*INPUTS}:
-            self.dt[1] = math.inf  # it moves otherwise than before
+            self.since[0] = math.inf  # it moves otherwise than before
         if not indices <= PASSED:
             self.read()
             self._by_the_laws()
@@ -154,11 +154,11 @@ class Slave(common.Slave):
 
         Over the step before too if this one is much shorter: a difference over little time is inaccurate.
         """
-        if math.isfinite(self.dt[1]) and dt < self.last / 2:
-            self.dt[1] += dt
+        if math.isfinite(self.since[0]) and dt < self.last / 2:
+            self.since[0] += dt
         else:
             self.earlier[:] = self.before
-            self.dt[1] = dt
+            self.since[0] = dt
         self.last = dt
 
     def _by_the_laws(self) -> None:
