@@ -19,6 +19,12 @@ CONFIDENT = ("traced", "several", "sensor_fault")
 SILENT = ("no_discrepancy", "insufficient_excitation")
 OF_NO_MOTION = ("constant_force", "step_force", "harmonic_excitation")  # forces that depend on no motion
 SUSPENSIONS = ("secondary", "primary")
+CHANGES = ("stiffness_change", "damping_change")
+# stiffness and damping of which a whole suspension consists
+PARTS = {
+    "vehicle": {"secondary": ("k1", "b1"), "primary": ("k2", "b2")},
+    "wheelset": {"primary_lateral": ("k_y", "b_y"), "primary_yaw": ("k_x", "b_x")},
+}
 
 
 @dataclass(frozen=True)
@@ -73,10 +79,12 @@ def other_names(system: str, item: Item) -> set[Pair]:
             found |= {(kind, "wheelset_lateral"), (kind, "contact")}  # both push the wheelset aside
     if system in ("vehicle", "wheelset") and at.startswith(SUSPENSIONS):
         if kind == "viscous_damping":
-            found.add(("damping_change", at))  # the same as a stronger damper
+            stronger = Item("damping_change", at)  # the same as a stronger damper
+            found |= {stronger.pair, *_of_a_suspension(system, stronger)}
         whole = not item.parameters.get("t0")
         if kind == "damping_change" and whole and float(item.parameters["change"]) > 0:  # type: ignore[arg-type]
             found |= other_names(system, Item("viscous_damping", at))
+    found |= _of_a_suspension(system, item)
     if system == "rig" and kind.startswith("parameter_") and at in ("mu0", "N"):
         found |= {(kind, "mu0"), (kind, "N")}  # nearly the same: Polach's force depends on their product
     if system == "wheelset" and kind.startswith("parameter_"):
@@ -85,6 +93,17 @@ def other_names(system: str, item: Item) -> set[Pair]:
         if at in FRICTION:
             found.add((kind, "friction_condition"))  # the group of the parameter
     return found
+
+
+def _of_a_suspension(system: str, item: Item) -> set[Pair]:
+    """The two names of a change of a whole suspension: of its component and of its parameter."""
+    since = "parameter_step" if item.parameters.get("t0") else "parameter_offset"
+    pairs = (
+        {(change, place), (since, parameter)}
+        for place, parameters in PARTS.get(system, {}).items()
+        for change, parameter in zip(CHANGES, parameters, strict=True)
+    )
+    return {pair for names in pairs if item.pair in names for pair in names}
 
 
 def named(truth: Truth, names: Iterable[Pair]) -> list[bool]:

@@ -56,6 +56,7 @@ from benchmarks.challenge.truth import (
 from estimator.closeloop.policy import DEFAULT
 from fmus.export.builders.hypotheses import ModelBuilder
 from tests.helpers.carriage import coulomb, looked_at, problem, record, to_and_fro
+from tests.truth import wheelset
 from tests.truth.wheelset_motion import places as wheelset_places
 
 VOCABULARY = [  # the contract's kinds
@@ -254,6 +255,8 @@ def test_torque_can_still_be_held_on_the_lowest_friction():
 # when an answer is right
 
 STIFF = {"change": 10.0, "t0": 0.0}
+SOFTER = {"change": -0.5, "t0": 0.0}
+LATER = {"change": 0.5, "t0": 0.5}
 LATE = {"F_0": 900.0, "t0": 0.5}
 SAME = [
     ("wheelset", "viscous_damping", "primary_yaw", {"c": 3e4}, "viscous_damping", "wheelset_yaw", {"c": 3e4}),
@@ -268,6 +271,22 @@ SAME = [
         STIFF,
     ),
     ("vehicle", "damping_change", "secondary_fl", STIFF, "viscous_damping", "secondary_fl", {"c": 1e4}),
+    ("vehicle", "stiffness_change", "secondary", SOFTER, "parameter_offset", "k1", {"delta": -2e5}),
+    ("vehicle", "damping_change", "secondary", SOFTER, "parameter_offset", "b1", {"delta": -1e4}),
+    ("vehicle", "stiffness_change", "primary", SOFTER, "parameter_offset", "k2", {"delta": -2e5}),
+    ("vehicle", "damping_change", "primary", LATER, "parameter_step", "b2", {"delta": 5e3, "t0": 0.5}),
+    ("wheelset", "stiffness_change", "primary_lateral", SOFTER, "parameter_offset", "k_y", {"delta": -1e5}),
+    ("wheelset", "damping_change", "primary_lateral", SOFTER, "parameter_offset", "b_y", {"delta": 1e4}),
+    (
+        "wheelset",
+        "stiffness_change",
+        "primary_yaw",
+        LATER,
+        "parameter_step",
+        "k_x",
+        {"delta": 1e6, "t0": 0.5},
+    ),
+    ("wheelset", "damping_change", "primary_yaw", SOFTER, "parameter_offset", "b_x", {"delta": 1e4}),
 ]
 
 
@@ -280,8 +299,9 @@ def brief(monkeypatch):
 def test_other_names_move_alike(system, kind, at, p, kind2, at2, p2, brief):
     here = bench(system, np.random.default_rng(2))
     sizes = {**p, **p2}
-    if "change" in sizes:  # of the same size as the law
-        sizes["change"] = sizes["c"] / here.strength(at)[1]
+    if "change" in sizes:  # of the same size as the law or as the change of the parameter
+        whole = here.true.get(at2) or getattr(wheelset.DECLARED, at2, 0.0)
+        sizes["change"] = sizes["c"] / here.strength(at)[1] if "c" in sizes else sizes["delta"] / whole
     one, other = (Item(k, a, {n: sizes[n] for n in own}) for k, a, own in ((kind, at, p), (kind2, at2, p2)))
     assert other.pair in other_names(system, one)
     assert one.pair in other_names(system, other)
@@ -296,8 +316,8 @@ def test_other_names_move_alike(system, kind, at, p, kind2, at2, p2, brief):
     ("system", "item"),
     [
         ("vehicle", Item("coulomb_friction", "secondary_fl")),
-        ("vehicle", Item("damping_change", "primary", {"change": -0.5, "t0": 0.0})),
-        ("vehicle", Item("damping_change", "primary", {"change": 0.5, "t0": 9.0})),
+        ("vehicle", Item("damping_change", "primary_fl", {"change": -0.5, "t0": 0.0})),
+        ("vehicle", Item("damping_change", "primary_fl", {"change": 0.5, "t0": 9.0})),
         ("wheelset", Item("viscous_damping", "wheelset_lateral")),
         ("rig", Item("constant_force", "wheel")),
         ("rig", Item("viscous_damping", "wheel")),
