@@ -12,7 +12,7 @@ from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.closeloop.screening.screen import Screening
+from estimator.closeloop.screening.screen import FIRST_ORDER, Screening
 from estimator.record import Array, BoolArray
 from estimator.weighting import Weighting
 
@@ -110,7 +110,7 @@ def responses(
     slopes = _slopes(problem, theta, unknowns, y, size)
     values = np.array([theta.get(u.name, u.start) for u in unknowns])
     base = Fit(tuple(unknowns), values, np.eye(len(unknowns)), np.zeros(y.size), slopes)
-    screening = Screening(problem, base, weighting)
+    screening = Screening(problem, base, weighting, shares=[FIRST_ORDER])
     moved = [m for c in candidates for m in (c, *_moved(c))]
     screening.prepare(moved)
     kept, stands_for = _kept(len(screening.samples))

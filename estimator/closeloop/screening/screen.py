@@ -58,7 +58,10 @@ CHANGES_AT_ONCE = 32  # largest number of responses that are computed together
 TOGETHER = 1 << 27  # bytes of the outputs that belong to them
 
 
-SHARES_TRIED = (1.0, 1e-3)  # of a change, of which the first is simulated that the FMU can follow
+FIRST_ORDER = 1e-3  # share of a change, to which an FMU answers to first order
+
+
+SHARES_TRIED = (1.0, FIRST_ORDER)  # of a change, of which the first is simulated that the FMU can follow
 RUNAWAY = 1e9  # weighted residual above which the linearised response is taken as diverged
 
 
@@ -67,13 +70,16 @@ class Screening:
 
     weighting: that of the fit's residual. forces: missing force at each port with the smoothed motion;
     a law is evaluated along that motion, since the FMU without the law may move quite differently.
+    shares: of a change that has to be simulated, of which the first is taken that the FMU can follow.
     fit: the fit with its samples averaged in groups (see `grouped.py`), to which the changes refer.
     """
 
     def __init__(
-        self, problem: Problem, base: Fit, weighting: Weighting, forces: Sequence[MissingForce] = ()
-    ) -> None:
+        self, problem: Problem, base: Fit, weighting: Weighting, forces: Sequence[MissingForce] = (),
+        shares: Sequence[float] = SHARES_TRIED,
+    ) -> None:  # fmt: skip
         self.problem, self.theta, self.weighting, self.forces = problem, base.theta, weighting, forces
+        self._shares = shares
         self._shown = all_set_aside(problem.simulate(self.theta))
         # prediction errors change from sample to sample, so that they have no means over groups
         self.group = group_size(problem, self._shown[0]) if weighting.is_white else 1
@@ -194,7 +200,7 @@ class Screening:
         An FMU may not be able to follow a change. A small share of it then tells the response to all of it;
         a change of which it cannot follow even that has none.
         """
-        for share in SHARES_TRIED:
+        for share in self._shares:
             try:
                 with np.errstate(over="ignore", invalid="ignore"):  # of a change that grows without limit
                     return self._simulated_share(change, share) / share

@@ -99,6 +99,10 @@ class Lanes(NamedTuple):
     called: str
 
 
+# not inlined, for the compiler would take as long for each place of a call as for the function
+APART = "VECTORS static __attribute__((noinline)) void"
+
+
 def lanes_of(functions: Sequence[cs.Function]) -> Lanes | None:
     """Each function under its own name: arguments one after the other, results likewise.
 
@@ -110,10 +114,7 @@ def lanes_of(functions: Sequence[cs.Function]) -> Lanes | None:
     except NotImplementedError:
         return None
     declared = [f"CALLED {name}{ARGUMENTS};" for name in printer.functions]
-    own = [
-        _definition("VECTORS static void", f"lanes_{f.name()}", body)
-        for f, body in zip(functions, bodies, strict=True)
-    ]
+    own = [_definition(APART, f"lanes_{f.name()}", body) for f, body in zip(functions, bodies, strict=True)]
     called = [_definition("CALLED", name, body) for name, body in printer.functions.items()]
     return Lanes(_file([*declared, *own]), _file([*printer.tables.values(), *called]) if called else "")
 

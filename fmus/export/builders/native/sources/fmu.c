@@ -19,15 +19,17 @@
 #pragma GCC diagnostic ignored "-Wunused-function" /* CasADi offers more than is asked here */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
+#if defined(IN_ROWS) && defined(__clang__)
+#define SELDOM_CALLED _Pragma("clang optimize off") /* by rows; half of the compiler's time */
+#define OFTEN_CALLED _Pragma("clang optimize on")
+#else
+#define SELDOM_CALLED
+#define OFTEN_CALLED
+#endif
 #define CASADI_SYMBOL_EXPORT static
 #include "quick.c"
-#if defined(IN_ROWS) && defined(__clang__)
-#pragma clang optimize off /* a third of the compiler's time */
-#endif
+SELDOM_CALLED
 #include "equations.c"
-#if defined(IN_ROWS) && defined(__clang__)
-#pragma clang optimize on
-#endif
 #undef pow
 #undef floor
 #if defined(__GNUC__)
@@ -37,11 +39,15 @@
 #include "instance.h"
 
 #include "instance.c"
+OFTEN_CALLED
 #include "values.c"
 #include "stepping.c"
+SELDOM_CALLED
 #include "states.c"
 #include "derivatives.c"
+OFTEN_CALLED
 #include "lanes.c"
+SELDOM_CALLED
 
 #if FMI_VERSION == 2
 #include "fmi2.c"
