@@ -267,6 +267,19 @@ def test_a_simpler_law_that_the_identify_part_denies_does_not_take_its_place(for
     assert only.candidates[0].kind == stays
 
 
+def test_a_law_that_the_record_prefers_is_not_replaced_by_its_limit_however_alike_both_are():
+    best, simple = law("stribeck_friction", 2, 19.0), law("coulomb_friction", 0, 0.0)
+    noise = np.where(np.arange(len(T)) % 2, 1.0, -1.0)
+    ahead, behind = (
+        replace(h, residuals=(h.residuals[0] + [0.0, 1.0] * noise[:, None],)) for h in (best, simple)
+    )
+    asked_for = baseline(asked(), noise=NOISE)
+    gained = asked_for.lead(ahead, behind)[0]
+    assert 2 * DEFAULT.decision.unknown < gained < DEFAULT.decision.alike * -asked_for.score(ahead)
+    assert alike(ahead, [ahead, behind]) == [ahead, behind]
+    assert alike(ahead, [ahead, behind], FORM) == [behind]  # the form may have gained it
+
+
 def test_where_the_motion_does_not_show_the_curve_what_lies_between_stays():
     """At one speed constant, Coulomb and viscous are alike; Coulomb friction becomes viscous damping."""
     found = [law(kind, extra, 0.0) for kind, extra in (("coulomb_friction", 1), ("viscous_damping", 0))]

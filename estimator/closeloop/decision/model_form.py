@@ -44,12 +44,22 @@ class ModelForm(ABC):
         """Whether the residual of each output (n_y,) on a part comes down to its noise or the open share."""
 
     @abstractmethod
-    def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
-        """Whether the record rejects h against the best one; price: log score for unknowns that h lacks."""
+    def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
+        """Whether the record rejects h against the best one, by more than an error of form may cause."""
 
     @abstractmethod
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """Whether a richer hypothesis fits the part to identify better than it could if h were right."""
+
+    def prefers(self, best: Hypothesis, h: Hypothesis) -> bool:
+        """Whether the record prefers the best one to h, however alike; an open form may gain as much."""
+        b = self.baseline
+        return self.exact and b.lead(best, h)[0] >= self._price(best, h) and b.beats(best, h)
+
+    def _price(self, h: Hypothesis, simpler: Hypothesis) -> float:
+        """Log score that the unknowns must gain which a law has beyond those of its limit."""
+        further = len(h.fit.unknowns) - len(simpler.fit.unknowns) if becomes(h, simpler) else 0
+        return self.baseline.policy.decision.unknown * further
 
     def calls_for_effect(self, began: bool) -> list[Check]:
         """The checks that the residual exceeds what needs no effect: undeclared noise, and the open share."""
@@ -100,13 +110,12 @@ class Closed(ModelForm):
         little = beyond <= b.policy.detection.signal_share * signal_size(b.problem)
         return self._at_noise(h, part) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
 
-    def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
+    def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
         """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
         b, limits = self.baseline, self.baseline.policy.decision
-        alike = limits.alike * -b.score(best)
         worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
-        better = b.lead(best, h)[0] >= max(price, alike) and b.beats(best, h)
-        return (h.fit.converged and worse) or better
+        large = b.lead(best, h)[0] >= limits.alike * -b.score(best)
+        return (h.fit.converged and worse) or (large and self.prefers(best, h))
 
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """See ModelForm; richer: a law with h as its limit, or h and one more effect.
@@ -160,12 +169,11 @@ class Open(ModelForm):
         small = (was < share) | (before < limits.detection.open_form_noises * noise)
         return np.asarray(down | np.where(small, no_worse, left < share))
 
-    def distinguishes(self, best: Hypothesis, h: Hypothesis, price: float) -> bool:
+    def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
         """See ModelForm; by both parts together, because the open form adds to what the best one leaves."""
         b, limits = self.baseline, self.baseline.policy.decision
-        alike = limits.alike * -b.score(best)
-        alike = max(alike, limits.open_alike * b.beyond_noise_of_all(best) / 2)
-        return b.lead(best, h)[0] + (cost(h) - cost(best)) / 2 >= max(price, alike)
+        alike = max(limits.alike * -b.score(best), limits.open_alike * b.beyond_noise_of_all(best) / 2)
+        return b.lead(best, h)[0] + (cost(h) - cost(best)) / 2 >= max(self._price(best, h), alike)
 
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """See ModelForm; never, because the gain may come from the open form."""

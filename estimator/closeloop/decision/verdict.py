@@ -156,8 +156,7 @@ def judge(
     both = [h for h in better_than_one if explains(baseline, h)]
     if both and (not good or completes(baseline, both[0], good[0], kinds)):
         members = [h for h in equivalent(baseline, both[0], both) if not one_curve(h)]
-        checks = account(baseline, both[0])
-        return (Judgement.naming(members) if members else no_law(both[0])).after(checks)
+        return (Judgement.naming(members) if members else no_law(both[0])).after(account(baseline, both[0]))
     if good:
         members = equivalent(baseline, good[0], good)
         best, checks = members[0], account(baseline, members[0])
@@ -182,9 +181,8 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     if _noise_alone(baseline, "choose"):
         reason = "the part to choose shows only noise: the discrepancy ends before it and cannot be confirmed"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to choose")
-    label = nearest.label if nearest.candidates else "none"
-    reason = f"no effect of the library accounts for the residual; best fit: {label}"
-    return Judgement(checks, (), reason)
+    why = "no effect of the library accounts for the residual; best fit: "
+    return Judgement(checks, (), why + nearest.label)
 
 
 def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: int) -> bool:
