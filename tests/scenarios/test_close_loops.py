@@ -14,7 +14,7 @@ from fmus.drive.model import Drive
 from fmus.errors import BadInput
 from fmus.export.builders.pythonfmu import build_python
 from fmus.host.fmu import FmuError
-from scenarios import close_loops
+from scenarios import close_loop, close_loops
 from scenarios.closing import closing
 from scenarios.closing.several import fmu_of
 from scenarios.closing.several_results import COLUMNS, Results
@@ -43,31 +43,38 @@ Outcomes = dict[float, Outcome]  # by the speed at the start
 
 
 @pytest.fixture(scope="module")
-def both(two: list[Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Results, Path, Outcomes]:
-    """Both experiments, closed once, the folder written, and what the chain found in each."""
-    out, outcomes = tmp_path_factory.mktemp("out"), {}
+def outcomes(two: list[Path]) -> Outcomes:
+    """What the chain finds in each experiment."""
+    found: Outcomes = {}
 
     def keep(problem, *more):
-        outcomes[problem.declared["q_dot"]] = chain.trace(problem, *more)
-        return outcomes[problem.declared["q_dot"]]
+        found[problem.declared["q_dot"]] = chain.trace(problem, *more)
+        return found[problem.declared["q_dot"]]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(TRACE, keep)
-        return close_loops(two, out, jobs=1), out, outcomes
+        for experiment in two:
+            close_loop(experiment, jobs=1)
+    return found
 
 
-@pytest.fixture
-def closed(both: tuple[Results, Path, Outcomes]) -> tuple[Results, Path]:
+@pytest.fixture(scope="module")
+def closed(
+    two: list[Path], outcomes: Outcomes, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Results, Path]:
     """Both experiments, closed once, and the folder written."""
-    return both[:2]
+    out = tmp_path_factory.mktemp("out")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(TRACE, lambda problem, *more: outcomes[problem.declared["q_dot"]])
+        return close_loops(two, out, jobs=1), out
 
 
 @pytest.fixture
-def known(both: tuple[Results, Path, Outcomes], monkeypatch) -> None:
-    """The chain finds what it found before, at once; FMUs and reports are those of the fixture `both`."""
+def known(outcomes: Outcomes, monkeypatch) -> None:
+    """The chain finds what it found before, at once; no FMUs and no reports are written."""
     monkeypatch.setattr("scenarios.closing.closing.augment", lambda *a: ())
     monkeypatch.setattr("scenarios.closing.report.write_report", lambda *a: None)
-    monkeypatch.setattr(TRACE, lambda problem, *more: both[2][problem.declared["q_dot"]])
+    monkeypatch.setattr(TRACE, lambda problem, *more: outcomes[problem.declared["q_dot"]])
 
 
 def rows(out: Path) -> list[dict[str, str]]:
