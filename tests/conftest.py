@@ -1,10 +1,15 @@
 """FMUs built once for all tests, and examples without a time limit."""
 
+import fcntl
 import os
+import pickle
 import shutil
 import signal
 from collections.abc import Callable, Iterator
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 from hypothesis import settings
@@ -27,6 +32,19 @@ settings.load_profile("same-draws")  # one tree, one result; `make test-all` dra
 
 DEMO = SHIPPED / "demo" / "rig-drag"
 Built = Callable[..., Path]
+Made = TypeVar("Made")
+
+
+def once(place: Path, make: Callable[[], Made]) -> Made:
+    """What `make` makes in the folder `place`, made by one of the processes of a run for all of them."""
+    place.mkdir(parents=True, exist_ok=True)
+    kept = place.with_suffix(".pickle")
+    with place.with_suffix(".lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        if not kept.exists():
+            kept.write_bytes(pickle.dumps(make()))
+    made: Made = pickle.loads(kept.read_bytes())
+    return made
 
 
 @pytest.fixture(autouse=True)
@@ -35,13 +53,18 @@ def no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(voice, "PATIENCE", 1e9)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """What is computed once is kept for this run alone, by all of its processes together."""
+@pytest.fixture(scope="session")
+def whole_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of all processes of this run together."""
     own = tmp_path_factory.getbasetemp()
-    whole = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_its_own(whole_run: Path) -> Iterator[None]:
+    """What is computed once is kept for this run alone, by all of its processes together."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(whole / "cache"))
+        patch.setenv("XDG_CACHE_HOME", str(whole_run / "cache"))
         yield
 
 
@@ -54,17 +77,14 @@ def ctrl_c() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+def built(whole_run: Path) -> Built:
     """built(model, "kind@location", ...) is the path of that FMU; "all" stands for every effect that fits."""
-    folder = tmp_path_factory.mktemp("built")
-    made: dict[tuple[str, ...], Path] = {}
 
+    @cache
     def build(name: str, *effects: str) -> Path:
-        key = (name, *effects)
-        if key not in made:
-            chosen = fitting(name) if effects == ("all",) else map(parse_effect, effects)
-            made[key] = build_python(model_class(name)(chosen), folder / str(len(made)))
-        return made[key]
+        place = whole_run / "built" / sha256(repr((name, effects)).encode()).hexdigest()
+        chosen = fitting(name) if effects == ("all",) else map(parse_effect, effects)
+        return once(place, lambda: build_python(model_class(name)(chosen), place))
 
     return build
 
@@ -103,7 +123,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
+def demo(whole_run: Path) -> tuple[Result, Path]:
     """The bundled record, closed once, and the folder of its report."""
-    out = tmp_path_factory.mktemp("demo")
-    return close_loop(DEMO, out, jobs=1), out
+    out = whole_run / "demo"
+    return once(out, lambda: close_loop(DEMO, out, jobs=1)), out
