@@ -286,13 +286,22 @@ def seconds(file, **options):
 
 
 def test_dates_of_other_forms_are_refused_with_the_options_that_read_them(tmp_path):
-    file = written(tmp_path, ["time;n"], lambda i: f"01.02.2026 12:00:{i:02d};{comma(i % 7)}")
-    words = ("line 2: column 'time' holds '01.02.2026 12:00:00'", 'parse_dates = ["time"]', "dayfirst")
+    file = written(tmp_path, ["time;n"], lambda i: f"01/02/2026 12:00:{i:02d};{comma(i % 7)}")
+    words = ("line 2: column 'time' holds '01/02/2026 12:00:00'", 'parse_dates = ["time"]', "dayfirst")
     refused(lambda: seconds(file), *words)
     refused(lambda: survey(file), *words)
     assert_array_equal(seconds(file, parse_dates=["time"], dayfirst=True), np.arange(FEW))
     file = written(tmp_path, ["time;n"], lambda i: f"{'?' if i == 5 else f'2026-01-01 00:00:{i:02d}'};1")
     refused(lambda: seconds(file), "line 7: column 'time' holds '?'")
+
+
+@pytest.mark.parametrize("date", ["28.2.2026", "28.02.2026"])
+def test_where_dots_stand_between_them_the_day_comes_first(tmp_path, date):
+    hour = lambda i: f"{date} 23:59:{i + 20:02d},5" if i < 40 else f"1.3.2026 00:00:{i - 40:02d},5"  # noqa: E731
+    file = written(tmp_path, ["time;n"], lambda i: f"{hour(i)};{comma(i)}")
+    assert_array_equal(seconds(file), np.arange(FEW))
+    file = written(tmp_path, ["time;n"], lambda i: f"{i + 1}.13.2026 12:00:00;{comma(i)}")
+    refused(lambda: seconds(file), "line 2: column 'time' holds '1.13.2026 12:00:00'")
 
 
 def test_a_comma_may_stand_before_fractions_of_a_second(tmp_path):

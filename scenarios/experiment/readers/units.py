@@ -16,6 +16,7 @@ from scenarios.experiment.readers.sheet import Sheet
 SAME = (1.0, 0.0)  # factor and offset
 ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
 FRACTION = r"(:\d{2}),(\d+)"  # of a second
+DOTTED = r"^(\d{1,2})\.(\d{1,2})\.(\d{4})(?!\S)"  # day, month and year, wherever dots stand between them
 OFFSET = r":\d{2}(?:[.,]\d+)? *(?:Z|[+-]\d{2}(?::?\d{2})?)\s*$"  # from UTC, behind a time of day
 
 
@@ -110,8 +111,8 @@ class StatedUnits:
         return (
             f"{self._file} {self._sheet.row} {i + self._sheet.first}: column '{column}' holds "
             f"'{str(cells.iloc[i])[:40]}', neither a number nor a date of ISO 8601, such as "
-            f'2026-02-01T12:00:00.5; write these, or say parse_dates = ["{column}"] in [data], and '
-            "dayfirst = true where the day comes first"
+            "2026-02-01T12:00:00.5, or 1.2.2026 12:00:00.5; write these, or say "
+            f'parse_dates = ["{column}"] in [data], and dayfirst = true where the day comes first'
         )
 
     def stated(self, column: str, where: str, derived: int = 0) -> str | None:
@@ -184,11 +185,15 @@ def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
 def iso_dates(cells: "pd.Series[Any]", errors: Literal["raise", "coerce"], utc: bool) -> "pd.Series[Any]":
     """Text as dates of ISO 8601, which allows a comma before the fractions of a second.
 
+    The date may also be written with dots, as 31.12.2026: wherever that is done, the day comes first.
+
     errors: whether text that is no date is a ValueError, or no time; utc: whether all dates are put in UTC,
     without which different offsets are a ValueError, too.
     """
     if cells.str.contains(",", regex=False).any():
         cells = cells.str.replace(FRACTION, r"\1.\2", regex=True)
+    if cells.str.contains(".", regex=False).any():
+        cells = cells.str.replace(DOTTED, lambda m: f"{m[3]}-{m[2]:0>2}-{m[1]:0>2}", regex=True)
     return pd.to_datetime(cells, errors=errors, format="ISO8601", utc=utc)
 
 
