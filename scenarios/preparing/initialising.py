@@ -18,7 +18,7 @@ from scenarios.experiment.record import load_record
 from scenarios.output import unwritten, writable
 from scenarios.preparing.clocks import with_clocks
 from scenarios.preparing.draft import Draft, Signal, doubtful, draft, sure, with_column
-from scenarios.preparing.survey import Raster, survey
+from scenarios.preparing.survey import Raster, lines_left_out, survey
 from scenarios.preparing.text import toml_of
 from scenarios.shown import Shown, axes_or_new
 
@@ -97,8 +97,7 @@ class Initialised(Shown):
 
 def _by_name(r: Raster) -> str:
     """What was guessed of how a file is to be read."""
-    above = f"; {r.options['skiprows']} lines above the names are left out" if r.options else ""
-    return (f", in {r.time_unit} by its name" if r.time_unit else "") + above
+    return "; ".join([f", in {r.time_unit} by its name" if r.time_unit else "", *lines_left_out(r.options)])
 
 
 def _stated(s: Signal) -> str:

@@ -8,7 +8,15 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from fmus.host.description import FmuVariable
-from scenarios.preparing.quantities import alike, known, quantities_of, share_a_word, words_of
+from scenarios.preparing.quantities import (
+    QUANTITIES,
+    alike,
+    known,
+    quantities_of,
+    share_a_word,
+    unit_in_name,
+    words_of,
+)
 from scenarios.preparing.survey import Channel
 
 SURE = 0.8  # from here on a match is not asked about
@@ -25,24 +33,36 @@ class Match:
 
 
 def likeness(v: FmuVariable, channel: Channel) -> float:
-    """How much a column looks like a variable: 1 for the same name, 0 if the units contradict each other."""
+    """How much a column looks like a variable: 1 for the same name, 0 if the units contradict each other.
+
+    Where the file states no unit, the end of the column's name may tell it, as in n_wheel_rpm.
+    """
     one, other = words_of(v.name), words_of(channel.name)
     unit = channel.unit if known(channel.unit) else None
     if v.unit and unit and not alike(unit, v.unit):
         return 0.0
     if one == other:
         return 1.0
+    unit = unit or _at_the_end(channel.name, v.unit)
     meant, seen = quantities_of(v.name, v.description), quantities_of(channel.name)
     score = 0.6 * SequenceMatcher(None, " ".join(one), " ".join(other)).ratio()
     if share_a_word([*one, *words_of(v.description)], other):
         score = max(score, 0.7)
     if set(meant) & set(seen):
         score = max(score, 0.6)
+    if v.unit and unit and not alike(unit, v.unit):
+        return score / 3  # what looks like a unit in a name need not be one
     if unit and (v.unit or any(alike(unit, q.unit) for q in meant)):
         return min(score + 0.3, 0.95)
     if unit and meant and not v.unit:
         return score / 3  # the name means another quantity than the unit
     return score
+
+
+def _at_the_end(name: str, also: str | None) -> str | None:
+    """The unit of two letters or more that ends a name; one letter is an index as often."""
+    found = unit_in_name(name, [*filter(None, [also]), *(q.unit for q in QUANTITIES)])
+    return found if found and len(found) > 1 else None
 
 
 def matches(variables: Sequence[FmuVariable], channels: Sequence[Channel]) -> list[Match]:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from scenarios.experiment.readers.header import is_unit, is_value, spelled
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.preparing.lines_above import lines_above
+from scenarios.preparing.lines_below import lines_below
 from scenarios.preparing.quantities import alike, unit_in_name
 
 TIME = re.compile(  # a capital T is a torque or a temperature as often
@@ -25,6 +27,8 @@ TIME = re.compile(  # a capital T is a torque or a temperature as often
 )
 TIME_GUESSED = "a guess: it increases, and no column is called time"
 FEWEST = 4  # numbers that a channel needs to be one
+# of a text file, that options of its reader leave out
+LINES = MappingProxyType({"skiprows": "above the names", "skipfooter": "below the last row"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +93,23 @@ class Raster:
         return float(self.t[first[best]]), float(self.t[last[best]])
 
 
+def lines_left_out(options: Mapping[str, Any]) -> list[str]:
+    """What options of the reader leave out of a text file, in words."""
+    return [
+        f"{many} {'line' if many == 1 else 'lines'} {LINES[name]} {'is' if many == 1 else 'are'} left out"
+        for name, many in options.items()
+    ]
+
+
 def survey(file: Path, time: str | None = None) -> list[Raster]:
     """The rasters of a file, the one with most channels first.
 
-    time: the time column, if it is known; else it is looked for. Lines above the names of a text file are
-    left out. Raises BadInput if there is no time, or no line with the names of the columns.
+    time: the time column, if it is known; else it is looked for. Lines above the names of a text file and
+    below its last row are left out. Raises BadInput if there is no time, or no line with the names of the
+    columns.
     """
-    above = lines_above(file)
-    options = {"skiprows": above} if above else {}
+    around = {"skiprows": lines_above(file), "skipfooter": lines_below(file)}
+    options = {name: lines for name, lines in around.items() if lines}
     if time is None:
         try:
             sheet = read_with_advice(file, options=options)
@@ -198,8 +211,7 @@ def _raster(sheet: Sheet, time: str, options: Mapping[str, Any], guessed: bool =
     notes += [f"no data from {t[i]:.9g} to {t[i + 1]:.9g} s" for i in gaps[:3]]
     if unit:
         notes.append(f"the times are taken in {unit}, by the name of their column")
-    if options:
-        notes.append(f"{options['skiprows']} lines above the names are left out")
+    notes += lines_left_out(options)
     channels = tuple(c for c in found if isinstance(c, Channel))
     left_out = tuple(c for c in found if isinstance(c, str) and c)
     begin = stated.begin(time)

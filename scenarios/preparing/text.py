@@ -7,7 +7,7 @@ from math import sqrt
 from pathlib import Path
 
 from scenarios.preparing.draft import AROUND, IDENTIFY, Draft, Signal, bounds_of, is_factor, sure, uncertain
-from scenarios.preparing.survey import TIME_GUESSED, Raster
+from scenarios.preparing.survey import LINES, TIME_GUESSED, Raster
 
 BY_NAME = "a guess, by the name of the column"
 CALIBRATED = 6  # parameters; with more the user has to choose
@@ -52,7 +52,7 @@ def _time(r: Raster) -> Iterator[str]:
 
 def _options(r: Raster) -> Iterator[str]:
     for name, value in r.options.items():
-        yield f"{name} = {value!r}  # lines above the names of the columns"
+        yield f"{name} = {value!r}  # lines {LINES[name]}"
 
 
 def _clocks(made: Draft, folder: Path) -> Iterator[str]:

@@ -19,7 +19,7 @@ from scenarios.output import WRITING, replaced
 from scenarios.preparing.draft import draft, with_column
 from scenarios.preparing.initialising import Initialised, init
 from scenarios.preparing.inspecting import bandwidth, inspect
-from scenarios.preparing.matching import SURE, likeness, matches
+from scenarios.preparing.matching import ENOUGH, SURE, likeness, matches
 from scenarios.preparing.ports import port_remarks
 from scenarios.preparing.quantities import unit_in_name
 from scenarios.preparing.survey import Channel, survey
@@ -148,6 +148,16 @@ def test_likeness(name, unit, column, column_unit, sure):
     found = likeness(variable(name, unit=unit), channel(column, column_unit))
     assert 0.0 <= found <= 1.0
     assert (found >= SURE) == sure
+
+
+def test_a_unit_at_the_end_of_a_name_tells_the_quantity():
+    column = channel("n_wheel_rpm", None)
+    speed = variable("omega_w", unit="rad/s", description="wheel speed")
+    torque = variable("T_w_ext", unit="N.m", description="port: torque on the wheel")
+    assert likeness(speed, column) >= SURE
+    assert likeness(torque, column) < ENOUGH
+    lateral = variable("y", unit="mm", description="place of the wheel A")
+    assert likeness(lateral, channel("wheel_A", None)) >= ENOUGH  # one letter is an index as often
 
 
 @given(st.permutations(["voltage", "speed", "current", "junk"]))

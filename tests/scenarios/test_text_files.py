@@ -15,6 +15,7 @@ from scenarios.experiment.readers.header import is_line_of_units, is_value
 from scenarios.experiment.readers.thousands import WHOLE
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.preparing.lines_above import lines_above
+from scenarios.preparing.lines_below import lines_below
 from scenarios.preparing.survey import survey
 
 FEW = 40  # rows
@@ -276,6 +277,29 @@ def test_the_head_of_numpy_is_names(tmp_path):
 def test_names_that_no_separator_divides_are_refused(tmp_path):
     file = written(tmp_path, ["time [s] speed [rpm]"], lambda i: f"{i} {i}", name="log.txt")
     refused(lambda: read_sheet(file), "4 and 2 by blanks", "1 and 1 by commas", "in [data] sep", "skiprows")
+
+
+# --- lines below
+
+
+@pytest.mark.parametrize("separator", [";", "\t", ","])
+@pytest.mark.parametrize("below", [[], ["End of record"], ["", "Operator: Smith", "ok", ""]])
+def test_lines_below_are_found(tmp_path, separator, below):
+    row = lambda i: separator.join([f"{0.01 * i:.2f}", "---" if i == 5 else str(i % 7), "OK"])  # noqa: E731
+    file = written(tmp_path, [separator.join(["time", "n", "status"])], row, name="log.txt")
+    file.write_text(file.read_text() + "".join(f"{line}\n" for line in below))
+    assert lines_below(file) == len(below)
+    [raster] = survey(file)
+    assert raster.t.size == FEW
+    assert [c.name for c in raster.channels] == ["n"]
+    assert np.isnan(raster.channels[0].x).nonzero()[0].tolist() == [5]
+
+
+@pytest.mark.parametrize("last", ["0.40;3", "Samples;40", "mean;3.0;3.1"])
+def test_a_row_that_is_not_whole_is_not_left_out_as_words(tmp_path, last):
+    file = written(tmp_path, ["time;n;k"], lambda i: f"{i / 100};{i % 7};{i % 3}")
+    file.write_text(f"{file.read_text()}{last}\n")
+    assert lines_below(file) == 0
 
 
 # --- times

@@ -21,6 +21,7 @@ from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.thousands import remarks_on_thousands
 
 WIDER = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # as pandas says it, lines from 1
+DASHES = ("-", "--", "---")  # as many loggers write where there is no value
 UNCLOSED = re.compile(r"EOF inside string starting at row (\d+)")  # likewise, rows from 0
 
 
@@ -96,6 +97,7 @@ def _table(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
         "skip_blank_lines": False,
         "skipinitialspace": True,
         "engine": engine,
+        "na_values": [*DASHES],
     }
     if engine == "c":
         ours["low_memory"] = False
