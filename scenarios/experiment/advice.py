@@ -13,6 +13,7 @@ from scenarios.experiment.readers import read_sheet
 from scenarios.experiment.readers.csv import UnlikeLines
 from scenarios.experiment.readers.reader import NO_OPTIONS
 from scenarios.experiment.readers.sheet import Sheet
+from scenarios.experiment.readers.units import CLOCK
 
 WITH_COLONS = re.compile(r"\d+:\d{2}(:\d{2})?([.,]\d+)?(\s*[ap]\.?m\.?)?", re.IGNORECASE)
 LOOKED_AT = 200  # rows in which the line of the names is looked for
@@ -57,11 +58,12 @@ def named_below(sheet: Sheet, column: str, table: str) -> str:
     return ""
 
 
-def check_no_colons(sheet: Sheet, column: str) -> None:
-    """Raise BadInput for a time column of times of day or durations with colons, which are not read."""
+def check_colons(sheet: Sheet, column: str) -> None:
+    """Raise BadInput for a time column with colons that could be read in two ways."""
     cells = sheet.cells[column]
-    if cells.size and WITH_COLONS.fullmatch(str(cells.iloc[0]).strip()):
+    first = str(cells.iloc[0]).strip() if cells.size else ""
+    if WITH_COLONS.fullmatch(first) and not CLOCK.fullmatch(first):
         raise BadInput(
-            f"{sheet.file} {sheet.row} {sheet.first}: time column '{column}' holds '{cells.iloc[0]}', a time "
-            "of day without a date; write seconds, or dates with times, such as 2026-11-26T12:00:00.5"
+            f"{sheet.file} {sheet.row} {sheet.first}: time column '{column}' holds '{cells.iloc[0]}'; write "
+            "seconds, hours:minutes:seconds from 0 to 24 such as 15:04:05.5, or dates with times"
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput, did_you_mean
-from scenarios.experiment.advice import check_no_colons, named_below, read_with_advice
+from scenarios.experiment.advice import check_colons, named_below, read_with_advice
 from scenarios.experiment.checks import check_time
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.readers.sheet import Sheet
@@ -153,7 +153,7 @@ def _source(
     stated = StatedUnits(sheet)
     _check_units(e, name, stated)
     prefix = f"{name}: " if name else ""
-    check_no_colons(sheet, time[0])
+    check_colons(sheet, time[0])
     t = stated.seconds(time[0], f"{e.file}: {named}", time[1])
     columns = {prefix + c: t if c == time[0] else sheet.numbers(c) for c in wanted}
     check_time(str(sheet.file), time[0], t, np.arange(t.size) + sheet.first, sheet.row)

@@ -13,7 +13,7 @@ import pandas as pd
 from estimator.noise import white_noise
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
-from scenarios.experiment.advice import check_no_colons, read_with_advice
+from scenarios.experiment.advice import check_colons, read_with_advice
 from scenarios.experiment.checks import GAP, check_time, output_notes, time_notes
 from scenarios.experiment.readers.header import is_unit, is_value, spelled
 from scenarios.experiment.readers.sheet import Sheet
@@ -193,7 +193,7 @@ def _seconds(stated: StatedUnits, sheet: Sheet, column: str) -> tuple[Array, str
 
     Raises BadInput, with the line, where they do not increase.
     """
-    check_no_colons(sheet, column)
+    check_colons(sheet, column)
     unit = None if column in sheet.units or stated.begin(column) is not None else unit_in_name(column, ["s"])
     t = stated.seconds(column, f"{sheet.file}: time", unit)
     check_time(str(sheet.file), column, t, np.arange(t.size) + sheet.first, sheet.row)

@@ -12,7 +12,7 @@ from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription
 from fmus.host.master.signals import Source
 from fmus.units import column_conversion, model_unit
-from scenarios.experiment.advice import check_no_colons, read_with_advice
+from scenarios.experiment.advice import check_colons, read_with_advice
 from scenarios.experiment.checks import check_time
 from scenarios.experiment.readers.units import StatedUnits
 from scenarios.experiment.table import Number, Table
@@ -89,7 +89,7 @@ def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) ->
             raise BadInput(
                 f"key '{key}.{what}': column '{column}' {why or f'is not in {sheet.file}; {near}'}"
             )
-    check_no_colons(sheet, c.time)
+    check_colons(sheet, c.time)
     stated = StatedUnits(sheet)
     times, values = stated.seconds(c.time, f"key '{key}.time'"), sheet.numbers(c.column)
     check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row)

@@ -114,11 +114,11 @@ def blank(cell):
         (blank("pause"), ["line 52: column 'time' holds 'pause', not a number"]),
         (lambda lines: [*lines[:102], *lines[52:]], ["line 103: time column 'time' goes from"]),
         (
-            lambda lines: [*lines[:2], *(f"12:00:{i:05.2f},1,2,3" for i in range(50))],
-            ["line 3: time column 'time' holds '12:00:00.00', a time of day without a date; write seconds"],
+            lambda lines: [*lines[:2], *(f"{i // 60:02d}:{i % 60:05.2f},1,2,3" for i in range(50))],
+            ["line 3: time column 'time' holds '00:00.00'; write seconds, hours:minutes:seconds"],
         ),
     ],
-    ids=["an empty cell", "a word", "it goes back", "times of day"],
+    ids=["an empty cell", "a word", "it goes back", "minutes or hours"],
 )
 def test_a_time_that_does_not_increase_is_shown_where(tmp_path, change, words):
     with pytest.raises(BadInput, match=r"or name another column with --time: time, voltage") as raised:
@@ -131,7 +131,7 @@ def test_a_time_that_does_not_increase_is_shown_where(tmp_path, change, words):
     [
         ("Nr,Zeit,v", "{i},noon {i},{x}", "line 2: column 'Zeit' holds 'noon 0'"),
         ("sample,time,v", "{i},{half},{x}", "line 3: time column 'time' goes from 0 to 0 s"),
-        ("Weg,Uhrzeit,v", "{i},12:00:{i:02},{x}", "line 2: time column 'Uhrzeit' holds '12:00:00', a time"),
+        ("Weg,Uhrzeit,v", "{i},12:{i:02},{x}", "line 2: time column 'Uhrzeit' holds '12:00'; write"),
         ("Nr,lap [s],v", "{i},{x},{x}", "line 9: time column 'lap [s]' goes from"),
         ("time [S],n,v", "{i},{i},{x}", "unit 'S' does not fit 's'"),
         ("Weg [m],t [degC],v", "{i},{i},{x}", "unit 'degC' does not fit 's'"),

@@ -328,6 +328,29 @@ def test_where_dots_stand_between_them_the_day_comes_first(tmp_path, date):
     refused(lambda: seconds(file), "line 2: column 'time' holds '1.13.2026 12:00:00'")
 
 
+@pytest.mark.parametrize("sign", [",", "."])
+@pytest.mark.parametrize("begin", [0, 86380, 90000])
+def test_times_of_day_pass_midnight(tmp_path, sign, begin):
+    """And hours beyond 24 are time that has passed."""
+
+    def hour(i):
+        s = (begin + i) % 86400 if begin < 86400 else begin + i
+        return f"{s // 3600:02d}:{s // 60 % 60:02d}:{s % 60:02d}{sign}5"
+
+    file = written(tmp_path, ["time;n"], lambda i: f"{hour(i)};{comma(i)}")
+    stated = StatedUnits(read_sheet(file))
+    assert_allclose(stated.seconds("time", "time"), begin + 0.5 + np.arange(FEW))
+    passed = [note.sentence for note in stated.notes if "midnight" in note.sentence]
+    assert len(passed) == (begin == 86380)
+
+
+def test_a_clock_that_jumps_back_within_the_day_is_refused(tmp_path):
+    file = written(tmp_path, ["time;n"], lambda i: f"12:00:{i % 30:02d};{comma(i)}")
+    refused(lambda: survey(file), "line 32")
+    file = written(tmp_path, ["time;n"], lambda i: f"{'noon' if i == 9 else f'12:00:{i:02d}'};{comma(i)}")
+    refused(lambda: survey(file), "line 11: column 'time' holds 'noon'")
+
+
 def test_a_comma_may_stand_before_fractions_of_a_second(tmp_path):
     file = written(tmp_path, ["time;n"], lambda i: f"2026-02-01 12:00:{i:02d},{i:03d};{comma(i)}")
     assert_allclose(seconds(file), 1.001 * np.arange(FEW), atol=1e-9)

@@ -1,5 +1,6 @@
 """Compare the units that a file states for its columns with the units declared for them."""
 
+import re
 from math import isclose
 from types import MappingProxyType
 from typing import Any, Literal
@@ -15,6 +16,8 @@ from scenarios.experiment.readers.sheet import Sheet
 
 SAME = (1.0, 0.0)  # factor and offset
 ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
+CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d+)?)")  # hours, minutes, seconds
+HOUR, DAY = 3600.0, 86400.0  # s
 FRACTION = r"(:\d{2}),(\d+)"  # of a second
 DOTTED = r"^(\d{1,2})\.(\d{1,2})\.(\d{4})(?!\S)"  # day, month and year, wherever dots stand between them
 OFFSET = r":\d{2}(?:[.,]\d+)? *(?:Z|[+-]\d{2}(?::?\d{2})?)\s*$"  # from UTC, behind a time of day
@@ -92,7 +95,9 @@ class StatedUnits:
             self.notes.append(Note("unit", column, said))
             cells = cells - cells.min()
         if pd.api.types.is_string_dtype(cells) and not is_number(_first(cells)):
-            raise BadInput(self._no_time(column, cells))
+            if not cells.str.fullmatch(CLOCK).all():
+                raise BadInput(self._no_time(column, cells))
+            return self._of_clock(column, cells)
         if cells.dtype.kind == "m":
             return np.asarray(cells.dt.total_seconds(), dtype=np.float64)
         if unit is None:
@@ -102,9 +107,22 @@ class StatedUnits:
             factor, offset = conversion(unit, "s", where)
         return self._sheet.numbers(column) * factor + offset
 
+    def _of_clock(self, column: str, cells: "pd.Series[Any]") -> Array:
+        """Hours, minutes and seconds (N,) as seconds; a time of day that jumps back has passed midnight."""
+        parts = cells.str.replace(",", ".", regex=False).str.extract(CLOCK).to_numpy(dtype=np.float64)
+        t = parts @ [HOUR, 60.0, 1.0]
+        if parts[:, 0].max() >= 24:  # time that has passed
+            return t
+        found: Array = np.unwrap(t, period=DAY)
+        if found[-1] != t[-1]:
+            said = f"{self._file.name}: column '{column}' passes midnight, from where on a day is added"
+            self.notes.append(Note("unit", column, said))
+        return found
+
     def _no_time(self, column: str, cells: "pd.Series[Any]") -> str:
         """Why text is no time: its first cell that is no date, or that some dates have a time zone."""
-        words = (iso_dates(cells, "coerce", utc=True).isna() & cells.notna()).to_numpy()
+        other = iso_dates(cells, "coerce", utc=True).isna() & ~cells.str.fullmatch(CLOCK).fillna(value=True)
+        words = other.to_numpy()
         if not words.any():
             return f"{self._file}: only some dates of column '{column}' have a time zone; write all alike"
         i = int(words.argmax())
