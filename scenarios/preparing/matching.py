@@ -13,7 +13,7 @@ from scenarios.preparing.quantities import (
     alike,
     known,
     quantities_of,
-    share_a_word,
+    shared_words,
     unit_in_name,
     words_of,
 )
@@ -45,11 +45,16 @@ def likeness(v: FmuVariable, channel: Channel) -> float:
         return 1.0
     unit = unit or _at_the_end(channel.name, v.unit)
     meant, seen = quantities_of(v.name, v.description), quantities_of(channel.name)
+    if v.unit:
+        meant = [q for q in meant if alike(q.unit, v.unit)]
     score = 0.6 * SequenceMatcher(None, " ".join(one), " ".join(other)).ratio()
-    if share_a_word([*one, *words_of(v.description)], other):
-        score = max(score, 0.7)
+    shared = shared_words([*one, *words_of(v.description)], other)
     if set(meant) & set(seen):
         score = max(score, 0.6)
+    elif v.unit and quantities_of("", channel.name):  # whole words say another one, of the same part perhaps
+        shared = 0
+    if shared:
+        score = max(score, 0.7 if shared == 1 else 0.75)
     if v.unit and unit and not alike(unit, v.unit):
         return score / 3  # what looks like a unit in a name need not be one
     if unit and (v.unit or any(alike(unit, q.unit) for q in meant)):

@@ -92,6 +92,10 @@ def likely_unit(name: str, description: str, column_unit: str | None) -> str | N
     return meant[0].unit if meant else None
 
 
-def share_a_word(one: Sequence[str], other: Sequence[str]) -> bool:
-    """Whether two lists of words have one of at least three letters in common."""
-    return bool({w for w in one if len(w) > 2} & set(other))
+def shared_words(one: Sequence[str], other: Sequence[str]) -> int:
+    """How many words of at least three letters two lists have in common; a beginning of four is enough."""
+    words = {w for w in one if len(w) > 2}
+    return sum(
+        any(w == v or (min(len(w), len(v)) > 3 and (w.startswith(v) or v.startswith(w))) for w in words)
+        for v in set(other)
+    )
