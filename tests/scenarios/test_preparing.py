@@ -371,6 +371,17 @@ def test_a_trial_notices_a_wrong_unit(tmp_path):
     assert trial.candidates == dry_run(DEMO).candidates > 20
 
 
+def test_a_trial_tells_the_unit_that_nobody_stated(tmp_path):
+    """Columns in rpm that are taken for rad/s: a run from their first values has no course like theirs."""
+    data = pd.read_csv(DEMO / "data.csv")
+    data[["omega_w", "omega_r"]] *= 30 / np.pi
+    data.to_csv(tmp_path / "data.csv", index=False)
+    (tmp_path / "experiment.toml").write_bytes((DEMO / "experiment.toml").read_bytes())
+    said = [line for line in dry_run(tmp_path).lines() if "times the simulated ones" in line]
+    assert len(said) == 2
+    assert all("as if the column were in rpm: look at unit" in line for line in said)
+
+
 def test_a_trial_judges_the_parts_of_the_record_alone():
     """What lies before them may show how the FMU starts."""
     part = T >= 1.0
@@ -378,7 +389,7 @@ def test_a_trial_judges_the_parts_of_the_record_alone():
     run = Run(T, np.empty((T.size, 0)), y, part & (T < 7), part & False, part & (T >= 7))
     simulated = y + 0.01 * np.cos(40 * T)[:, None] + np.where(part, 0.0, 50.0)[:, None]
     problem = SimpleNamespace(record=Record((run,), (), ("y",), np.array([np.nan])))
-    told = Trial(problem, simulated, 1.0, 1, 1).to_frame().loc["y"]
+    told = Trial(problem, simulated, simulated, 1.0, 1, 1).to_frame().loc["y"]
     assert told["error"] == pytest.approx(0.01 / np.sqrt(2), rel=0.02)
     assert told["factor"] == pytest.approx(1.0, rel=0.01)
 
@@ -388,6 +399,7 @@ def test_the_factor_between_signals_of_one_course(factor):
     x = np.sin(T)
     assert factor_of(factor * x, x) == pytest.approx(factor)
     assert factor_of(np.cos(40 * T), x) is None
+    assert factor_of(factor * x, np.cos(40 * T), x) == pytest.approx(factor)
 
 
 @pytest.mark.parametrize(
