@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
-from pydantic import ConfigDict, Field, PlainValidator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, PlainValidator, model_validator
 
 from scenarios.experiment.estimated import Estimate
 from scenarios.experiment.table import Interval, Number, Positive, Share, Table, is_number
@@ -15,22 +15,40 @@ def key_of(column: str, file: str | None) -> str:
     return f"{file}: {column}" if file else column
 
 
+def _not_zero(value: float) -> float:
+    if value == 0:
+        raise ValueError("must not be 0, with which every value would be the same")
+    return value
+
+
 class Measured(Table):
-    """A column of the record, or of one of [files]."""
+    """A column of the record, or of one of [files]; what is measured is scale * column + offset."""
 
     column: str
     file: str | None = None
+    scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0
+    offset: Number = 0.0
 
     @property
     def key(self) -> str:
         """See key_of."""
         return key_of(self.column, self.file)
 
+    @property
+    def is_scaled(self) -> bool:
+        """Whether its unit is that of the scaled value, and not of the column in the file."""
+        return (self.scale, self.offset) != (1.0, 0.0)
+
+    def converted(self, factor: float, offset: float) -> tuple[float, float]:
+        """Factor and offset from the column, where these convert what is measured."""
+        return factor * self.scale, factor * self.offset + offset
+
 
 class InputColumn(Measured):
-    """A measured input: its column, the column's unit, and the FMU's where the FMU states none.
+    """A measured input: its column, its unit, and the FMU's where the FMU states none.
 
-    Without `unit` the column has the unit that the file states, else that of the FMU.
+    Without `unit` the column has the unit that the file states, else that of the FMU; a scaled one always has
+    that of the FMU then.
     """
 
     unit: str | None = None
@@ -45,7 +63,8 @@ def _column_or_number(value: object) -> str | float | InputColumn:
     if isinstance(value, dict):
         return InputColumn.model_validate(value)
     raise ValueError(
-        "must be a column name in quotes or a number, or a table {column, unit, model_unit, file}, "
+        "must be a column name in quotes or a number, or a table {column, unit, model_unit, file, scale, "
+        "offset}, "
         f"not {value!r}"
     )
 
@@ -96,7 +115,7 @@ class Split(Table):
 
 
 class Output(Measured):
-    """A measured output: its column, the column's unit, and the standard deviation of its noise in it.
+    """A measured output: its column, its unit, and the standard deviation of its noise in that.
 
     model_unit: the FMU's unit, to be said where the FMU states none; the column is converted to it.
     """

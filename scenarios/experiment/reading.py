@@ -162,9 +162,13 @@ def _source(
 
 def _check_units(e: Experiment, file: str | None, stated: StatedUnits) -> None:
     """Compare the units declared for the measured inputs and outputs with those stated in a file."""
-    declared = {f"[outputs.{name}]": (output.key, output.unit) for name, output in e.outputs.items()}
+    declared = {
+        f"[outputs.{name}]": (output.key, output.unit)
+        for name, output in e.outputs.items()
+        if not output.is_scaled
+    }
     for name, channel in e.input_columns.items():
-        if channel.unit is not None:
+        if channel.unit is not None and not channel.is_scaled:
             declared[f"[inputs] {name}"] = channel.key, channel.unit
     for where, (key, unit) in declared.items():
         base = base_of(e, key)

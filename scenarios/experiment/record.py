@@ -49,12 +49,11 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
         runs.append(run)
         notes += found
         conversions += inputs if not part else []
-    std = [output.noise_std or np.nan for output in experiment.outputs.values()]
     return Record(
         runs=tuple(runs),
         inputs=tuple(experiment.inputs),
         outputs=tuple(experiment.outputs),
-        noise_std=np.array(std) * np.abs(scale[:, 0]),
+        noise_std=_noise(experiment, conversions),
         notes=tuple(notes),
         conversions=tuple(conversions),
     )
@@ -74,16 +73,21 @@ def load_planned(experiment: Experiment, description: FmuDescription) -> Record:
     derived = {name: made for name, made in experiment.derived.items() if name in needed}
     inputs_alone = experiment.model_copy(update={"outputs": {}, "derived": derived})
     record = load_record(inputs_alone, description)
-    std = [
-        (output.noise_std or np.nan) * abs(c.factor)
-        for output, c in zip(experiment.outputs.values(), conversions, strict=True)
-    ]
     return replace(
         record,
         outputs=tuple(experiment.outputs),
-        noise_std=np.array(std),
+        noise_std=_noise(experiment, conversions),
         conversions=(*conversions, *record.conversions),
     )
+
+
+def _noise(e: Experiment, conversions: Sequence[Conversion]) -> Array:
+    """Declared noise (n_y,) of the outputs in the FMU's units, nan where none is declared.
+
+    conversions: those of the outputs come first.
+    """
+    declared = zip(e.outputs.values(), conversions, strict=False)
+    return np.array([(o.noise_std or np.nan) * abs(c.factor / o.scale) for o, c in declared])
 
 
 def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[list[Conversion], list[Note]]:
@@ -93,7 +97,7 @@ def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[list[Conversion], 
         where, variable = f"{e.file}: [outputs.{name}]", f"'{name}' of {fmu.name}"
         unit = model_unit(fmu.variables[name].unit, output.model_unit, variable, where)
         scale = column_conversion(output.unit, unit, variable, where)
-        found.append(Conversion(name, output.key, output.unit, unit, *scale))
+        found.append(Conversion(name, output.key, output.unit, unit, *output.converted(*scale)))
         if scale != SAME:
             said = f"column '{output.key}' is converted from {output.unit} to {unit}"
             notes.append(Note("unit", output.key, said))
@@ -140,6 +144,8 @@ def _input(e: Experiment, fmu: FmuDescription, name: str, read: Channels) -> Con
     base = base_of(e, channel.key)
     stated = read.stated[base.file]
     target = model_unit(fmu.variables[name].unit, channel.model_unit, variable, where)
+    if channel.unit is None and channel.is_scaled:
+        return Conversion(name, channel.key, target, target, *channel.converted(*SAME))
     if channel.unit is None:
         scale = stated.to(base.column, target, where, base.times)
         unit = stated.stated(base.column, where, base.times)
@@ -148,7 +154,7 @@ def _input(e: Experiment, fmu: FmuDescription, name: str, read: Channels) -> Con
     if scale != SAME:
         said = f"column '{channel.key}' is converted from {channel.unit} to {target}"
         stated.notes.append(Note("unit", channel.key, said))
-    return Conversion(name, channel.key, channel.unit, target, *scale)
+    return Conversion(name, channel.key, channel.unit, target, *channel.converted(*scale))
 
 
 def _filled(e: Experiment, t: Array, data: dict[str, Array]) -> BoolArray:

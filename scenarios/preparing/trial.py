@@ -102,7 +102,7 @@ class Trial(Shown):
         """For each output the error of the simulation, and the factor by which the measured values differ.
 
         error: rms, in the FMU's unit; share: of the standard deviation of the measured values; factor: nan if
-        the two have not the same course.
+        the two have not the same course, negative if it is the opposite one.
         """
         record, run = self.problem.record, self.problem.record.runs[0]
         used = run.fit | run.unseen  # what lies before the split may show how the FMU starts
@@ -134,7 +134,7 @@ class Trial(Shown):
             yield f"{name}: error of the simulation with declared values {said}"
             if np.isfinite(factor) and not 1 / APART < factor < APART:
                 times = f"{factor:.3g} times the simulated ones{self._as_if(name, factor)}"
-                way = "look at unit, model_unit and the column of this output"
+                way = "look at unit, model_unit, scale and the column of this output"
                 yield f"  measured values are {times}: {way}"
 
     def _as_if(self, name: str, factor: float) -> str:
@@ -142,7 +142,9 @@ class Trial(Shown):
         stated = next((c for c in self.problem.record.conversions if c.variable == name), None)
         if stated is None or stated.model_unit is None:
             return ""
-        wanted = stated.factor / factor
+        if 1 / APART < abs(factor) < APART:
+            return ""
+        wanted = abs(stated.factor / factor)
         found = [(u, conversion(u, stated.model_unit, "")[0]) for u in COMMON if alike(u, stated.model_unit)]
         near = [(abs(np.log(f / wanted)), u) for u, f in found if u != stated.unit]
         best = min(near, default=(np.inf, ""))
@@ -207,15 +209,16 @@ def _from_own_start(problem: Problem, simulated: Array) -> Array:
 def factor_of(measured: Array, *simulated: Array) -> float | None:
     """Factor between two signals (N,) of the same course, by their spreads; None if they have not the same.
 
-    Of several simulated signals the one counts whose course is most alike.
+    It is negative if one goes up where the other goes down. Of several simulated signals the one counts whose
+    course is most alike.
     """
     best, found = SAME_COURSE, None
     for x in simulated:
         spreads = float(np.std(measured)), float(np.std(x))
         if np.all(np.isfinite(spreads)) and min(spreads) > 0:
             course = float(np.corrcoef(measured, x)[0, 1])
-            if course > best:
-                best, found = course, spreads[0] / spreads[1]
+            if abs(course) > best:
+                best, found = abs(course), float(np.copysign(spreads[0] / spreads[1], course))
     return found
 
 

@@ -366,7 +366,7 @@ def test_a_trial_notices_a_wrong_unit(tmp_path):
     text = (DEMO / "experiment.toml").read_text().replace('unit = "rad/s"', 'unit = "rpm"')
     (tmp_path / "experiment.toml").write_text(text)
     trial = dry_run(tmp_path)
-    assert sum("look at unit, model_unit" in line for line in trial.lines()) == 2
+    assert sum("look at unit, model_unit, scale" in line for line in trial.lines()) == 2
     assert not any("look at unit" in line for line in dry_run(DEMO).lines())
     assert trial.candidates == dry_run(DEMO).candidates > 20
 
@@ -398,6 +398,7 @@ def test_a_trial_judges_the_parts_of_the_record_alone():
 def test_the_factor_between_signals_of_one_course(factor):
     x = np.sin(T)
     assert factor_of(factor * x, x) == pytest.approx(factor)
+    assert factor_of(-factor * x, x) == pytest.approx(-factor)
     assert factor_of(np.cos(40 * T), x) is None
     assert factor_of(factor * x, np.cos(40 * T), x) == pytest.approx(factor)
 

@@ -338,6 +338,30 @@ def test_an_input_in_a_declared_unit_is_converted_to_that_of_the_fmu(tmp_path):
     assert_allclose(read(write(tmp_path, toml)).runs[0].u[:, 0], 1e3 * table()["torque"], atol=1e-3)
 
 
+@pytest.mark.parametrize(("scale", "offset"), [(-1.0, 0.0), (-25.0, 0.3), (1.0, -4.0)])
+def test_what_is_measured_is_the_scaled_column(tmp_path, scale, offset):
+    """A sensor that looks the other way, raw voltages, and a zero that is not one."""
+    as_logged = {
+        name: (x - offset) / scale if name in ("n_wheel", "torque") else x for name, x in table().items()
+    }
+    how = f"scale = {scale}, offset = {offset}"
+    toml = GOOD.replace('unit = "rpm"', f'unit = "rpm"\n{how.replace(", ", chr(10))}')
+    toml = toml.replace('T_P = "torque"', f'T_P = {{column = "torque", {how}}}')
+    record, usual = read(write(tmp_path, toml, as_logged)), read(write(tmp_path / "usual"))
+    (run,), (same,) = record.runs, usual.runs
+    assert_allclose(run.y[:, 0], same.y[:, 0], rtol=1e-7, atol=1e-7)
+    assert_allclose(run.u, same.u, atol=1e-5)
+    assert_allclose(record.noise_std, usual.noise_std)
+    stated_units(tmp_path, "V")  # of the column, which says nothing of what is measured
+    assert_array_equal(read(tmp_path / "experiment.toml").runs[0].u, run.u)
+
+
+def test_a_column_that_is_scaled_to_nothing_is_refused(tmp_path):
+    toml = GOOD.replace('unit = "rpm"', 'unit = "rpm"\nscale = 0.0')
+    with pytest.raises(BadInput, match=r"key 'outputs.omega_w.scale' must not be 0"):
+        read(write(tmp_path, toml))
+
+
 def test_what_nobody_says_a_unit_of_is_taken_as_it_is(tmp_path):
     (run,) = read(write(tmp_path, with_units('unit = "rad/s"\nmodel_unit = "rad/s"')), BARE).runs
     assert_allclose(run.u[:, 0], table()["torque"], atol=1e-6)
