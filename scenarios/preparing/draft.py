@@ -10,13 +10,24 @@ import numpy as np
 from fmus.host.description import FmuDescription, FmuVariable
 from scenarios.experiment.readers.units import dates_apart
 from scenarios.experiment.sampling import SAME
-from scenarios.preparing.matching import SURE, Match, matches
-from scenarios.preparing.quantities import alike, known, likely_unit, quantities_of, unit_in_name, words_of
+from scenarios.preparing.matching import SURE, Match, fitting, matches
+from scenarios.preparing.quantities import (
+    QUANTITIES,
+    alike,
+    known,
+    likely_unit,
+    meant_by,
+    numbered_words_of,
+    quantities_of,
+    unit_in_name,
+    words_of,
+)
 from scenarios.preparing.survey import Channel, Raster
 
 ONE_MORE = 0.65  # likeness of a further column that makes it worth another file; a mere guess has less
 LATEST = 0.2  # of a record that may pass before it is used
 AROUND = 0.2  # of the FMU's value: the bounds of a parameter that is calibrated
+RATE = "_dot"  # ends the name of a rate
 IDENTIFY = 0.65  # share of the record that identifies; the rest tests
 FORCES = ("force", "torque")
 LABELS = {"force": "mass", "torque": "shaft"}  # of the only port of its kind
@@ -138,9 +149,16 @@ class Draft:
         return round(begin, places), round(middle, places), round(end, places)
 
     @property
+    def rates(self) -> dict[str, Signal]:
+        """Inputs that are the rate of another one by their name, with that, which has a column."""
+        own = {s.variable.name: s for s in self.inputs}
+        rates = {n: own.get(n.removesuffix(RATE)) for n in self.description.inputs if n.endswith(RATE)}
+        return {n: s for n, s in rates.items() if s and n not in own and n not in self.columns}
+
+    @property
     def free_inputs(self) -> list[FmuVariable]:
-        """Inputs without a column that are no port."""
-        taken = {s.variable.name for s in self.inputs} | {p.force for p in self.ports}
+        """Inputs without a column that are no port and no rate of another input."""
+        taken = {*(s.variable.name for s in self.inputs), *(p.force for p in self.ports), *self.rates}
         return [self.description.variables[n] for n in self.description.inputs if n not in taken]
 
     @property
@@ -172,7 +190,8 @@ def _drafted(fmu: Path, description: FmuDescription, rasters: Sequence[Raster]) 
 
 
 def _signal(m: Match, raster: Raster) -> Signal:
-    v, stated = m.variable, m.channel.unit if known(m.channel.unit) else None
+    v = m.variable
+    stated = meant_by(m.channel.unit, fitting(v))
     named = None if stated else _unit_by_name(v, m.channel.name)
     unit = stated or named
     guess = None if v.unit else likely_unit(v.name, v.description, unit)
@@ -183,8 +202,7 @@ def _unit_by_name(v: FmuVariable, column: str) -> str | None:
     """The unit at the end of a column's name, unless the variable's name ends likewise."""
     if words_of(column)[-1:] == words_of(v.name)[-1:]:
         return None
-    fitting = [v.unit] if v.unit else [q.unit for q in quantities_of(v.name, v.description)]
-    return unit_in_name(column, fitting)
+    return unit_in_name(column, fitting(v))
 
 
 def with_column(made: Draft, variable: str, column: str | None) -> Draft:
@@ -200,10 +218,11 @@ def with_column(made: Draft, variable: str, column: str | None) -> Draft:
 
 
 def _quantity(v: FmuVariable) -> list[str]:
-    """Names of the quantities that a variable can be: by its unit if it has one, else by its name."""
+    """Names of the quantities that a variable can be: by its unit if it has one, and by its name."""
     meant = quantities_of(v.name, v.description)
     if known(v.unit):
-        meant = [q for q in meant if alike(str(v.unit), q.unit)]
+        of_unit = [q for q in QUANTITIES if alike(str(v.unit), q.unit)]
+        meant = [q for q in meant if q in of_unit] or of_unit
     return [q.name for q in meant]
 
 
@@ -224,10 +243,16 @@ def _ports(made: Draft) -> Iterator[Place]:
 
 
 def _nearest(name: str, outputs: Sequence[FmuVariable], quantity: str) -> str | None:
-    """The output that is such a quantity and whose name has most in common with a name; None if none is."""
-    words = {*words_of(name)}
-    fitting = [v.name for v in outputs if quantity in _quantity(v)[:1]]
-    return max(fitting, key=lambda other: len(words & {*words_of(other)}), default=None)
+    """The output that is such a quantity and whose name has most in common with a name; None if none is.
+
+    Of names with the same words, that with the same numbers has more.
+    """
+
+    def in_common(other: str) -> int:
+        return sum(len({*words(name)} & {*words(other)}) for words in (words_of, numbered_words_of))
+
+    such = [v.name for v in outputs if quantity in _quantity(v)[:1]]
+    return max(such, key=in_common, default=None)
 
 
 def sure(likeness: float) -> str:

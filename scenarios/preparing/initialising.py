@@ -65,6 +65,10 @@ class Initialised(Shown):
         for port in d.ports:
             far = f", displacement {port.displacement}" if port.displacement else ", no displacement"
             lines.append(f"port '{port.name}': force {port.force}, velocity {port.velocity}{far}")
+        for name, s in d.rates.items():
+            lines.append(
+                f"input '{name}' is the rate of {s.variable.name}: the derivative of '{s.channel.name}'"
+            )
         for v in d.free_inputs:
             lines.append(f"input '{v.name}' has no column; it is constant at {v.start or 0.0:g}")
         used = {s.raster.file for s in d.signals}

@@ -11,7 +11,7 @@ from fmus.host.description import FmuVariable
 from scenarios.preparing.quantities import (
     QUANTITIES,
     alike,
-    known,
+    meant_by,
     quantities_of,
     shared_words,
     unit_in_name,
@@ -20,6 +20,7 @@ from scenarios.preparing.quantities import (
 from scenarios.preparing.survey import Channel
 
 SURE = 0.8  # from here on a match is not asked about
+DOUBTFUL = 0.75  # at most, if another variable looks the same
 ENOUGH = 0.45  # below it a column and a variable are left apart
 
 
@@ -32,13 +33,20 @@ class Match:
     likeness: float
 
 
+def fitting(v: FmuVariable) -> list[str]:
+    """Units that a column of a variable may have, or such as they convert into."""
+    return [v.unit] if v.unit else [q.unit for q in quantities_of(v.name, v.description)]
+
+
 def likeness(v: FmuVariable, channel: Channel) -> float:
     """How much a column looks like a variable: 1 for the same name, 0 if the units contradict each other.
 
     Where the file states no unit, the end of the column's name may tell it, as in n_wheel_rpm.
     """
     one, other = words_of(v.name), words_of(channel.name)
-    unit = channel.unit if known(channel.unit) else None
+    unit = meant_by(
+        channel.unit, [v.unit] if v.unit else [q.unit for q in quantities_of(v.name, v.description)]
+    )
     if v.unit and unit and not alike(unit, v.unit):
         return 0.0
     if one == other:
@@ -48,7 +56,7 @@ def likeness(v: FmuVariable, channel: Channel) -> float:
     if v.unit:
         meant = [q for q in meant if alike(q.unit, v.unit)]
     score = 0.6 * SequenceMatcher(None, " ".join(one), " ".join(other)).ratio()
-    shared = shared_words([*one, *words_of(v.description)], other)
+    shared = _share_words(v, channel)
     if set(meant) & set(seen):
         score = max(score, 0.6)
     elif v.unit and quantities_of("", channel.name):  # whole words say another one, of the same part perhaps
@@ -71,11 +79,26 @@ def _at_the_end(name: str, also: str | None) -> str | None:
 
 
 def matches(variables: Sequence[FmuVariable], channels: Sequence[Channel]) -> list[Match]:
-    """The assignment of columns to variables with the largest sum of likeness, each used once at most."""
+    """The assignment of columns to variables with the largest sum of likeness, each used once at most.
+
+    A column that looks as much like a variable that has none is not sure. If it shares no word with any of
+    these, as a speed of which there are many, it is left apart.
+    """
     if not variables or not channels:
         return []
     score = np.array([[likeness(v, c) for c in channels] for v in variables])
     rows, columns = linear_sum_assignment(score, maximize=True)
-    at = zip(rows.tolist(), columns.tolist(), strict=True)
-    pairs = [(variables[i], channels[j], float(score[i, j])) for i, j in at]
-    return [Match(v, c, s) for v, c, s in pairs if s >= ENOUGH]
+    free = np.isin(np.arange(len(variables)), rows[score[rows, columns] >= ENOUGH], invert=True)
+    found = []
+    for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
+        v, c, s = variables[i], channels[j], float(score[i, j])
+        rivals = [variables[k] for k in np.flatnonzero(free & (score[:, j] >= s)).tolist()]
+        if rivals and not any(_share_words(other, c) for other in (v, *rivals)):
+            continue
+        if s >= ENOUGH:
+            found.append(Match(v, c, min(s, DOUBTFUL) if rivals else s))
+    return found
+
+
+def _share_words(v: FmuVariable, channel: Channel) -> int:
+    return shared_words([*words_of(v.name), *words_of(v.description)], words_of(channel.name))

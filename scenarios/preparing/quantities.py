@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fmus.errors import BadInput
 from fmus.units import base_exponents, conversion
 from scenarios.experiment.readers.header import spelled
+from scenarios.experiment.readers.units import ALSO
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,12 @@ _SPLIT = re.compile(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])")
 
 def words_of(name: str) -> list[str]:
     """The words of a name in lower case, without a unit in brackets and without digits at their end."""
-    bare = _BRACKET.sub(" ", name)
-    return [word.lower().rstrip("0123456789") or word for word in _SPLIT.split(bare) if word]
+    return [word.rstrip("0123456789") or word for word in numbered_words_of(name)]
+
+
+def numbered_words_of(name: str) -> list[str]:
+    """The same with these digits."""
+    return [word.lower() for word in _SPLIT.split(_BRACKET.sub(" ", name)) if word]
 
 
 def quantities_of(name: str, description: str = "") -> list[Quantity]:
@@ -57,6 +62,17 @@ def alike(unit: str, other: str) -> bool:
     except BadInput:
         return False
     return True
+
+
+def meant_by(unit: str | None, fitting: Sequence[str]) -> str | None:
+    """The unit that a word of a file means, as g of an acceleration; None if it is not known.
+
+    fitting: units, into one of which it should convert.
+    """
+    also = ALSO.get(unit or "")
+    if also and any(alike(also, other) for other in fitting):
+        return also
+    return unit if known(unit) else None
 
 
 def unit_in_name(name: str, fitting: Sequence[str]) -> str | None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import sqrt
 from pathlib import Path
 
+from scenarios.experiment.readers.units import differentiated
 from scenarios.preparing.draft import AROUND, IDENTIFY, Draft, Signal, bounds_of, is_factor, sure, uncertain
 from scenarios.preparing.survey import LINES, TIME_GUESSED, Raster
 
@@ -107,8 +108,17 @@ def _signals(made: Draft) -> Iterator[str]:
         units += [f"file = {_text(made.name(s.raster))}"] if s.raster is not made.raster else []
         table = ", ".join([f"column = {_text(s.channel.name)}", *units])
         yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}" + (f"; unit is {guess}" if guess else "")
+    for name, s in made.rates.items():
+        unit = f", unit = {_text(differentiated(s.unit, 1))}" if s.unit else ""
+        yield f"{_key(name)} = {{column = {_text(name)}{unit}}}  # the rate of {s.variable.name}, by its name"
     for v in made.free_inputs:
         yield f"{_key(v.name)} = {v.start or 0.0!r}  # no column looks like it: constant at its start value"
+    for name, s in made.rates.items():
+        yield ""
+        yield f"[derived.{_key(name)}]  # a column made by central differences"
+        yield f"derivative = {_text(s.channel.name)}"
+        if s.raster is not made.raster:
+            yield f"file = {_text(made.name(s.raster))}"
     for s in made.outputs:
         yield ""
         yield f"[outputs.{_key(s.variable.name)}]  # {_why(s)}"

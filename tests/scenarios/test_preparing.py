@@ -15,6 +15,7 @@ from fmus.units import UNITS
 from scenarios.cli.app import run_safely
 from scenarios.cli.console import interrupted, say_notices, will_write
 from scenarios.experiment.experiment import load_experiment
+from scenarios.experiment.record import load_record
 from scenarios.output import WRITING, replaced
 from scenarios.preparing.draft import draft, with_column
 from scenarios.preparing.initialising import Initialised, init
@@ -160,6 +161,22 @@ def test_a_unit_at_the_end_of_a_name_tells_the_quantity():
     assert likeness(lateral, channel("wheel_A", None)) >= ENOUGH  # one letter is an index as often
 
 
+def test_one_column_for_many_variables_alike_is_left_apart():
+    """Unless it shares a word with one of them, which is not sure then."""
+    rates = [variable(f"u_{c}_dot", "input", unit="m/s", description="rate of the rail height") for c in "ab"]
+    assert matches(rates, [channel("speed", "km/h")]) == []
+    [one] = matches(rates, [channel("rail height rate", "mm/s")])
+    assert ENOUGH <= one.likeness < SURE
+    [alone] = matches(rates[:1], [channel("speed", "km/h")])
+    assert alone.likeness >= SURE
+
+
+def test_g_of_an_acceleration_is_no_gram(tmp_path):
+    coach = fmu(variable("z1_ddot", unit="m/s2", description="vertical acceleration of the coach"))
+    [signal] = drafted(tmp_path, coach, text_of_units="s,g,rpm,mA", names="time,acc vertical,n,i").outputs
+    assert (signal.channel.name, signal.unit) == ("acc vertical", "g_0")
+
+
 @given(st.permutations(["voltage", "speed", "current", "junk"]))
 def test_the_order_of_the_columns_does_not_matter(names):
     units = {"voltage": "V", "speed": "rpm", "current": "mA", "junk": "degC"}
@@ -259,6 +276,36 @@ def test_a_column_without_a_unit_is_told_what_it_is_taken_in(tmp_path, units, sa
 def test_a_port_takes_the_displacement_that_the_fmu_gives(tmp_path):
     more = fmu(*MOTOR.variables.values(), variable("theta"))
     assert drafted(tmp_path, more).ports[0].displacement == "theta"
+
+
+def test_a_port_has_the_motion_of_its_own_number(tmp_path):
+    """And what turns is known by its unit, where no word of its name says so."""
+    bogie = fmu(
+        variable("u", "input", "V"), variable("F_z2_ext", "input", "N"), variable("M_y2_ext", "input", "N.m"),
+        *(variable(f"z{i}_dot", unit="m/s", description="rate") for i in (1, 2)),
+        *(variable(f"z{i}", unit="m") for i in (1, 2)),
+        *(variable(f"phi_y{i}_dot", unit="rad/s", description="pitch rate") for i in (1, 2)),
+        *(variable(f"phi_y{i}", unit="rad") for i in (1, 2)),
+    )  # fmt: skip
+    motions = {p.force: (p.velocity, p.displacement) for p in drafted(tmp_path, bogie).ports}
+    assert motions == {"F_z2_ext": ("z2_dot", "z2"), "M_y2_ext": ("phi_y2_dot", "phi_y2")}
+
+
+def test_the_rate_of_an_input_is_derived_from_its_column(tmp_path):
+    track = fmu(
+        variable("u_fl", "input", "m"),
+        *(variable(f"u_{c}_dot", "input", "m/s") for c in ("fl", "fr")),
+        variable("omega", unit="rad/s"),
+    )
+    made = drafted(tmp_path, track, text_of_units="s,mm,rpm,mA", names="time,u fl,speed,i")
+    assert [v.name for v in made.free_inputs] == ["u_fr_dot"]
+    text = toml_of(made, tmp_path)
+    (tmp_path / "experiment.toml").write_text(text)
+    e = load_experiment(tmp_path / "experiment.toml")
+    assert (e.derived["u_fl_dot"].derivative, e.input_columns["u_fl_dot"].unit) == ("u fl", "(mm)/s")
+    record = load_record(e, track)
+    rate, place = (record.runs[0].u[:, record.inputs.index(name)] for name in ("u_fl_dot", "u_fl"))
+    np.testing.assert_allclose(rate, np.gradient(place, record.runs[0].t), rtol=1e-9, atol=1e-12)
 
 
 def test_many_parameters_are_left_to_the_user(tmp_path):
