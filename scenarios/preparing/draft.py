@@ -19,6 +19,7 @@ from scenarios.preparing.quantities import (
     meant_by,
     numbered_words_of,
     quantities_of,
+    shared_words,
     unit_in_name,
     words_of,
 )
@@ -236,23 +237,25 @@ def _ports(made: Draft) -> Iterator[Place]:
     }
     kinds = {name: kind for name, kind in kinds.items() if kind and name not in taken}
     for name, kind in kinds.items():
-        velocity, displacement = (_nearest(name, outputs, quantity) for quantity in MOTION[kind])
+        velocity, displacement = (_nearest(variables[name], outputs, q) for q in MOTION[kind])
         if velocity is not None:
             alone = list(kinds.values()).count(kind) == 1
             yield Place(LABELS[kind] if alone else name, name, velocity, displacement)
 
 
-def _nearest(name: str, outputs: Sequence[FmuVariable], quantity: str) -> str | None:
-    """The output that is such a quantity and whose name has most in common with a name; None if none is.
+def _nearest(v: FmuVariable, outputs: Sequence[FmuVariable], quantity: str) -> str | None:
+    """The output that is such a quantity and has most in common with a variable; None if none is.
 
-    Of names with the same words, that with the same numbers has more.
+    Of names with the same words, that with the same numbers has more; then the descriptions count.
     """
 
-    def in_common(other: str) -> int:
-        return sum(len({*words(name)} & {*words(other)}) for words in (words_of, numbered_words_of))
+    def in_common(other: FmuVariable) -> tuple[int, int]:
+        names = sum(len({*words(v.name)} & {*words(other.name)}) for words in (words_of, numbered_words_of))
+        return names, shared_words(words_of(v.description), words_of(other.description))
 
-    such = [v.name for v in outputs if quantity in _quantity(v)[:1]]
-    return max(such, key=in_common, default=None)
+    such = [o for o in outputs if quantity in _quantity(o)[:1]]
+    found = max(such, key=in_common, default=None)
+    return found.name if found else None
 
 
 def sure(likeness: float) -> str:

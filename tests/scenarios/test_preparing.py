@@ -205,6 +205,7 @@ def test_a_draft_guesses_units_ports_split_and_bounds(tmp_path):
     assert e.split.test[1] <= 1234.5 + T[-1] + 1e-9
 
 
+MASSES = [("y", "wheelset"), ("y_m", "suspended mass")]
 UNITS_IN_NAMES = [
     ("v_kmh", "m/s", "km/h"),
     ("omega_rpm", "rad/s", "rpm"),
@@ -289,6 +290,16 @@ def test_a_port_has_the_motion_of_its_own_number(tmp_path):
     )  # fmt: skip
     motions = {p.force: (p.velocity, p.displacement) for p in drafted(tmp_path, bogie).ports}
     assert motions == {"F_z2_ext": ("z2_dot", "z2"), "M_y2_ext": ("phi_y2_dot", "phi_y2")}
+
+
+def test_a_port_has_the_motion_of_what_it_is_said_to_push(tmp_path):
+    mass = fmu(
+        variable("F_ym_ext", "input", "N", description="lateral force on the suspended mass"),
+        *(variable(f"{n}_dot", unit="m/s", description=f"lateral velocity of the {of}") for n, of in MASSES),
+        *(variable(n, unit="m", description=f"lateral displacement of the {of}") for n, of in MASSES),
+    )
+    [port] = drafted(tmp_path, mass).ports
+    assert (port.velocity, port.displacement) == ("y_m_dot", "y_m")
 
 
 def test_the_rate_of_an_input_is_derived_from_its_column(tmp_path):
