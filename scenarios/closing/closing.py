@@ -31,6 +31,7 @@ from fmus.host.description import FmuDescription, PortNames
 from fmus.host.fmu import FmuError
 from fmus.host.grading.honest import check_honest
 from scenarios.closing.result import Result, result_of
+from scenarios.closing.suspicion import suspicions
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment, load_experiment
 from scenarios.experiment.given import Given, given
@@ -69,7 +70,7 @@ def close_loop(
     seed: seed of the random numbers.
     resume: continue from the checkpoints that an interrupted run left in `out`.
     isolation: limits of the processes in which a foreign FMU runs; None runs it in this process.
-    show: gets the table of conversions as lines, before anything is simulated.
+    show: gets the table of conversions as lines before the search, and what tells of a wrong unit or sign.
     data: the record, in place of the data file; units by column in data.attrs["units"].
     Raises BadInput if the experiment is wrong, FmuEnded if a foreign FMU crashes or passes a limit.
     """
@@ -77,7 +78,7 @@ def close_loop(
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
         declared = with_test_part(given(experiment, data_dir, data, Path(work)))
         posed = Posed.of(declared, Path(work), isolation)
-        show(conversion_lines(posed.problem.record))
+        show([*conversion_lines(posed.problem.record), *suspicions(posed.problem)])
         folder = None if out is None else writable(Path(out))
         stages = stages_of(declared, folder, seed, resume)
         result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]

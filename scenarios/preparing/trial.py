@@ -17,15 +17,13 @@ from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from fmus.host.apart.isolation import ISOLATED, Isolation
 from fmus.host.archive import describe
-from fmus.host.fmu import FmuError
-from fmus.units import conversion
 from scenarios.closing.closing import Posed, experiment_of
+from scenarios.closing.suspicion import factors, simulated_twice, told
 from scenarios.drawing.sheet import BEFORE, CLOUD, Plot, envelope, legend, name_axes, sheet, sheets
 from scenarios.drawing.typography import unit
 from scenarios.experiment.conversions import conversion_lines
 from scenarios.output import writable, written_at_once
 from scenarios.preparing.ports import port_remarks
-from scenarios.preparing.quantities import alike
 from scenarios.shown import Shown, axes_or_new
 
 if TYPE_CHECKING:
@@ -35,30 +33,6 @@ SHOWN = 0.25  # of the record is drawn, from its beginning
 # of simulations in a whole run, a third and three times of the 89 that the motor of the tutorial took, since
 # what is found decides how many it takes
 RUNS_PER_CANDIDATE = (30.0, 300.0)
-SAME_COURSE = 0.5  # correlation from which on two signals have the same course
-COMMON = (  # units of measured columns
-    *("rpm", "1/min", "Hz", "rad/s", "deg/s", "rad", "deg", "mrad", "m", "cm", "mm", "um", "m/s", "km/h"),
-    *(
-        "mm/s",
-        "m/s2",
-        "g_0",
-        "mm/s2",
-        "N",
-        "kN",
-        "N.m",
-        "mN.m",
-        "kN.m",
-        "V",
-        "mV",
-        "A",
-        "mA",
-        "Pa",
-        "kPa",
-        "bar",
-    ),
-)
-NEAR = 0.1  # relative difference of two factors that may be the same, before the parameters are calibrated
-APART = 2.0  # factor between measured and simulated values beyond which a wrong unit is suspected
 PANELS = 6
 
 
@@ -106,13 +80,13 @@ class Trial(Shown):
         """
         record, run = self.problem.record, self.problem.record.runs[0]
         used = run.fit | run.unseen  # what lies before the split may show how the FMU starts
-        y, simulated, other = (x[used] for x in (run.y, self.simulated, self.from_own_start))
+        y, simulated = run.y[used], self.simulated[used]
         error = np.sqrt(np.mean((y - simulated) ** 2, axis=0))
-        factors = [factor_of(*some) for some in zip(y.T, simulated.T, other.T, strict=True)]
+        found = factors(record, self.simulated, self.from_own_start)
         columns = {
             "error": error,
             "share": error / (y.std(axis=0) + 1e-300),
-            "factor": [np.nan if factor is None else factor for factor in factors],
+            "factor": [np.nan if factor is None else factor for factor in found],
         }
         return pd.DataFrame(columns, index=pd.Index(record.outputs, name="output"))
 
@@ -132,23 +106,8 @@ class Trial(Shown):
         for name, error, share, factor in self.to_frame().itertuples(name=None):
             said = f"{error:.3g}, {share:.0%} of the signal"
             yield f"{name}: error of the simulation with declared values {said}"
-            if np.isfinite(factor) and not 1 / APART < factor < APART:
-                times = f"{factor:.3g} times the simulated ones{self._as_if(name, factor)}"
-                way = "look at unit, model_unit, scale and the column of this output"
-                yield f"  measured values are {times}: {way}"
-
-    def _as_if(self, name: str, factor: float) -> str:
-        """The unit in which a column would have to be for measured values of the right size, in words."""
-        stated = next((c for c in self.problem.record.conversions if c.variable == name), None)
-        if stated is None or stated.model_unit is None:
-            return ""
-        if 1 / APART < abs(factor) < APART:
-            return ""
-        wanted = abs(stated.factor / factor)
-        found = [(u, conversion(u, stated.model_unit, "")[0]) for u in COMMON if alike(u, stated.model_unit)]
-        near = [(abs(np.log(f / wanted)), u) for u, f in found if u != stated.unit]
-        best = min(near, default=(np.inf, ""))
-        return f", as if the column were in {best[1]}" if best[0] < NEAR else ""
+            if said := told(self.problem.record, name, factor if np.isfinite(factor) else None):
+                yield f"  {said}"
 
     def _cost(self) -> Iterator[str]:
         low, high = self.expected
@@ -176,50 +135,19 @@ def dry_run(
     with tempfile.TemporaryDirectory(prefix="railfmi_trial_") as work:
         problem = Posed.of(declared, Path(work), isolation).problem
         try:
-            theta = {**problem.declared, **_first_states(problem)}
-            problem.simulate(theta)  # the first one also builds and loads the FMU
-            problem.forget()  # the second one is to be made, not remembered
+            both = simulated_twice(problem)  # the first one also builds and loads the FMU
+            problem.forget()  # the next one is to be made, not remembered
             begun = time.perf_counter()
-            [simulated, *_] = problem.simulate(theta)
+            problem.simulate(problem.declared)
             seconds = time.perf_counter() - begun
-            from_own_start = _from_own_start(problem, simulated)
         finally:
             PLANTS.close()
         candidates = len(problem.builder.offers) + len(FAULTS) * len(problem.record.outputs)
-        pictures = () if folder is None else _pictures(problem, simulated, folder)
+        pictures = () if folder is None else _pictures(problem, both[0], folder)
     run, inputs = problem.record.runs[0], problem.record.inputs
     remarks = tuple(port_remarks(declared, run, inputs, isolation))
     jobs = jobs or cpu_count()
-    return Trial(problem, simulated, from_own_start, seconds, candidates, jobs, pictures, remarks)
-
-
-def _first_states(problem: Problem) -> dict[str, float]:
-    return {name: value for name, (value, _) in problem.start_states(problem.record.runs[0]).items()}
-
-
-def _from_own_start(problem: Problem, simulated: Array) -> Array:
-    """The first run (N, n_y) from the FMU's own start values; `simulated` if that is not possible."""
-    try:
-        [found, *_] = problem.simulate(problem.declared)
-    except FmuError:
-        return simulated
-    return found
-
-
-def factor_of(measured: Array, *simulated: Array) -> float | None:
-    """Factor between two signals (N,) of the same course, by their spreads; None if they have not the same.
-
-    It is negative if one goes up where the other goes down. Of several simulated signals the one counts whose
-    course is most alike.
-    """
-    best, found = SAME_COURSE, None
-    for x in simulated:
-        spreads = float(np.std(measured)), float(np.std(x))
-        if np.all(np.isfinite(spreads)) and min(spreads) > 0:
-            course = float(np.corrcoef(measured, x)[0, 1])
-            if abs(course) > best:
-                best, found = abs(course), float(np.copysign(spreads[0] / spreads[1], course))
-    return found
+    return Trial(problem, *both, seconds, candidates, jobs, pictures, remarks)
 
 
 def duration(seconds: float) -> str:

@@ -14,6 +14,7 @@ from fmus.host.description import FmuDescription, FmuVariable
 from fmus.units import UNITS
 from scenarios.cli.app import run_safely
 from scenarios.cli.console import interrupted, say_notices, will_write
+from scenarios.closing.suspicion import factor_of
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.output import WRITING, replaced
@@ -25,7 +26,7 @@ from scenarios.preparing.ports import port_remarks
 from scenarios.preparing.quantities import unit_in_name
 from scenarios.preparing.survey import Channel, survey
 from scenarios.preparing.text import toml_of
-from scenarios.preparing.trial import Trial, dry_run, duration, factor_of
+from scenarios.preparing.trial import Trial, dry_run, duration
 from tests.helpers.foreign import GOOD, foreign_builder
 from tests.helpers.paths import SHIPPED
 
