@@ -35,6 +35,7 @@ from scenarios.closing.several_results import (
     joint,
     together,
 )
+from scenarios.closing.suspicion import suspicions
 from scenarios.experiment.conversions import Show, conversion_lines
 from scenarios.experiment.experiment import Experiment
 from scenarios.output import writable, written_at_once
@@ -70,7 +71,7 @@ def close_loops(
     with tempfile.TemporaryDirectory(prefix="railfmi_loops_") as work:
         posed = [_posed(e, Path(work) / f"{i}", isolation) for i, e in enumerate(declared)]
         for p in posed:
-            show([f"{p.declared.id}:", *conversion_lines(p.problem.record)])
+            show([f"{p.declared.id}:", *conversion_lines(p.problem.record), *suspicions(p.problem)])
         campaign = _Campaign(posed, None if out is None else writable(Path(out)), jobs or cpu_count())
         try:
             campaign.run(tell, done, seed, resume)
