@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from fmus.export.builders.native.table import table
 from fmus.host.archive import describe
@@ -11,12 +10,12 @@ from fmus.model import equations
 from fmus.models import MODELS
 from scenarios.preparing.draft import draft
 from scenarios.preparing.survey import Channel, Raster
-from tests.helpers.everything import EVERY_MODEL
+from tests.helpers.sizes import by_size
 
 NOTHING = Raster(Path("log.csv"), "time", np.arange(3.0), (Channel("-", None, np.zeros(3), ()),), ())
 
 
-@pytest.mark.parametrize("name", EVERY_MODEL)
+@by_size
 def test_a_port_has_the_motion_of_its_terminal(name, built):
     """By names, units and descriptions alone, as of any FMU."""
     model, fmu = MODELS[name](), built(name)

@@ -21,7 +21,8 @@ from fmus.model import equations
 from fmus.models import MODELS
 from fmus.variables import Parameter
 from tests.helpers.everything import near_start, values
-from tests.helpers.runs import every_model, names
+from tests.helpers.runs import names
+from tests.helpers.sizes import by_size
 
 CODES = sorted({*UNARY, *BINARY, *CALLED} - {cs.OP_ASSIGN, cs.OP_CONSTPOW})
 TWO = {cs.OP_POW, cs.OP_ATAN2, cs.OP_HYPOT, cs.OP_FMOD, cs.OP_DIV, cs.OP_COPYSIGN, cs.OP_FMIN, cs.OP_FMAX} | {
@@ -64,7 +65,7 @@ def of_model(name, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@every_model
+@by_size
 def test_every_model_computes_the_same_numbers_from_its_text(name, kind):
     model = MODELS[name]()
     made, text, rng = equations(model), of_model(name, kind), np.random.default_rng(4)

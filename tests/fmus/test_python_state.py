@@ -27,6 +27,7 @@ from tests.helpers.runs import (
     start_of,
     stirred,
 )
+from tests.helpers.sizes import by_size
 
 
 def wrongs(model):
@@ -48,7 +49,7 @@ def wrongs(model):
     }
 
 
-@every_model
+@by_size
 @pytest.mark.parametrize("what", wrongs(Drive()))
 def test_what_cannot_be_done_is_discarded_with_its_reason(built, name, what):
     model = MODELS[name]()
@@ -180,7 +181,7 @@ def test_an_instance_keeps_nothing_beside_its_values(built, name, tmp_path):
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 10_000), middle=st.integers(1, 9))
-@every_model
+@by_size
 def test_a_run_goes_on_from_the_values_it_shows(built, name, seed, middle):
     model, rng = MODELS[name](), np.random.default_rng(seed)
     rows, start = stirred(model, rng, 10), start_of(model, near_start(model, rng))

@@ -156,7 +156,7 @@ def curving(pair, cant):
     return said, x, built.outputs(**{**said, **x})
 
 
-@pytest.mark.parametrize("cant", [0.0, 0.08])
+@pytest.mark.parametrize("cant", [0.0, pytest.param(0.08, marks=pytest.mark.slow)])
 def test_a_flange_that_carries_balances_a_curve(cant):
     said, _, o = curving("apart", cant)
     assert o["flange_contact"] == 1.0
