@@ -1,4 +1,4 @@
-"""Measured outputs that may have another unit or sign than declared, by a simulation with declared values."""
+"""Measured outputs whose declared unit or sign may be wrong, found by comparison with a simulation."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ from fmus.units import conversion
 SAME_COURSE = 0.5  # correlation from which on two signals have the same course
 APART = 2.0  # factor between measured and simulated values beyond which a wrong unit is suspected
 NEAR = 0.1  # relative difference of two factors that may be the same, before the parameters are calibrated
-COMMON = (  # units of measured columns
+LIKELY = (  # units that columns of loggers are in
     *("rpm", "1/min", "Hz", "rad/s", "deg/s", "rad", "deg", "mrad", "m", "cm", "mm", "um", "m/s", "km/h"),
     *("mm/s", "m/s2", "g_0", "mm/s2", "N", "kN", "N.m", "mN.m", "kN.m", "V", "mV", "A", "mA", "Pa", "kPa"),
     "bar",
@@ -86,7 +86,7 @@ def _as_if(record: Record, name: str, factor: float) -> str:
     if stated is None or stated.model_unit is None or 1 / APART < abs(factor) < APART:
         return ""
     wanted, found = abs(stated.factor / factor), []
-    for unit in COMMON:
+    for unit in LIKELY:
         try:
             found.append((conversion(unit, stated.model_unit, "")[0], unit))
         except BadInput:  # of another kind

@@ -3,7 +3,7 @@
 import csv
 import zlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -23,19 +23,28 @@ def lines_above(file: Path) -> int:
     some. The names stand right above, perhaps with a line of units between: none of the cells is a value, and
     each is filled, but perhaps the first, above an index. Files of other formats have none.
     """
+    for rows in tables_of(file, lambda lines: islice(lines, LOOKED_AT)):
+        names = _names([row for _, row in rows])
+        if names is not None:
+            return rows[names - 1][0] if names else 0
+    return 0
+
+
+def tables_of(file: Path, some: Callable[[Iterable[str]], Iterable[str]]) -> Iterator[list[tuple[int, Row]]]:
+    """The records of some lines of a text file of columns, as each separator that it may have divides them.
+
+    some: picks the lines. Each record has the number of its last line among these, from 1. There are none of
+    a file of another format, and none of one that cannot be read, of which its reader says what is wrong.
+    """
     if not file.name.lower().endswith(Csv.suffixes) or not file.is_file():
-        return 0
+        return
     try:
         with opened(file, encoding_of(file), NO_OPTIONS) as stream:
-            lines = list(islice(stream, LOOKED_AT))
+            lines = list(some(stream))
         for separator in separators_of(file):
-            rows = list(records(lines, separator))
-            names = _names([row for _, row in rows])
-            if names is not None:
-                return rows[names - 1][0] if names else 0
-    except (OSError, EOFError, UnicodeError, csv.Error, zlib.error):  # its reader says what is wrong with it
-        pass
-    return 0
+            yield list(records(lines, separator))
+    except (OSError, EOFError, UnicodeError, csv.Error, zlib.error):
+        return
 
 
 def _names(rows: Sequence[Row]) -> int | None:

@@ -124,11 +124,9 @@ class Reading:
     def _check_units(self, sheet: Sheet) -> None:
         """Raise BadInput if a window states another unit than the record that the filter was set up with."""
         inputs = self._e.input_columns
-        scaled = {
-            n for n, m in {**self._e.outputs, **inputs}.items() if m.is_scaled
-        }  # the file's unit is its own
+        measured = {**self._e.outputs, **inputs}
         for name, c in self._conversions.items():
-            if name in scaled:
+            if measured[name].is_scaled:  # the unit of the column is not that of the value
                 continue
             stated, why = spelled(sheet.units.get(c.column, "")), ""
             if c.unit is not None and (name not in inputs or inputs[name].unit is not None):  # declared
