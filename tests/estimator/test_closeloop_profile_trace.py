@@ -1,6 +1,7 @@
 """Ends of intervals: exact where the residual is linear, elsewhere where the profile likelihood has them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -172,6 +173,21 @@ def test_intervals_along_a_curved_ridge_hold_the_truth_as_the_likelihood_ratio_d
 def test_an_interval_that_the_record_does_not_end_reaches_the_bound():
     problem = slid(0, 1 / 100)
     assert reached(problem, optimum(problem, FRICTION))[0, 0] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("start", [0.9, 0.96])
+def test_the_end_is_found_along_a_ridge_that_secants_cannot_follow(start):
+    """The optimum lies at A near 1 and large B; on the way to A = 0, B falls as 1 / (1 - A)."""
+
+    def model(p: Sequence[float]) -> Array:
+        return 2e4 * ((1 - p[0]) * np.expm1(-p[1] * SLIP / 100) + 1)
+
+    p = np.array([start, 0.36 / (1 - start)])
+    problem = Written(model, model(p.tolist()) + np.random.default_rng(0).standard_normal(len(SLIP)))
+    there = fit_with(FRICTION, p, np.eye(2), SLIP, np.eye(len(SLIP), 2))
+    there = replace(there, residual=problem.identify_residual(there.theta).ravel())
+    h = within_error(problem, Hypothesis((), there, ()), WHITE)
+    assert reached(problem, h)[0, 0] == pytest.approx(0.0, abs=1e-6)
 
 
 # ---- laws of likelihood intervals

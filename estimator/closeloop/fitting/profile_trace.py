@@ -3,9 +3,10 @@
 The slopes at an optimum say where the interval of an unknown ends, if they hold as far as that. One
 simulation of the end shows whether they do: its residual is compared with the one that the slopes predict. If
 it differs by more than the policy allows, the slopes are corrected by the difference (Broyden's secant
-method), and the end is predicted again from there, until a simulation confirms a prediction. At an end, the
-sum of squares exceeds the least one by as much as a 95 % interval allows, and no values of the other unknowns
-lower it. Several ends are followed at once, as many as the FMU takes.
+method), and the end is predicted again from there, until a simulation confirms a prediction. Where secants do
+not lead there, because the valley of the sum of squares bends too much, slopes are taken anew at the place
+that was reached. At an end, the sum of squares exceeds the least one by as much as a 95 % interval allows,
+and no values of the other unknowns lower it. Several ends are followed at once, as many as the FMU takes.
 
 Sources: D. J. Venzon, S. H. Moolgavkar, Applied Statistics 37 (1988), 87-94, for the ends; C. G. Broyden,
 Mathematics of Computation 19 (1965), 577-593, for the slopes.
@@ -13,13 +14,14 @@ Mathematics of Computation 19 (1965), 577-593, for the slopes.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from estimator.closeloop.fitting.fit import REFUSED, in_turn
+from estimator.closeloop.fitting.slopes_within_error import slopes_at
 from estimator.closeloop.hypotheses.fitted import WIDE, Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem
@@ -28,7 +30,8 @@ from estimator.weighting import Weighting
 from fmus.aside import set_aside
 
 WIDTH = 1.96  # standard errors: 95 %
-MOVES = 20  # largest number of simulations for one end of an interval
+MOVES = 20  # largest number of simulations with the same slopes and their secants
+RENEWED = 3  # largest number of times that slopes are taken anew on the way to one end of an interval
 HIGHER = 2.0  # times the width of an interval: a move to a place as far from the optimum is taken back
 
 
@@ -58,7 +61,35 @@ def ends(
             t.arrived(d, r)
             places += [t.x] if t.within else []
         moving = [t for t in moving if not t.ended]
+        for t in moving:
+            if t.lost:
+                at = fixed | start.named(t.x)
+                t.renewed(slopes_at(built, at, h.fit.unknowns, t.slopes.columns, weighting))
     return np.array(places) * start.scale, {}
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The residual near a place by its slopes, columns (m,) each; scale: (n,) of the unknowns."""
+
+    columns: Sequence[Array]
+    scale: Array
+
+    @cached_property
+    def gram(self) -> Array:
+        """Products of the slopes with one another, (n, n), in scales."""
+        return np.array([self.products(column) for column in self.columns]) * self.scale[:, None]
+
+    def products(self, r: Array) -> Array:
+        """Products (n,) of the slopes with a residual (m,), in scales."""
+        return np.array([float(column @ r) for column in self.columns]) * self.scale
+
+    def change(self, d: Array) -> Array:
+        """Change (m,) of the residual by a move d (n,) in scales, as the slopes predict it."""
+        found = np.zeros_like(self.columns[0])
+        for column, along in zip(self.columns, d * self.scale, strict=True):
+            found += along * column
+        return found
 
 
 @dataclass(frozen=True)
@@ -83,14 +114,14 @@ class Optimum:
         return np.array([[u.low, u.high] for u in self.fit.unknowns]).T / self.scale
 
     @cached_property
-    def gram(self) -> Array:
-        """Products of the slopes with one another, (n, n)."""
-        return np.array([self.products(column) for column in self.fit.slopes]) * self.scale[:, None]
+    def slopes(self) -> Linear:
+        """The slopes at the optimum."""
+        return Linear(self.fit.slopes, self.scale)
 
     @cached_property
     def gradient(self) -> Array:
         """Products of the slopes with the residual, (n,)."""
-        return self.products(self.fit.residual)
+        return self.slopes.products(self.fit.residual)
 
     @cached_property
     def looseness(self) -> Array:
@@ -102,17 +133,6 @@ class Optimum:
     def units(self) -> Array:
         """Length of the residual for one standard error of each unknown, (n,)."""
         return np.sqrt(self.fit.inflation)
-
-    def products(self, r: Array) -> Array:
-        """Products (n,) of the slopes with a residual (m,)."""
-        return np.array([float(column @ r) for column in self.fit.slopes]) * self.scale
-
-    def change(self, d: Array) -> Array:
-        """Change (m,) of the residual by a move d (n,), as the slopes predict it."""
-        found = np.zeros_like(self.fit.residual)
-        for column, along in zip(self.fit.slopes, d * self.scale, strict=True):
-            found += along * column
-        return found
 
     def named(self, x: Array) -> dict[str, float]:
         """Values by name."""
@@ -130,12 +150,13 @@ class Trace:
         self._start, self._i, self._side, self._limit = start, i, side, limit
         self.x, self.unit = start.x, float(start.units[i])
         self.within = self.ended = False
-        self._r, self._gram, self._gradient = start.fit.residual, start.gram, start.gradient
+        self.slopes, self._r = start.slopes, start.fit.residual
+        self._gram, self._gradient = start.slopes.gram, start.gradient
         self._secants: list[tuple[Array, Array]] = []  # corrections of the slopes: (m,) along a move (n,)
         self._rise = (WIDTH * self.unit) ** 2  # of the sum of squares at the end
         self._most = np.inf  # length of the next move, in scales
         self._whole = False  # whether the last move was to lead to the end
-        self._left = MOVES
+        self._left, self._renewals = MOVES, RENEWED
 
     def move(self) -> Array:
         """The move (n,) to where the slopes predict the end, as far as bounds and earlier moves allow.
@@ -185,8 +206,8 @@ class Trace:
         if np.abs(r).max() >= REFUSED:
             self._turned_back(d)
             return
-        missed = r - self._r - start.change(d)
-        products = start.products(r)
+        missed = r - self._r - self.slopes.change(d)
+        products = self.slopes.products(r)
         for secant, direction in self._secants:
             missed -= float(direction @ d) * secant
             products += float(secant @ r) * direction
@@ -202,9 +223,20 @@ class Trace:
         else:
             self._gradient = self._gradient + float(missed @ self._r) * u
             self._turned_back(d)
-        self.ended |= self._left == 0
+        self.ended |= self.lost and self._renewals == 0
+
+    @property
+    def lost(self) -> bool:
+        """Whether the slopes do not lead to the end."""
+        return self._left == 0
+
+    def renewed(self, columns: Sequence[Array]) -> None:
+        """Go on from here with new slopes, (m,) of each unknown."""
+        self.slopes, self._secants = Linear(columns, self._start.scale), []
+        self._gram, self._gradient = self.slopes.gram, self.slopes.products(self._r)
+        self._left, self._renewals, self._most = MOVES, self._renewals - 1, np.inf
 
     def _turned_back(self, d: Array) -> None:
         """Stay where the trace is; the next move is at most half as long."""
         self._most, self.within = float(np.linalg.norm(d)) / 2, False
-        self.ended = self._left == 0
+        self.ended = self.lost and self._renewals == 0
