@@ -111,11 +111,14 @@ class Closed(ModelForm):
         return self._at_noise(h, part) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
 
     def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
-        """See ModelForm; either part can reject h, if the difference exceeds that of a small form error."""
+        """See ModelForm; either part can reject h, if the difference exceeds that of a small form error.
+
+        A law that outgrows its limit rejects it, as it would refuse it an answer.
+        """
         b, limits = self.baseline, self.baseline.policy.decision
         worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
         large = b.lead(best, h)[0] >= limits.alike * -b.score(best)
-        return (h.fit.converged and worse) or (large and self.prefers(best, h))
+        return (h.fit.converged and (worse or self.outgrown(h, best))) or (large and self.prefers(best, h))
 
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """See ModelForm; richer: a law with h as its limit, or h and one more effect.
@@ -186,12 +189,12 @@ class Open(ModelForm):
         return [form, *super().calls_for_effect(began)]
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
-        """See ModelForm; the most that a curve elsewhere explains, or chance.
+        """See ModelForm; the most that a curve elsewhere explains, or what a right law may leave.
 
         An error of the form is as like a curve elsewhere as like one over this motion. What a wrong law
         leaves is a force at its own port, and less like any other.
         """
-        return max(self.baseline.policy.decision.noticed, elsewhere)
+        return max(self.noticed(h), elsewhere)
 
 
 def form_of(baseline: Baseline) -> ModelForm:
