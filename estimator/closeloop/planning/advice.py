@@ -137,7 +137,7 @@ def _class_with_advice(question: Question, baseline: Baseline, members: Sequence
     shown = responses(problem, theta, unknowns_of(problem), [s.first for s in some], question.parts)
     comparison, sizes = compared(question, shown), [1.0] * len(some)
     found = class_of(comparison, some, sizes, comparison.distances(some, sizes))
-    [found], _ = advised(question, comparison, [found], theta, most=MOST_TRIED)
+    [found], _ = advised(question, comparison, [found], theta, most=MOST_TRIED, enough=NAMED)
     return found
 
 

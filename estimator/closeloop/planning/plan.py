@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,21 +129,29 @@ def _sight(comparison: Comparison, question: Question, s: Sought, rooms: Mapping
 
 def advised(
     question: Question, comparison: Comparison, classes: Sequence[EffectClass], theta: Mapping[str, float],
-    tell: Tell = lambda _: None, most: int | None = None,
+    tell: Tell = lambda _: None, most: int | None = None, enough: int | None = None,
 ) -> tuple[list[EffectClass], dict[str, str]]:  # fmt: skip
     """The classes with the sensors and the excitations that would split them, and the refused excitations.
 
-    most: number of excitations that are tried, spread over the inputs; by default all.
+    most: number of excitations that are tried, spread over the inputs; enough: number of those that tell all
+    members of each class apart, after which no more are tried; by default all are.
     """
     alike = [c for c in classes if len(c.members) > 1]
     if not alike:
         return list(classes), {}
     tell(f"adding sensors to split {len(alike)} classes")
-    found = {id(c): replace(c, sensors=_sensors(question, comparison, c)) for c in alike}
-    tried, refused = _excited(question, alike, theta, tell, most)
-    for c in alike:
-        splitters = ranked([splitter(c, with_it, words) for words, with_it in tried])
-        found[id(c)] = replace(found[id(c)], excitations=splitters)
+    refused: dict[str, str] = {}
+    tried: list[list[Splitter]] = [[] for _ in alike]
+    for words, with_it in _excited(question, alike, theta, tell, most, refused):
+        for c, splitters in zip(alike, tried, strict=True):
+            splitters.append(splitter(c, with_it, words))
+        whole = [sum(s.pairs == c.pairs for s in some) for c, some in zip(alike, tried, strict=True)]
+        if enough is not None and min(whole) >= enough:
+            break
+    found = {
+        id(c): replace(c, sensors=_sensors(question, comparison, c), excitations=ranked(splitters))
+        for c, splitters in zip(alike, tried, strict=True)
+    }
     return [found.get(id(c), c) for c in classes], refused
 
 
@@ -162,21 +170,18 @@ def _sensors(question: Question, comparison: Comparison, c: EffectClass) -> tupl
 
 
 def _excited(
-    question: Question,
-    alike: Sequence[EffectClass],
-    theta: Mapping[str, float],
-    tell: Tell,
-    most: int | None,
-) -> tuple[list[tuple[str, Comparison]], dict[str, str]]:
-    """The comparison with each changed input, by its words, and the changes that are not possible."""
+    question: Question, alike: Sequence[EffectClass], theta: Mapping[str, float], tell: Tell,
+    most: int | None, refused: dict[str, str],
+) -> Iterator[tuple[str, Comparison]]:  # fmt: skip
+    """The comparison with each changed input, by its words; `refused` gets those that are not possible."""
     problem = question.problem
     [planned] = problem.simulate(theta)
     inputs = [n for n in changeable(problem) if question.excite is None or n in question.excite]
-    changed, refused = excitations(problem, inputs)
+    changed, impossible = excitations(problem, inputs)
+    refused |= impossible
     if most is not None and len(changed) > most:
         changed = [changed[i] for i in np.linspace(0, len(changed) - 1, most).astype(int)]
     members = list(dict.fromkeys(v for c in alike for s in c.members for v in s.variants))
-    tried = []
     for e in changed:
         words = f"{e.input} {e.change}"
         there = with_run(problem, e.run)
@@ -185,5 +190,4 @@ def _excited(
             continue
         tell(f"trying the excitation {words}")
         shown = responses(there, theta, unknowns_of(there), members, question.parts)
-        tried.append((words, compared(question, shown)))
-    return tried, refused
+        yield words, compared(question, shown)
