@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from estimator.closeloop.fitting.fit import REFUSED, in_turn
-from estimator.closeloop.fitting.slopes_within_error import slopes_at
+from estimator.closeloop.fitting.slopes_within_error import slopes_from
 from estimator.closeloop.hypotheses.fitted import WIDE, Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.problem import Problem
@@ -63,8 +63,8 @@ def ends(
         moving = [t for t in moving if not t.ended]
         for t in moving:
             if t.lost:
-                at = fixed | start.named(t.x)
-                t.renewed(slopes_at(built, at, h.fit.unknowns, t.slopes.columns, weighting))
+                at, near = fixed | start.named(t.x), t.slopes.columns
+                t.renewed(slopes_from(built, at, t.r, h.fit.unknowns, near, weighting))
     return np.array(places) * start.scale, {}
 
 
@@ -150,7 +150,7 @@ class Trace:
         self._start, self._i, self._side, self._limit = start, i, side, limit
         self.x, self.unit = start.x, float(start.units[i])
         self.within = self.ended = False
-        self.slopes, self._r = start.slopes, start.fit.residual
+        self.slopes, self.r = start.slopes, start.fit.residual
         self._gram, self._gradient = start.slopes.gram, start.gradient
         self._secants: list[tuple[Array, Array]] = []  # corrections of the slopes: (m,) along a move (n,)
         self._rise = (WIDTH * self.unit) ** 2  # of the sum of squares at the end
@@ -191,7 +191,7 @@ class Trace:
         pull = self._gradient + self._gram @ d
         inner = self._gram[np.ix_(o, o)] + np.diag(self._start.looseness[o])
         rest, follow = np.linalg.solve(inner, -np.column_stack([pull[o], self._gram[o, i]])).T
-        rise = float(self._r @ self._r + d @ (self._gradient + pull) + pull[o] @ rest) - self._start.fit.cost
+        rise = float(self.r @ self.r + d @ (self._gradient + pull) + pull[o] @ rest) - self._start.fit.cost
         slope = self._side * float(pull[i] + self._gram[i, o] @ rest)
         bend = float(self._gram[i, i] + self._gram[i, o] @ follow)
         if bend <= 0:
@@ -201,12 +201,12 @@ class Trace:
 
     def arrived(self, d: Array, r: Array) -> None:
         """Take the residual r (m,) that was simulated after a move d (n,), and correct the slopes by it."""
-        start, cost, before = self._start, float(r @ r), float(self._r @ self._r)
+        start, cost, before = self._start, float(r @ r), float(self.r @ self.r)
         self._left -= 1
         if np.abs(r).max() >= REFUSED:
             self._turned_back(d)
             return
-        missed = r - self._r - self.slopes.change(d)
+        missed = r - self.r - self.slopes.change(d)
         products = self.slopes.products(r)
         for secant, direction in self._secants:
             missed -= float(direction @ d) * secant
@@ -216,12 +216,12 @@ class Trace:
         self._gram = self._gram + np.outer(onto, u) + np.outer(u, onto) + bent**2 * np.outer(u, u)
         self._secants.append((set_aside(missed), u))
         if cost <= max(before, start.fit.cost + HIGHER**2 * self._rise):
-            self.x, self._r, self._most = self.x + d, r, 2 * self._most
+            self.x, self.r, self._most = self.x + d, r, 2 * self._most
             self._gradient = products + float(missed @ r) * u
             self.ended = self._whole and bent <= self._limit * WIDTH * self.unit
             self.within = self.ended or cost <= start.fit.cost + self._rise
         else:
-            self._gradient = self._gradient + float(missed @ self._r) * u
+            self._gradient = self._gradient + float(missed @ self.r) * u
             self._turned_back(d)
         self.ended |= self.lost and self._renewals == 0
 
@@ -233,7 +233,7 @@ class Trace:
     def renewed(self, columns: Sequence[Array]) -> None:
         """Go on from here with new slopes, (m,) of each unknown."""
         self.slopes, self._secants = Linear(columns, self._start.scale), []
-        self._gram, self._gradient = self.slopes.gram, self.slopes.products(self._r)
+        self._gram, self._gradient = self.slopes.gram, self.slopes.products(self.r)
         self._left, self._renewals, self._most = MOVES, self._renewals - 1, np.inf
 
     def _turned_back(self, d: Array) -> None:

@@ -27,32 +27,41 @@ def within_error(built: Problem, h: Hypothesis, weighting: Weighting) -> Hypothe
     built: the problem with the effects of the hypothesis. An onset time keeps its slope, because a model
     realises an onset only at its own time steps.
     """
-    slopes = slopes_at(built, h.theta, h.fit.unknowns, h.fit.slopes, weighting)
+    moved = [(u, column) for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True) if not u.is_onset]
+    ends = [_ends(u, h.theta[u.name], column) for u, column in moved]
+    asked = [{**h.theta, u.name: x} for (u, _), pair in zip(moved, ends, strict=True) for x in pair]
+    residuals, found = in_turn(built, asked, weighting), {}
+    for (u, _), (low, high) in zip(moved, ends, strict=True):
+        below, above = next(residuals), next(residuals)
+        found[u.name] = set_aside((above - below) / (high - low))
+    slopes = [found.get(u.name, column) for u, column in zip(h.fit.unknowns, h.fit.slopes, strict=True)]
     scale = np.array([u.scale for u in h.fit.unknowns])
     width = np.array([u.high - u.low for u in h.fit.unknowns])
     covariance = sandwich(h.fit.residual, stacked(slopes), scale, width)
     return replace(h, fit=replace(h.fit, slopes=tuple(slopes), covariance=covariance))
 
 
-def slopes_at(
-    built: Problem,
-    theta: Mapping[str, float],
-    unknowns: Sequence[Unknown],
-    near: Sequence[Array],
-    weighting: Weighting,
-) -> list[Array]:
-    """The slope (m,) of the residual along each unknown at theta, over one standard error to both sides.
+def slopes_from(
+    built: Problem, theta: Mapping[str, float], r: Array, unknowns: Sequence[Unknown],
+    near: Sequence[Array], weighting: Weighting,
+) -> list[Array]:  # fmt: skip
+    """The slopes (m,) at theta, where the residual is r (m,), over one standard error to one side.
 
-    near: slopes (m,) at a place nearby, which give the size of that error. Onset times keep theirs.
+    near: slopes (m,) at a place nearby, which give the size of that error; onset times keep theirs.
     """
     moved = [(u, column) for u, column in zip(unknowns, near, strict=True) if not u.is_onset]
-    ends = [_ends(u, theta[u.name], column) for u, column in moved]
-    asked = [{**theta, u.name: x} for (u, _), pair in zip(moved, ends, strict=True) for x in pair]
-    residuals, found = in_turn(built, asked, weighting), {}
-    for (u, _), (low, high) in zip(moved, ends, strict=True):
-        below, above = next(residuals), next(residuals)
-        found[u.name] = set_aside((above - below) / (high - low))
+    ends = [_farther(u, theta[u.name], column) for u, column in moved]
+    asked = [{**theta, u.name: x} for (u, _), x in zip(moved, ends, strict=True)]
+    found = {
+        u.name: set_aside((there - r) / (x - theta[u.name]))
+        for (u, _), x, there in zip(moved, ends, in_turn(built, asked, weighting), strict=True)
+    }
     return [found.get(u.name, column) for u, column in zip(unknowns, near, strict=True)]
+
+
+def _farther(u: Unknown, now: float, column: Array) -> float:
+    """That of `_ends` which is farther away; the lower one may be a bound at which u is."""
+    return max(reversed(_ends(u, now, column)), key=lambda x: abs(x - now))
 
 
 def _ends(u: Unknown, now: float, column: Array) -> tuple[float, float]:

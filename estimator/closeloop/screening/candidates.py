@@ -25,6 +25,12 @@ SHAPE_CHANGE = 0.1  # scale of a shape parameter, as share of its value
 LARGEST_CHANGE = 200.0  # bound of a parameter's change, in realistic sizes; it is ten times the parameter
 
 
+INERTIAS = ("kg", "kg.m2")  # units of what cannot vanish
+
+
+LEAST_INERTIA = 0.1  # of its start value; what has hardly any takes a thousand times as long to simulate
+
+
 NEAR_START = 0.2  # share of its start value by which a calibrated parameter may differ from it
 
 
@@ -105,6 +111,8 @@ def _limited(change: Unknown, of: Variable) -> Unknown:
     """The change with bounds that keep the parameter within its limits, also after calibration."""
     value, most = of.start or 0.0, LARGEST_CHANGE * change.scale
     low = -np.inf if of.min is None else of.min - value - NEAR_START * abs(value)
+    if of.unit in INERTIAS:
+        low = max(low, (LEAST_INERTIA - 1) * value)
     high = np.inf if of.max is None else of.max - value + NEAR_START * abs(value)
     return replace(change, low=max(low, -most), high=min(high, most))
 
