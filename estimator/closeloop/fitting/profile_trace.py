@@ -30,8 +30,9 @@ from estimator.weighting import Weighting
 from fmus.aside import set_aside
 
 WIDTH = 1.96  # standard errors: 95 %
-MOVES = 20  # largest number of simulations with the same slopes and their secants
-RENEWED = 3  # largest number of times that slopes are taken anew on the way to one end of an interval
+MOVES = 12  # largest number of simulations with the same slopes and their secants
+RENEWED = 6  # largest number of times that slopes are taken anew on the way to one end of an interval
+WORTH = 0.1  # share of the way by which new slopes must lengthen it, so that others are taken
 HIGHER = 2.0  # times the width of an interval: a move to a place as far from the optimum is taken back
 
 
@@ -157,6 +158,7 @@ class Trace:
         self._most = np.inf  # length of the next move, in scales
         self._whole = False  # whether the last move was to lead to the end
         self._left, self._renewals = MOVES, RENEWED
+        self._way = 0.0  # of the unknown when slopes were taken last, in scales
 
     def move(self) -> Array:
         """The move (n,) to where the slopes predict the end, as far as bounds and earlier moves allow.
@@ -223,20 +225,31 @@ class Trace:
         else:
             self._gradient = self._gradient + float(missed @ self.r) * u
             self._turned_back(d)
-        self.ended |= self.lost and self._renewals == 0
+        self.ended |= self._given_up
 
     @property
     def lost(self) -> bool:
         """Whether the slopes do not lead to the end."""
         return self._left == 0
 
+    @property
+    def _given_up(self) -> bool:
+        """Whether they do not, and new slopes would be of no use either."""
+        return self.lost and (self._renewals == 0 or self._gone < (1 + WORTH) * self._way)
+
+    @property
+    def _gone(self) -> float:
+        """Way of the unknown from the optimum, in scales."""
+        return abs(float(self.x[self._i] - self._start.x[self._i]))
+
     def renewed(self, columns: Sequence[Array]) -> None:
         """Go on from here with new slopes, (m,) of each unknown."""
         self.slopes, self._secants = Linear(columns, self._start.scale), []
         self._gram, self._gradient = self.slopes.gram, self.slopes.products(self.r)
         self._left, self._renewals, self._most = MOVES, self._renewals - 1, np.inf
+        self._way = self._gone
 
     def _turned_back(self, d: Array) -> None:
         """Stay where the trace is; the next move is at most half as long."""
         self._most, self.within = float(np.linalg.norm(d)) / 2, False
-        self.ended = self.lost and self._renewals == 0
+        self.ended = self._given_up
