@@ -16,8 +16,9 @@ from benchmarks.groups.close_loop import DEMO
 from benchmarks.timing import Clock, Run, Times, in_turns, processor_time
 from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.missing_force import missing_forces
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from estimator.filters.bounds import bounded
 from estimator.filters.history import Samples, filtered
 from estimator.filters.system import Joint, UnknownParameter

@@ -15,18 +15,11 @@ from estimator.closeloop.decision.verdict import confirmed_on_test, judge, proba
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
-from estimator.closeloop.fitting.calibrate import calibrate, explains_most, nearer, without_input_noise
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.refined import arrived
-from estimator.closeloop.fitting.resolution import (
-    in_fine_steps,
-    in_long_steps,
-    in_settled_steps,
-    long_steps_hold,
-    over_steps,
-)
+from estimator.closeloop.fitting.resolution import in_fine_steps, over_steps
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -37,6 +30,7 @@ from estimator.closeloop.progress import Progress, Tell
 from estimator.closeloop.question.moments import identified_at
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
+from estimator.closeloop.search.calibrated import in_its_steps
 from estimator.closeloop.search.clock_offset import clock_beside, clock_of
 from estimator.closeloop.search.free_form import free_form
 from estimator.closeloop.search.pairs import with_worth
@@ -80,7 +74,7 @@ class Chain:
         """Calibrate, detect, search, decide, and check the answer on the test part."""
         tell, done = self.tell, self.stages.done
         tell("calibrate", "calibrating the declared parameters")
-        problem, declared, base, noise = self._calibrated()
+        problem, declared, base, noise = in_its_steps(self.problem, tell, self.stages)
         baseline = Baseline(problem, base, noise)
         tell("missing force", "estimating the missing force at each port")
         forces = done("forces", lambda: missing_forces(problem, base.fit.theta, noise.std))
@@ -140,41 +134,6 @@ class Chain:
         fitter = self.fitter(found.baseline, self.jobs)
         base = shown.over_form(self.stages.done("forms", lambda: over_forms(fitter, found.base)))
         return replace(found, baseline=replace(found.baseline, hypothesis=base))
-
-    def _calibrated(self) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
-        """The problem and what `calibrate` finds, in the longest steps if these hold."""
-        long = in_long_steps(self.problem)
-        found = self._in_steps(long, self.stages)
-        problem, _, base, noise = found
-        if long is self.problem or long_steps_hold(problem, base, noise.weighting):
-            return self._settled(*found)
-        self.tell("steps", "calibrating in shorter steps")
-        return self._settled(*self._in_steps(self.problem, self.stages.under("held")))
-
-    def _settled(
-        self, problem: Problem, declared: Hypothesis, base: Hypothesis, noise: Noise
-    ) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
-        """The same with outputs that see the inputs of their sample, unless these were held over it."""
-        other = in_settled_steps(problem, base.theta, noise.weighting)
-        if other is None:
-            return problem, declared, base, noise
-        self.tell("steps", "calibrating with outputs that see the inputs of their sample")
-        again = self.stages.done("settled", lambda: calibrate(other))
-        held = explains_most(problem, base, again[1])
-        return (problem, declared, base, noise) if held else (other, *again)
-
-    def _in_steps(self, problem: Problem, stages: Stages) -> tuple[Problem, Hypothesis, Hypothesis, Noise]:
-        """The same in the steps of a problem, with smoothed inputs if the FMU is nearer with these.
-
-        What looks like noise of an input may be the excitation itself, with which the FMU is nearer.
-        """
-        found = stages.done("calibrated", lambda: calibrate(problem))
-        other = without_input_noise(problem, found[1].theta)
-        if other is None:
-            return problem, *found
-        self.tell("inputs", "calibrating with smoothed inputs")
-        again = stages.done("smoothed", lambda: calibrate(other))
-        return (other, *again) if nearer(other, again[1], found[1]) else (problem, *found)
 
     def _detected(self, shown: Screened) -> Detection:
         self.tell("detect", "testing whether the residual is more than noise")

@@ -40,7 +40,8 @@ SCREENED = """
 
     from estimator.closeloop.fitting.calibrate import calibrate
     from estimator.closeloop.screening.candidates import fault_candidates
-    from estimator.closeloop.screening.screen import Screening, screen
+    from estimator.closeloop.screening.changes import Screening
+    from estimator.closeloop.screening.screen import screen
     from fmus.export.builders.hypotheses import ModelBuilder
     from tests.helpers.carriage import NOISE, problem, record, to_and_fro
 

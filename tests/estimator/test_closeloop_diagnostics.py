@@ -31,10 +31,10 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.free_form import dependences, left_out
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.regressors import Calibration, alike
-from estimator.closeloop.screening.screen import Screening
 from estimator.closeloop.search.free_form import curve_of, free_form, resolved
 from estimator.record import Array, Record, Run
 from estimator.weighting import Weighting

@@ -15,10 +15,11 @@ from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening import levers, regressors
 from estimator.closeloop.screening import screen as screening_of
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.regressors import Calibration
 from estimator.closeloop.screening.regressors import alike as alike_of
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from fmus import aside
 from fmus.export.builders.hypotheses import ModelBuilder
 from tests.helpers.carriage import coulomb, problem, record, to_and_fro

@@ -18,6 +18,7 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.grouped import group_size, grouped
 from estimator.closeloop.screening.linear import (
     Linearised,
@@ -27,7 +28,7 @@ from estimator.closeloop.screening.linear import (
 )
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search import search
 from estimator.closeloop.search.lookalikes import lookalikes

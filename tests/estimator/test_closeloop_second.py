@@ -20,7 +20,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label,
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
-from estimator.closeloop.screening.screen import Screening
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
 from estimator.closeloop.search.pairs import beside, try_pairs, with_worth

@@ -12,7 +12,7 @@ from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.closeloop.screening.screen import FIRST_ORDER, Screening
+from estimator.closeloop.screening.changes import FIRST_ORDER, Screening
 from estimator.record import Array, BoolArray
 from estimator.weighting import Weighting
 

@@ -6,8 +6,9 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.missing_force import MissingForce
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from estimator.weighting import Weighting
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.changes import Screening
+from estimator.closeloop.screening.screen import screen
 
 FIRST_SPACING = 0.1  # spacing of the onset times of the candidates, as share of the fitted length
 

@@ -20,6 +20,7 @@ from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.free_form import (
     FREE_FORMS,
     Dependence,
@@ -28,7 +29,7 @@ from estimator.closeloop.screening.free_form import (
 )
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.regressors import Calibration, Changes
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from estimator.record import Array
 
 RESOLVED = 3.0  # standard errors that a spline coefficient of realistic size must exceed

@@ -17,8 +17,8 @@ from estimator.closeloop.decision.law_form import motion, over_what
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct, key
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.regressors import Calibration, Changes
-from estimator.closeloop.screening.screen import Screening
 from estimator.record import Array
 
 

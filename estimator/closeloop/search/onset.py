@@ -16,7 +16,8 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.question.problem import Problem
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.changes import Screening
+from estimator.closeloop.screening.screen import screen
 from estimator.record import Array
 from estimator.weighting import Weighting
 

@@ -19,9 +19,10 @@ from estimator.closeloop.hypotheses.promise import (
 )
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.grouped import grouped_fit
 from estimator.closeloop.screening.missing_force import missing_forces
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from estimator.record import Array
 
 QUICK = 3e6  # candidates times samples up to which every leading effect is built in and screened again

@@ -20,10 +20,11 @@ from estimator.closeloop.hypotheses.twins import Twins
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
+from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.grouped import grouped_fit
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.closeloop.screening.regressors import Calibration, alike
-from estimator.closeloop.screening.screen import Screening, screen
+from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.search.onset import onset
 from estimator.record import Array
 
