@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from benchmarks.challenge.draw import Plan
 from benchmarks.challenge.measuring import Measuring
 from benchmarks.challenge.menu import OUTPUTS
 from benchmarks.challenge.truth import Item, Truth
+from estimator.record import Array
 from estimator.sensor_faults import FAULTS
 from tests.truth.more import More, made
 from tests.truth.rig import measured
@@ -29,6 +31,7 @@ LOWEST = 60.0  # s, duration of a drift of mu0
 SHARE = {"limit_share": "limit", "slew_share": "slew"}
 WORSE = ("wet", "low", "very_low")  # friction conditions with less friction than dry
 DIGITS = 8
+SMALL = 1e-3  # share by which a calibrated parameter is changed to see what calibration can do
 ATTEMPTS = 20
 FAINT = 2.0  # times the noise; close-loop may ignore a smaller sensor fault as too small to matter
 IDENTIFY = 0.6  # share of the record that is the part to identify
@@ -167,10 +170,10 @@ def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Ou
     early, whole = (max(ratios(here, with_it, sound, part).values()) for part in (IDENTIFY, 1.0))
     if early < LATE * whole:
         raise ValueError(f"{early:.2f} times the noise in the part to identify, {whole:.2f} in all")
-    each = []
-    for item in items if len(items) > 1 else ():
-        alone = here.simulate(effect_of((item,), here), more)
-        each.append(max(ratios(here, shown(here, alone, (item,)), sound).values()))
+    alone = [with_it]
+    if len(items) > 1:
+        alone = [shown(here, here.simulate(effect_of((i,), here), more), (i,)) for i in items]
+    each = [max(ratios(here, y, sound).values()) for y in alone if len(items) > 1]
     truth = Truth(
         plan.name,
         plan.group,
@@ -183,8 +186,30 @@ def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Ou
         plan.quiet,
         plan.note,
         tuple(each),
+        left_over(here, alone, sound, more) if items else (),
     )
     return truth, with_it
+
+
+def left_over(here: Bench, alone: Sequence[Outputs], sound: Outputs, like: More) -> tuple[float, ...]:
+    """For each effect the largest ratio of an output of what is left after calibration, to first order.
+
+    alone: outputs with each effect; sound: without any. The calibration changes the calibrated parameters by
+    whatever makes the sum of squares least, and other effects too have the size that does.
+    """
+
+    def change(y: Outputs) -> Array:
+        return np.concatenate([(y[o] - sound[o]) / noise for o, noise in here.noise.items()])
+
+    moved = [made("parameter_offset", n, delta=SMALL * value) for n, value in here.true.items()]
+    calibrated, changes = [change(here.simulate(m, like)) for m in moved], [change(y) for y in alone]
+    found = []
+    for i, own in enumerate(changes):
+        free = np.column_stack([*calibrated, *changes[:i], *changes[i + 1 :]])
+        free /= np.maximum(np.linalg.norm(free, axis=0), np.finfo(float).tiny)
+        rest = own - free @ np.linalg.lstsq(free, own)[0]
+        found.append(float(max(np.sqrt(np.mean(y**2)) for y in np.split(rest, len(here.noise)))))
+    return tuple(found)
 
 
 def write(home: Path, text: str, columns: Outputs) -> None:

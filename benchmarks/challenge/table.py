@@ -30,7 +30,7 @@ def markdown(marked: Sequence[Marked], seed: int, count: int, every: bool = Fals
         lines += ["", "Right answers by the probability that they state:", "", *said]
     listed = sorted(marked, key=lambda m: m[0].name) if every else failures(marked)
     if listed:
-        head = "| record | group | truth | SNR | grade | answer | s |"
+        head = "| record | group | truth | SNR (after calibration) | grade | answer | s |"
         lines += ["", "All records:" if every else "Answers that are not right:", "", head]
         lines.append("|---|---|---|---|---|---|---|")
         lines += ["| " + " | ".join(_line(m)) + " |" for m in listed]
@@ -41,4 +41,5 @@ def _line(m: Marked) -> list[str]:
     t, a = m
     label = f"{t.system}: {t.label}"
     ratio = f"{t.largest_snr:.2g}" if t.items else ""
+    ratio += f" ({min(t.left):.2g})" if t.left else ""
     return [t.name, t.group, label, ratio, judged(t, a), a.label.replace("|", "/"), f"{a.seconds:.0f}"]

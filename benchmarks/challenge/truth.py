@@ -56,6 +56,7 @@ class Truth:
     quiet: bool = False
     note: str = ""
     each: tuple[float, ...] = ()  # for several effects, the largest signal-to-noise ratio of each alone
+    left: tuple[float, ...] = ()  # the ratio of each effect that is left after calibration, see `left_over`
 
     @property
     def largest_snr(self) -> float:
@@ -80,4 +81,4 @@ class Truth:
         d = json.loads(path.read_text(encoding="utf-8"))
         items = tuple(Item(**i) for i in d.pop("items"))
         near = tuple((k, p) for k, p in d.pop("near"))
-        return cls(**d | {"items": items, "near": near, "each": tuple(d["each"])})
+        return cls(**d | {"items": items, "near": near, "each": tuple(d["each"]), "left": tuple(d.get("left", ()))})

@@ -198,8 +198,22 @@ def test_two_effects_have_a_ratio_each(tmp_path):
         )
     )
     truth = make(Plan(5, "double", "rig", (one, other)), 3, tmp_path / "r", tmp_path / "t")
-    assert len(truth.each) == 2
+    assert len(truth.each) == len(truth.left) == 2
     assert min(truth.each) > 0
+    assert 0 < truth.left[0] <= truth.each[0] * 1.001
+    assert 0 < truth.left[1] <= truth.each[1] * 1.001
+
+
+@pytest.mark.parametrize(
+    ("location", "size", "least", "most"), [("mu0", 5e-3, 0.0, 0.05), ("J_w", 0.5, 0.2, 1.0)]
+)
+def test_what_is_left_of_a_ratio_is_what_calibration_cannot_make_up_for(
+    tmp_path, location, size, least, most
+):
+    asked = plan("single", "parameter_offset", location, delta=size)
+    truth = make(asked, 3, tmp_path / "records", tmp_path / "truth")
+    assert location == "mu0" or location not in truth.true
+    assert least * truth.largest_snr <= truth.left[0] <= most * truth.largest_snr
 
 
 def test_sizes_by_the_run_are_settled():

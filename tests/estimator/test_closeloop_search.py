@@ -460,3 +460,19 @@ def test_an_answer_that_leaves_more_than_noise_does_not_end_the_search(monkeypat
     singles, pairs = asked._finished([answer], [])
     assert singles[0] is (right if grows else answer)
     assert pairs == []
+
+
+@pytest.mark.parametrize(("form", "left_out"), [(0.0, set()), (0.02, {"parameter_step@friction"})])
+def test_a_group_of_parameters_is_one_of_two_effects_only_if_the_form_is_right(form, left_out):
+    step = candidate("parameter_step", "friction", amplitude="delta_mu0")
+    group = replace(
+        step, amplitudes=(*step.amplitudes, replace(step.amplitudes[0], name=f"{step.prefix}delta_A"))
+    )
+    every = [group, candidate("parameter_step", "mu0"), candidate("coulomb_friction", "wheel")]
+    screened = SimpleNamespace(
+        baseline=baseline(SimpleNamespace(policy=DEFAULT, form_error=form)),
+        change=[(c, np.ones((4, 1))) for c in every],
+        twins=SimpleNamespace(left_out=set()),
+    )
+    asked = search.Search(screened, SimpleNamespace(), lambda *_: None)
+    assert {c.label for c in every} - {c.label for c, _ in asked._in_pairs} == left_out

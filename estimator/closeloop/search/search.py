@@ -9,6 +9,7 @@ from estimator.closeloop.fitting.fitter import BRIEF, Fitter
 from estimator.closeloop.fitting.refined import arrived, evenly, from_declared
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct
+from estimator.closeloop.hypotheses.relations import groups_with
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
@@ -86,6 +87,18 @@ class Search:
         return [(c, g) for c, g in self.screened.change if c.label not in left_out]
 
     @cached_property
+    def _in_pairs(self) -> Changes:
+        """The changes by each candidate that may be one of two effects.
+
+        Where the form of the model is open, a group of parameters may not, but each of its parameters may.
+        The group holds those of the form, and beside the right effect it explains what another form leaves.
+        """
+        every = [c for c, _ in self._single]
+        if self._form.exact:
+            return self._single
+        return [(c, g) for c, g in self._single if not any(groups_with(c, other) for other in every)]
+
+    @cached_property
     def _promises(self) -> list[Promise]:
         """The promises of these candidates, best first, starting from the calibrated parameters."""
         s, labels = self.screened, {c.label for c, _ in self._single}
@@ -142,7 +155,9 @@ class Search:
         if s.explained(alone) or s.baseline.seen_by_several(s.baseline.hypothesis) is False:
             return alone, []
         self.tell("pairs", "trying pairs of effects")
-        pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, alone, self._single))
+        labels = {c.label for c, _ in self._in_pairs}
+        paired = [h for h in alone if h.label in labels]
+        pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, paired, self._in_pairs))
         return best_by_label([*alone, *freed]), pairs
 
     def _from_declared(self, found: list[Hypothesis]) -> list[Hypothesis]:
@@ -156,7 +171,7 @@ class Search:
         s = self.screened
         self.tell("second", "looking for a second effect in the remaining residual")
         least = 0.0 if self._form.exact else s.problem.policy.decision.most
-        return s.stages.done("beside", lambda: beside(self.fitter, one, s.screening, self._single, least))
+        return s.stages.done("beside", lambda: beside(self.fitter, one, s.screening, self._in_pairs, least))
 
     def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:
         """Sensor faults that account for the residual, fitted to the end, and the candidates still to be
@@ -203,7 +218,7 @@ class Search:
         found = self._form.ranked(best_by_label(found))
         if not found:
             return found
-        every = [c for c, _ in self._single]
+        every = [c for c, _ in (self._single if len(found[0].candidates) < 2 else self._in_pairs)]
         if whole := self.fitter.finished(in_groups(found, every)):
             found = self._form.ranked(best_by_label([*found, *whole]))
         if s.baseline.noise.known and not s.explained(found[:1]):
