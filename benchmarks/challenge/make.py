@@ -31,6 +31,7 @@ LOWEST = 60.0  # s, duration of a drift of mu0
 SHARE = {"limit_share": "limit", "slew_share": "slew"}
 WORSE = ("wet", "low", "very_low")  # friction conditions with less friction than dry
 DIGITS = 8
+LEFT = ("single", "double")  # groups of which it is said what calibration leaves, as this takes simulations
 SMALL = 1e-3  # share by which a calibrated parameter is changed to see what calibration can do
 ATTEMPTS = 20
 FAINT = 2.0  # times the noise; close-loop may ignore a smaller sensor fault as too small to matter
@@ -186,7 +187,7 @@ def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Ou
         plan.quiet,
         plan.note,
         tuple(each),
-        left_over(here, alone, sound, more) if items else (),
+        left_over(here, alone, sound, more) if plan.group in LEFT else (),
     )
     return truth, with_it
 

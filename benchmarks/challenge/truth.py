@@ -81,4 +81,6 @@ class Truth:
         d = json.loads(path.read_text(encoding="utf-8"))
         items = tuple(Item(**i) for i in d.pop("items"))
         near = tuple((k, p) for k, p in d.pop("near"))
-        return cls(**d | {"items": items, "near": near, "each": tuple(d["each"]), "left": tuple(d.get("left", ()))})
+        return cls(
+            **d | {"items": items, "near": near, "each": tuple(d["each"]), "left": tuple(d.get("left", ()))}
+        )
