@@ -12,8 +12,7 @@ from estimator.closeloop.fitting.calibrate import calibrate
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.question.problem import Problem
-from estimator.closeloop.screening import levers, regressors
-from estimator.closeloop.screening import screen as screening_of
+from estimator.closeloop.screening import changes, levers, regressors
 from estimator.closeloop.screening.candidates import fault_candidates, physical_candidates
 from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.missing_force import missing_forces
@@ -46,7 +45,7 @@ def all_is_long(monkeypatch):
     monkeypatch.setattr(aside, "FILE", 1 << 16)
     monkeypatch.setattr(aside, "BLOCK", 1 << 12)
     monkeypatch.setattr(aside._SHELF, "_last", None)
-    monkeypatch.setattr(screening_of, "TOGETHER", 1)
+    monkeypatch.setattr(changes, "TOGETHER", 1)
     monkeypatch.setattr(regressors, "BATCH", 1)
     monkeypatch.setattr(levers, "SAMPLES_AT_ONCE", 100)
 

@@ -12,7 +12,7 @@ import pytest
 from estimator.closeloop import pipeline as chain
 from estimator.closeloop.checkpoints import SUFFIX, Stages
 from estimator.closeloop.fitting.fitter import Fitter
-from estimator.closeloop.search import screened, search
+from estimator.closeloop.search import calibrated, screened, search
 from fmus import codec
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -229,7 +229,7 @@ def test_what_belongs_to_something_else_is_worked_out_again(
         data.write_text(data.read_text() + "\n")
     elif change == "units":
         (carriage / "data.csv.units.json").write_text('{"q": "m"}')
-    monkeypatch.setattr(chain, "calibrate", refused)
+    monkeypatch.setattr(calibrated, "calibrate", refused)
     with pytest.raises(RuntimeError, match="worked out again"):
         close(carriage, tmp_path / "out", *more)
 
