@@ -171,10 +171,10 @@ def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Ou
     early, whole = (max(ratios(here, with_it, sound, part).values()) for part in (IDENTIFY, 1.0))
     if early < LATE * whole:
         raise ValueError(f"{early:.2f} times the noise in the part to identify, {whole:.2f} in all")
-    alone = [with_it]
+    alone, each = [with_it], []
     if len(items) > 1:
         alone = [shown(here, here.simulate(effect_of((i,), here), more), (i,)) for i in items]
-    each = [max(ratios(here, y, sound).values()) for y in alone if len(items) > 1]
+        each = [max(ratios(here, y, sound).values()) for y in alone]
     truth = Truth(
         plan.name,
         plan.group,

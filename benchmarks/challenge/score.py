@@ -92,10 +92,7 @@ def recognised(marked: Sequence[Marked]) -> list[Row]:
         rows.append(Row("single effects right, SNR 1 and more", text, "at least 92 %"))
         rows.append(Row("of these alone in the answer, not in a class", share(alone, len(clear))))
         rows.append(Row("of these first in the answer", share(top, len(clear))))
-    visible = [(t, a) for t, a in marked if min(t.left, default=0.0) >= 1]
-    if visible:
-        text = share(count(visible, "right"), len(visible))
-        rows.append(Row("single effects right, SNR 1 and more after calibration", text))
+    rows += after_calibration(marked, "single effects right, SNR 1 and more after calibration")
     if marked:
         rows.append(Row("single effects with a definite wrong name", share(confident(marked), len(marked))))
     return rows
@@ -153,11 +150,13 @@ def doubles(marked: Sequence[Marked]) -> list[Row]:
     rows.append(Row("two effects, one named", share(count(marked, "part"), len(marked))))
     if both:
         rows.append(Row("two of SNR 1 and more each, both named", share(count(both, "right"), len(both))))
+    return rows + after_calibration(marked, "two of SNR 1 and more each after calibration, both named")
+
+
+def after_calibration(marked: Sequence[Marked], what: str) -> list[Row]:
+    """How many are right of the records with effects of which each leaves the noise at least."""
     visible = [(t, a) for t, a in marked if min(t.left, default=0.0) >= 1]
-    if visible:
-        text = share(count(visible, "right"), len(visible))
-        rows.append(Row("two of SNR 1 and more each after calibration, both named", text))
-    return rows
+    return [Row(what, share(count(visible, "right"), len(visible)))] if visible else []
 
 
 def closed(a: Answer) -> float:

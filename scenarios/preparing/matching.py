@@ -44,9 +44,7 @@ def likeness(v: FmuVariable, channel: Channel) -> float:
     Where the file states no unit, the end of the column's name may tell it, as in n_wheel_rpm.
     """
     one, other = words_of(v.name), words_of(channel.name)
-    unit = meant_by(
-        channel.unit, [v.unit] if v.unit else [q.unit for q in quantities_of(v.name, v.description)]
-    )
+    unit = meant_by(channel.unit, fitting(v))
     if v.unit and unit and not alike(unit, v.unit):
         return 0.0
     if one == other:

@@ -111,7 +111,7 @@ class Closed(ModelForm):
         return self._at_noise(h, part) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
 
     def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
-        """See ModelForm; by more than a small error of form on either part, or by outgrowing its limit."""
+        """See ModelForm; h is worse by more than a small error of form, or a limit that best outgrows."""
         b, limits = self.baseline, self.baseline.policy.decision
         worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
         large = b.lead(best, h)[0] >= limits.alike * -b.score(best)

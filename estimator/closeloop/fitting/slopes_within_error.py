@@ -60,7 +60,7 @@ def slopes_from(
 
 
 def _farther(u: Unknown, now: float, column: Array) -> float:
-    """That of `_ends` which is farther away; the lower one may be a bound at which u is."""
+    """The one of `_ends` that is farther away, the upper one if they are equally far."""
     return max(reversed(_ends(u, now, column)), key=lambda x: abs(x - now))
 
 
