@@ -113,7 +113,7 @@ def crossings(equilibria: Equilibria, rests: Sequence[Rest], finer: Equilibria) 
     """Where between positions of rest the number of growing motions changes; finer: with half the step."""
     reach = abs(rests[-1].parameter - rests[0].parameter)
     return [
-        _crossing(equilibria, finer, one.parameter, other.parameter, min(one.unstable, other.unstable), reach)
+        _crossing(equilibria, finer, one, other, reach)
         for low, high in pairwise(rests)
         for one, other in _single(equilibria, low, high, DEEP)
     ]
@@ -131,9 +131,9 @@ def _single(equilibria: Equilibria, low: Rest, high: Rest, deep: int) -> Iterato
     yield from _single(equilibria, middle, high, deep - 1)
 
 
-def _crossing(
-    equilibria: Equilibria, finer: Equilibria, low: float, high: float, number: int, reach: float
-) -> Crossing:
+def _crossing(equilibria: Equilibria, finer: Equilibria, one: Rest, other: Rest, reach: float) -> Crossing:
+    low, high, number = one.parameter, other.parameter, min(one.unstable, other.unstable)
+
     def growth(of: Equilibria, p: float) -> float:
         return float(of.at(p).rates[number].real)
 
@@ -152,5 +152,5 @@ def _crossing(
     rest = equilibria.at(at)
     rate = rest.rates[number]
     swings = abs(rate.imag) > REAL * float(np.abs(rest.rates).min()) and abs(rate.imag) > NEUTRAL
-    begins = bool(equilibria.at(high).rates[number].real > 0)
-    return Crossing(rest, error, abs(rate.imag) / (2 * np.pi) if swings else 0.0, begins, number)
+    frequency = abs(rate.imag) / (2 * np.pi) if swings else 0.0
+    return Crossing(rest, error, frequency, other.unstable > one.unstable, number)
