@@ -32,10 +32,11 @@ class Copies:
 
     way: how the state is set; put, get: names of the variables to set and to read; constants: values that are
     set once; free_time: whether a step may begin at any time, so that one instance is enough for all rows.
-    Otherwise each row has its own instance, whose time only moves forward.
+    Otherwise each row has its own instance, whose time only moves forward. look: s, length of the step after
+    which values are read that are to be those of what was set; 0 reads without a step.
     """
 
-    SHOWN = ("get",)  # in another process that uses them, see fmus.host.apart.room
+    SHOWN = ("get", "look")  # in another process that uses them, see fmus.host.apart.room
 
     def __init__(
         self,
@@ -47,8 +48,10 @@ class Copies:
         t0: float = 0.0,
         free_time: bool = False,
         compiled: bool = True,
+        look: float = 0.0,
     ) -> None:
         self.way, self.put, self.get, self.t0 = way, tuple(put), tuple(get), t0
+        self.look = look
         self.constants = {n: v for n, v in constants.items() if n not in put}
         self._archive, self._compiled = archive, compiled
         self._one = free_time or way is not Way.SET
@@ -74,8 +77,8 @@ class Copies:
         return out
 
     def evaluate(self, values: Array, t: float) -> Array:
-        """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step."""
-        return self.advance(values, t, 0.0)
+        """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step or after the short one."""
+        return self.advance(values, t, self.look)
 
     def call(self, values: Array, dt: float) -> Call | None:
         """The call that makes a step of dt [s] from values (k, n_put), for compiled code, or None."""

@@ -13,18 +13,14 @@ import numpy as np
 from estimator.access.copies import Copies, Refused
 from estimator.access.exchange import Exchange
 from estimator.access.recipe import Way
-from estimator.record import Array
+from estimator.access.trial import CONTINUES, RUN, Point, Trial, perturbed
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
-from fmus.host.description import FmuDescription
 from fmus.host.fmu import Fmu, FmuError
 
-CONTINUES = 1e-9  # relative tolerance of a restart against an uninterrupted simulation, for rounding
-NUDGE = 0.01  # perturbation of a value, relative to itself or to its nominal value
-LATER = 7.25  # s, time shift of the test whether the equations depend on the time
-RUN = 24  # steps before the second point
 ALIKE = 1.3  # ratio of the computing times, above which a faster way is preferred to a simpler one
 CO_SIMULATION = (Way.SET, Way.RESUME, Way.RESTART)
+LOOK = 1e-3  # of a step, length of one that only shows outputs
 MOST_PARTS = 4096  # largest number of parts of a step by model exchange
 ORDERS = ((1, 2, 1), (2, 1, 2), (0, 1, 1), (1, 0, 2))  # orders of the points, to detect remaining memory
 TIMED = 5  # number of evaluations, the fastest of which counts
@@ -35,8 +31,9 @@ class Access:
     """The result of the probe.
 
     way: the simplest among the fastest correct ones; free_time: whether its steps may begin at any time;
-    late: outputs that are computed in steps only; refused: the reason against each other way; cost: computing
-    time of one copy and step, s.
+    late: outputs that do not show the state that was set; look: s, length of the step after which outputs do
+    that an FMU computes in steps only, 0 if it has none; refused: the reason against each other way; cost:
+    computing time of one copy and step, s.
     """
 
     way: Way
@@ -45,6 +42,7 @@ class Access:
     refused: dict[Way, str]
     cost: float
     parts: int = 1  # number of parts of a step by model exchange
+    look: float = 0.0
 
     @property
     def sentence(self) -> str:
@@ -52,15 +50,6 @@ class Access:
         shared = self.free_time or self.way is not Way.SET
         who = "one instance for all sigma points" if shared else "one instance per sigma point"
         return f"{self.way.words}; {who}; {1e6 * self.cost:.2g} µs per state and step"
-
-
-@dataclass(frozen=True)
-class Point:
-    """Values that are set, (n,), and the values read after a plain restart with these, (n_get,) each."""
-
-    values: Array
-    before: Array  # outputs without a step
-    after: Array  # outputs after a step
 
 
 def probe(
@@ -110,7 +99,7 @@ def by_exchange(
     exchange = Exchange(archive, put, get, constants, t0)
     try:
         row = np.array([start[n] for n in put])
-        moved = _perturbed(archive.description, put, row)
+        moved = perturbed(archive.description, put, row)
         while exchange.parts < MOST_PARTS:
             coarse = exchange.advance(np.array([row, moved, row]), t0, dt)
             exchange.parts *= 2
@@ -142,6 +131,8 @@ def _by_co_simulation(
     with Fmu(archive) as fmu:
         trial = Trial(fmu, tuple(put), tuple(get), dict(constants), t0, dt)
         points, late = trial.points(dict(start), states)
+        if late and d.variable_step:
+            trial, points, late = _with_a_look(trial, points, late, start, states)
         timeless = trial.ignores_time(points[1])
         answers = [points if timeless else trial.again(points, k) for k in range(len(ORDERS))]
     refused: dict[Way, str] = {}
@@ -159,7 +150,7 @@ def _by_co_simulation(
     least = min(cost for cost, _ in honest.values())
     way = next(w for w in CO_SIMULATION if w in honest and honest[w][0] <= ALIKE * least)
     refused |= {w: f"not faster ({1e6 * c:.2g} µs)" for w, (c, _) in honest.items() if w is not way}
-    return Access(way, honest[way][1], frozenset(late), refused, honest[way][0])
+    return Access(way, honest[way][1], frozenset(late), refused, honest[way][0], look=trial.look)
 
 
 Answers = Sequence[Sequence[Point]]  # for each time, the results at each point
@@ -169,79 +160,16 @@ class Dishonest(Exception):
     """A way that the FMU accepts but that gives other numbers than a restart."""
 
 
-@dataclass(frozen=True)
-class Trial:
-    """An instance that gives the reference results by plain restarts."""
-
-    fmu: Fmu
-    put: tuple[str, ...]
-    get: tuple[str, ...]
-    constants: dict[str, float]
-    t0: float
-    dt: float
-
-    def answer(self, values: Array, t: float) -> Point:
-        """The values read before and after a step, from a restart at t with values (n,)."""
-        self.fmu.restart(t, **{**self.constants, **dict(zip(self.put, values.tolist(), strict=True))})
-        before = np.array(self.fmu.read(self.get))
-        self.fmu.step(self.dt)
-        return Point(values, before, np.array(self.fmu.read(self.get)))
-
-    def points(self, start: dict[str, float], states: list[str]) -> tuple[list[Point], set[str]]:
-        """The start, a later point of the simulation, that perturbed; and outputs updated in steps only.
-
-        Raises BadInput if a restart in the middle of the simulation does not reproduce its continuation.
-        """
-        name, fmu = self.fmu.name, self.fmu
-        begin, later = np.array([start[n] for n in self.put]), self.t0 + RUN * self.dt
-        try:
-            first = self.answer(begin, later)
-            self.answer(begin, self.t0)
-            for _ in range(RUN - 1):
-                fmu.step(self.dt)
-            along = np.array(fmu.read(self.get))
-            there = dict(zip(self.get, along.tolist(), strict=True))
-            middle = np.array([there[n] if n in states else start[n] for n in self.put])
-            fmu.step(self.dt)
-            straight = np.array(fmu.read(self.get))
-            second = self.answer(middle, later)
-        except FmuError as error:
-            raise BadInput(f"{name}: cannot be simulated from its start values: {error}") from error
-        gaps = [(n, _gap(a, b)) for n, a, b in zip(self.get, straight, second.after, strict=True)]
-        hidden = [n for n, gap in gaps if n in states and not gap <= CONTINUES]
-        if hidden:
-            raise BadInput(
-                f"{name}: after a restart from its visible states, '{hidden[0]}' differs from the simulation "
-                "without a restart; it has a hidden state, so it cannot be estimated; export it with all "
-                "states as outputs"
-            )
-        late = {
-            n for n, a, b in zip(self.get, along, second.before, strict=True) if not _gap(a, b) <= CONTINUES
-        }
-        moved = _perturbed(fmu.description, self.put, middle)
-        return [first, second, self.answer(moved, later)], late
-
-    def again(self, points: Sequence[Point], steps: int) -> list[Point]:
-        """The results at the same points some steps later."""
-        return [self.answer(p.values, self.t0 + (RUN + steps) * self.dt) for p in points]
-
-    def ignores_time(self, point: Point) -> bool:
-        """Whether a restart at another time gives exactly the same results."""
-        other = self.answer(point.values, self.t0 + LATER)
-        return np.array_equal(other.after, point.after) and np.array_equal(other.before, point.before)
-
-
-def _perturbed(d: FmuDescription, put: Sequence[str], values: Array) -> Array:
-    moved = []
-    for name, value in zip(put, values.tolist(), strict=True):
-        v = d.variables[name]
-        by = NUDGE * (abs(value) or v.nominal or 1.0)
-        moved.append(value + by if v.max is None or value + by <= v.max else value - by)
-    return np.array(moved)
-
-
-def _gap(a: float, b: float) -> float:
-    return 0.0 if a == b else abs(a - b) / max(abs(a), abs(b), 1e-12)
+def _with_a_look(
+    trial: Trial, points: list[Point], late: set[str], start: Mapping[str, float], states: list[str]
+) -> tuple[Trial, list[Point], set[str]]:
+    """The same with outputs read after a short step, if more of them show the state that was set then."""
+    looking = replace(trial, look=LOOK * trial.dt)
+    try:
+        seen, left = looking.points(dict(start), states)
+    except BadInput:  # it refuses so short a step
+        return trial, points, late
+    return (looking, seen, left) if left < late else (trial, points, late)
 
 
 def _tried(
@@ -250,7 +178,7 @@ def _tried(
     """Computing time of a way per copy, s, and its `free_time`; raises Dishonest or FmuError if it fails."""
     for free in _times(way, alone):
         with Copies(
-            archive, way, trial.put, trial.get, trial.constants, trial.t0, free_time=free, compiled=compiled
+            archive, way, trial.put, trial.get, trial.constants, trial.t0, free, compiled, trial.look
         ) as copies:
             try:
                 _compare(copies, trial, answers)
@@ -289,12 +217,17 @@ def _compare(copies: Copies, trial: Trial, answers: Answers) -> None:
 
 
 def _cost(copies: Copies, trial: Trial, points: Sequence[Point]) -> float:
-    """Computing time of one copy and step in s, the fastest of several trials at increasing times."""
+    """Computing time of one copy and step in s, the fastest of several trials at increasing times.
+
+    Where outputs are read after a short step, its time is included.
+    """
     values = np.array([p.values for p in points])
     t, times = trial.t0 + (RUN + len(ORDERS)) * trial.dt, []
     for _ in range(TIMED):
         begun = time.perf_counter()
         copies.advance(values, t, trial.dt)
+        if trial.look:
+            copies.evaluate(values, t + trial.dt)
         times.append(time.perf_counter() - begun)
         t += trial.dt
     return min(times[1:]) / len(values)

@@ -250,5 +250,5 @@ def march_of(joint: Joint, X: Array, u: Array, carried: Array, part: float) -> M
     if joint.clipped or len(joint.adds) or not isinstance(joint.copies, Copies):
         return None
     values = joint.rows(X, u, carried)
-    step, look = joint.copies.call(values, part), joint.copies.call(values, 0.0)
+    step, look = joint.copies.call(values, part), joint.copies.call(values, joint.copies.look)
     return March(joint, step, look, len(carried)) if step and look else None

@@ -265,8 +265,8 @@ class Joint:
         late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
         if late:
             raise BadInput(
-                f"{self.archive.path}: output '{late[0]}' is computed in steps only, not from the states; "
-                "leave it out of [outputs] or measure a state"
+                f"{self.archive.path}: output '{late[0]}' is computed in steps only, not from the states, "
+                "and a short step does not show it; leave it out of [outputs] or measure a state"
             )
         if way is Way.EXCHANGE:
             self.access = self.archive.called(by_exchange, put, get, constants, first, t0, dt)
@@ -278,7 +278,9 @@ class Joint:
             self._stack.callback(self.copies.close)
             return
         free = self.access.free_time if chosen is self.access.way else False
-        self.copies = self.archive.made(Copies, chosen, put, get, constants, t0, free, compiled)
+        self.copies = self.archive.made(
+            Copies, chosen, put, get, constants, t0, free, compiled, self.access.look
+        )  # fmt: skip
         self._stack.callback(self.copies.close)
 
     def _check(self, put: list[str], get: list[str]) -> None:

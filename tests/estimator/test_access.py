@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from estimator.access.copies import Copies, Refused
 from estimator.access.exchange import Exchange, continuous_states
 from estimator.access.loop import PythonLoop
-from estimator.access.probe import CO_SIMULATION, probe
+from estimator.access.probe import CO_SIMULATION, LOOK, probe
 from estimator.access.recipe import Way
 from fmus.drive.model import Drive
 from fmus.errors import BadInput
@@ -98,10 +98,41 @@ def test_a_memory_below_rounding_forbids_setting_but_not_restarting(foreign):
     assert "differs from that after a restart" in found.refused[Way.SET]
 
 
-def test_an_output_that_lags_behind_the_state_is_named(foreign):
-    """y is worked out in a step only: after a restart it is not yet that of the state."""
-    late = foreign("self.x += dt * (self.u - self.k * self.x)\nself.y = 3 * self.x", LATE)
-    assert tried(late, (["x", "k", "u"], ["x", "y"]), FOREIGN_START).late == {"y"}
+STEP = "self.x += dt * (self.u - self.k * self.x)\n"
+SHOWS = ["x", "k", "u"], ["x", "y"]
+
+
+@LOOPS
+def test_an_output_that_is_computed_in_steps_is_read_after_a_short_one(foreign, compiled):
+    """After a restart y is not yet that of the state; a step shows it, with the input that acts then."""
+    late = foreign(f"{STEP}self.y = 3 * self.x + self.u", LATE)
+    found = tried(late, SHOWS, FOREIGN_START, compiled=compiled)
+    assert (found.late, found.look) == (frozenset(), LOOK * DT)
+    rows = np.array([[1.0, 2.0, 0.3], [0.5, 1.9, -0.2]])
+    more = found.free_time, compiled, found.look
+    with Archive(late) as archive, Copies(archive, found.way, *SHOWS, {}, 0.0, *more) as copies:
+        for t in (0.0, DT):
+            shown = copies.evaluate(rows, t)[:, 1]
+            assert_allclose(shown, 3 * rows[:, 0] + rows[:, 2], rtol=5 * LOOK * DT)
+            assert_array_equal(copies.advance(rows, t, DT), plain(late, *SHOWS, rows, t)[1])
+
+
+@pytest.mark.parametrize(
+    ("step", "options"),
+    [
+        (f"self.y = 3 * self.x\n{STEP}", {}),  # that of the step before
+        (f"{STEP}self.y = 3 * self.x", {"canHandleVariableCommunicationStepSize": "false"}),
+        (f"if dt < 1e-3:\n    return False\n{STEP}self.y = 3 * self.x", {}),
+    ],
+    ids=["of the step before", "steps of one length", "no short steps"],
+)
+def test_an_output_that_lags_behind_the_state_is_named(foreign, step, options):
+    found = tried(foreign(step, LATE, **options), SHOWS, FOREIGN_START)
+    assert (found.late, found.look) == ({"y"}, 0.0)
+
+
+def test_an_fmu_that_shows_its_outputs_at_once_makes_no_short_steps(foreign):
+    assert tried(foreign(), FOREIGN, FOREIGN_START).look == 0.0
 
 
 @LOOPS
