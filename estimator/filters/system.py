@@ -264,9 +264,13 @@ class Joint:
         self.access: Access = self.archive.called(probe, put, get, constants, first, t0, dt, compiled)
         late = sorted(self.access.late & set(self.outputs) - {s.name for s in self.states})
         if late:
+            way_out = (
+                "leave it out of [outputs] or measure a state" if self.states
+                else "the FMU declares no states, so name them: [estimate] states = [...]"
+            )  # fmt: skip
             raise BadInput(
                 f"{self.archive.path}: output '{late[0]}' is computed in steps only, not from the states, "
-                "and a short step does not show it; leave it out of [outputs] or measure a state"
+                f"and a short step does not show it; {way_out}"
             )
         if way is Way.EXCHANGE:
             self.access = self.archive.called(by_exchange, put, get, constants, first, t0, dt)

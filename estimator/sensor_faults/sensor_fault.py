@@ -37,6 +37,14 @@ class SensorFault(ABC):
         samples, s.
         """
 
+    def afar(self, shown: Array, measured: Array, step: float) -> float | None:
+        """A size far from zero at which the fault explains what is measured best, where slopes at zero do not
+        lead there; None if they do.
+
+        shown: (N,) simulated output; measured: (N,), nan where it is not used; step: between samples, s.
+        """
+        return None
+
     @abstractmethod
     def apply(self, y: Array, t: Array, value: float) -> Array:
         """The output y (N,) at times t (N,) [s] as measured by a sensor with a fault of size `value`."""

@@ -113,7 +113,8 @@ def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
         motion = [name for name in (port.velocity, port.displacement) if name]
         yield f"[[ports]] '{port.name}'", motion, fmu.outputs, "an output"
     if e.estimate:
-        yield "[estimate] states", e.estimate.states, states, "a state whose start can be set"
+        shown = [v.name for v in fmu.variables.values() if v.causality in ("output", "local")]
+        yield "[estimate] states", e.estimate.states, shown, "an output or a local variable"  # see the probe
         yield "[estimate.parameters]", e.estimate.parameters, fmu.parameters, "a parameter"
         yield "[estimate.inputs]", e.estimate.inputs, fmu.inputs, "an input"
         rates = [i.rate_input for i in e.estimate.inputs.values() if i.rate_input]

@@ -111,6 +111,59 @@ def test_the_oscillator_made_with_pythonfmu(foreign, tmp_path):
     assert k["std_error"] < 0.05
 
 
+FALLING = """\
+id = "falling"
+fmu = "{fmu}"
+data = "data.csv"
+time = "t"
+[inputs]
+u = "u"
+[outputs.x]
+column = "x"
+unit = "m"
+model_unit = "m"
+noise_std = 1e-3
+[estimate]
+parameters.k = {{start = 1.0, std = 0.5, bounds = [0.1, 9.0]}}
+"""
+
+
+def write_falling(folder, fmu, text=""):
+    """A record of x' = u - k x with k = 2, from 1.5, and its experiment."""
+    t = 0.02 * np.arange(500)
+    u = np.sign(np.sin(2 * t))
+    x = [1.5]
+    for now in (u[1:] + u[:-1]) / 2:
+        x.append(now / 2 + (x[-1] - now / 2) * np.exp(-2 * 0.02))
+    seen = x + 1e-3 * np.random.default_rng(5).standard_normal(len(t))
+    np.savetxt(folder / "data.csv", np.column_stack([t, u, seen]), delimiter=",", header="t,u,x", comments="")
+    file = folder / "experiment.toml"
+    file.write_text(FALLING.format(fmu=fmu) + text)
+    return file
+
+
+EXACT = "self.x = self.u / self.k + (self.x - self.u / self.k) * math.exp(-self.k * dt)"
+
+
+def test_a_state_that_the_fmu_does_not_declare_can_be_named(foreign, tmp_path):
+    """Most FMUs that are written quickly declare none; whether one is a state, restarts show."""
+    fmu = foreign(EXACT, initial="calculated")
+    k = estimate(write_falling(tmp_path, fmu, 'states = ["x"]\n')).estimated["k"]
+    assert k["value"] == pytest.approx(2.0, abs=3 * k["std_error"])
+    assert k["std_error"] < 0.01
+
+
+def test_an_fmu_without_declared_states_asks_for_their_names(foreign, tmp_path):
+    with pytest.raises(BadInput, match=r"declares no states, so name them: \[estimate\] states = \[...\]$"):
+        estimate(write_falling(tmp_path, foreign(EXACT, initial="calculated")))
+
+
+def test_a_state_that_is_named_without_being_one_is_found_out(foreign, tmp_path):
+    hidden = foreign("self.h += dt * (self.u - self.k * self.h)\nself.x = self.h", initial="calculated")
+    with pytest.raises(BadInput, match=r"'x' differs from the simulation without a restart; it has a hidden"):
+        estimate(write_falling(tmp_path, hidden, 'states = ["x"]\n'))
+
+
 def test_mass_and_friction_of_the_drive(built, tmp_path):
     shutil.copy(built("drive"), tmp_path / "Drive.fmu")
     rng, t = np.random.default_rng(4), 0.005 * np.arange(500)

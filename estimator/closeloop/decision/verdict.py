@@ -179,7 +179,7 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
         reason = "the part to identify shows only noise: the discrepancy begins after it"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")
     if _noise_alone(baseline, "choose"):
-        reason = "the part to choose shows only noise: the discrepancy ends before it and cannot be confirmed"
+        reason = "the part to choose shows only noise: the discrepancy is not in it and cannot be confirmed"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to choose")
     why = "no effect of the library accounts for the residual; best fit: "
     return Judgement(checks, (), why + nearest.label)

@@ -60,17 +60,23 @@ def physical_candidates(
     return found
 
 
-def fault_candidates(record: Record, noise: Array) -> list[Candidate]:
-    """Candidates for every kind of sensor fault at every measured output."""
+def fault_candidates(record: Record, noise: Array, shown: Array | None = None) -> list[Candidate]:
+    """Candidates for every kind of sensor fault at every measured output, one per size to start from.
+
+    shown: (N, n_y) simulated outputs of the first run; without them each starts from a realistic size.
+    """
     found = []
-    y = np.vstack([run.y for run in record.runs])
+    y, run = np.vstack([run.y for run in record.runs]), record.runs[0]
     length = max(float(run.t[-1] - run.t[0]) for run in record.runs)
     for j, output in enumerate(record.outputs):
         spread = float(np.std(y[:, j])) + float(noise[j])
         for fault in FAULTS.values():
-            size = fault.size(spread, length, record.runs[0].sample)
-            unknown = Unknown(fault.name_at(output), 0.0, fault.low, fault.high, size)
-            found.append(Candidate(fault.kind, output, (unknown,)))
+            sizes = [fault.size(spread, length, run.sample)]
+            if shown is not None:
+                afar = fault.afar(shown[:, j], np.where(run.fit, run.y[:, j], np.nan), run.sample)
+                sizes += [afar] if afar is not None and afar > sizes[0] else []
+            unknowns = (Unknown(fault.name_at(output), 0.0, fault.low, fault.high, size) for size in sizes)
+            found += [Candidate(fault.kind, output, (unknown,)) for unknown in unknowns]
     return found
 
 

@@ -93,6 +93,11 @@ class Screening:
             self._linearised(list(levers), self._states)
 
     @property
+    def shown(self) -> Array:
+        """Simulated outputs (N, n_y) of the first run."""
+        return self._shown[0]
+
+    @property
     def length(self) -> float:
         """Length of the fitted run, s."""
         return float(self._free.t[-1])

@@ -117,9 +117,9 @@ def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress,
     """Screen every candidate by its effect on the linearised FMU."""
     problem, builder = baseline.problem, baseline.problem.builder
     candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
-    candidates += fault_candidates(problem.record, baseline.noise.std)
-    tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     screening = Screening(problem, baseline.hypothesis.fit, baseline.noise.weighting, forces)
+    candidates += fault_candidates(problem.record, baseline.noise.std, screening.shown)
+    tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     # with a form error, a calibrated parameter at its bound says nothing about effects
     fit = loose(screening.fit) if form_of(baseline).exact else screening.fit
