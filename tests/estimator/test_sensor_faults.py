@@ -65,6 +65,12 @@ def test_it_says_what_causes_it_and_how_it_shows(fault):
     assert "In data: " in sys.modules[type(fault).__module__].__doc__
 
 
+@pytest.mark.parametrize(("share", "negative"), [(1.0, 1.0), (0.5, 0.0)])
+def test_a_lost_sign_shows_the_amount_or_nothing(share, negative):
+    shown = FAULTS["sensor_rectification"].apply(Y, T, share)
+    assert np.array_equal(shown, np.where(Y < 0, -negative * Y, Y))
+
+
 @given(late=st.integers(1, 190), seed=st.integers(0, 99), level=st.floats(-50.0, 50.0))
 def test_a_delay_of_many_periods_is_found_from_any_level(late, seed, level):
     """Of motion at 5 and 8.3 Hz, with its noise, of which a third is not to be used."""
