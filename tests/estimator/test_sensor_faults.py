@@ -82,7 +82,7 @@ def test_a_delay_of_many_periods_is_found_from_any_level(late, seed, level):
     assert FAULTS["sensor_delay"].afar(y, measured, 0.005) == pytest.approx(0.005 * late, abs=0.006)
 
 
-@pytest.mark.parametrize("kind", set(FAULTS) - {"sensor_delay"})
+@pytest.mark.parametrize("kind", [kind for kind in FAULTS if kind != "sensor_delay"])
 def test_slopes_lead_to_every_other_fault(kind):
     assert FAULTS[kind].afar(Y, Y, 0.005) is None
 
