@@ -10,7 +10,7 @@ from estimator.sensor_faults.sensor_fault import SCALED, SensorFault
 
 
 class Rectification(SensorFault):
-    """y + share (|y| - y); share = 1 shows the amount, 1/2 shows zero where y is negative."""
+    """y + share (abs(y) - y)."""
 
     kind = "sensor_rectification"
     parameter = "share"

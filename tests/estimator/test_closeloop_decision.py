@@ -200,7 +200,7 @@ def test_several_effects_leave_noise_alone_because_they_can_imitate_form(before,
     ("early", "late", "said"),
     [
         (1.0, 5.0, "begins after it"),
-        (5.0, 1.0, "ends before"),
+        (5.0, 1.0, "is not in it"),
         (1.2, 5.0, "best fit:"),
         (5.0, 1.2, "best fit:"),
     ],

@@ -102,7 +102,7 @@ BAD_NAMES = [
     ("omega_w = 12", "omega_w_dot = 12", "[initial] 'omega_w_dot' of Testrig is not a state"),
     ('force = "T_w_ext"', 'force = "T_w"', "[[ports]] 'wheel' force 'T_w' is not an input of Testrig"),
     ('displacement = "theta_w"', 'displacement = "theta"', "did you mean 'theta_w'?"),
-    ('states = ["omega_w"]', 'states = ["mu0"]', "[estimate] states 'mu0' of Testrig is not a state"),
+    ('states = ["omega_w"]', 'states = ["mu0"]', "[estimate] states 'mu0' of Testrig is not an output"),
     ("parameters.mu0 =", "parameters.mu1 =", "[estimate.parameters] 'mu1'"),
     ("frequency = 0.5", "frequency = 0.5, rate_input = 'x'", "[estimate.inputs] rate_input 'x'"),
     ("J_w = 17.86", "J_w = 0.0", "[parameters] J_w = 0 is outside the FMU's limits 1e-06 to inf"),
