@@ -32,8 +32,8 @@ class Copies:
 
     way: how the state is set; put, get: names of the variables to set and to read; constants: values that are
     set once; free_time: whether a step may begin at any time, so that one instance is enough for all rows.
-    Otherwise each row has its own instance, whose time only moves forward. look: s, length of the step after
-    which values are read that are to be those of what was set; 0 reads without a step.
+    Otherwise each row has its own instance, whose time only moves forward. look: length of the step that
+    `evaluate` makes before it reads, s, for outputs that only a step shows; 0 for none.
     """
 
     SHOWN = ("get", "look")  # in another process that uses them, see fmus.host.apart.room
@@ -77,7 +77,7 @@ class Copies:
         return out
 
     def evaluate(self, values: Array, t: float) -> Array:
-        """Values (k, n_get) of `get` at values (k, n_put) of `put`, without a step or after the short one."""
+        """Values (k, n_get) of `get` at values (k, n_put) of `put`, after the step of `look` s."""
         return self.advance(values, t, self.look)
 
     def call(self, values: Array, dt: float) -> Call | None:

@@ -14,13 +14,13 @@ from estimator.access.copies import Copies, Refused
 from estimator.access.exchange import Exchange
 from estimator.access.recipe import Way
 from estimator.access.trial import CONTINUES, RUN, Point, Trial, perturbed
+from estimator.plant import LAST
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 
 ALIKE = 1.3  # ratio of the computing times, above which a faster way is preferred to a simpler one
 CO_SIMULATION = (Way.SET, Way.RESUME, Way.RESTART)
-LOOK = 1e-3  # of a step, length of one that only shows outputs
 MOST_PARTS = 4096  # largest number of parts of a step by model exchange
 ORDERS = ((1, 2, 1), (2, 1, 2), (0, 1, 1), (1, 0, 2))  # orders of the points, to detect remaining memory
 TIMED = 5  # number of evaluations, the fastest of which counts
@@ -31,9 +31,9 @@ class Access:
     """The result of the probe.
 
     way: the simplest among the fastest correct ones; free_time: whether its steps may begin at any time;
-    late: outputs that do not show the state that was set; look: s, length of the step after which outputs do
-    that an FMU computes in steps only, 0 if it has none; refused: the reason against each other way; cost:
-    computing time of one copy and step, s.
+    late: outputs that do not show the state that was set; refused: the reason against each other way; cost:
+    computing time of one copy and step, s; look: length of the short step that shows outputs which the FMU
+    computes in steps only, s, 0 if no output needs one.
     """
 
     way: Way
@@ -164,7 +164,7 @@ def _with_a_look(
     trial: Trial, points: list[Point], late: set[str], start: Mapping[str, float], states: list[str]
 ) -> tuple[Trial, list[Point], set[str]]:
     """The same with outputs read after a short step, if more of them show the state that was set then."""
-    looking = replace(trial, look=LOOK * trial.dt)
+    looking = replace(trial, look=LAST * trial.dt)
     try:
         seen, left = looking.points(dict(start), states)
     except BadInput:  # it refuses so short a step

@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from estimator.access.copies import Copies, Refused
 from estimator.access.exchange import Exchange, continuous_states
 from estimator.access.loop import PythonLoop
-from estimator.access.probe import CO_SIMULATION, LOOK, probe
+from estimator.access.probe import CO_SIMULATION, probe
 from estimator.access.recipe import Way
+from estimator.plant import LAST
 from fmus.drive.model import Drive
 from fmus.errors import BadInput
 from fmus.host.archive import Archive
@@ -107,13 +108,13 @@ def test_an_output_that_is_computed_in_steps_is_read_after_a_short_one(foreign, 
     """After a restart y is not yet that of the state; a step shows it, with the input that acts then."""
     late = foreign(f"{STEP}self.y = 3 * self.x + self.u", LATE)
     found = tried(late, SHOWS, FOREIGN_START, compiled=compiled)
-    assert (found.late, found.look) == (frozenset(), LOOK * DT)
+    assert (found.late, found.look) == (frozenset(), LAST * DT)
     rows = np.array([[1.0, 2.0, 0.3], [0.5, 1.9, -0.2]])
     more = found.free_time, compiled, found.look
     with Archive(late) as archive, Copies(archive, found.way, *SHOWS, {}, 0.0, *more) as copies:
         for t in (0.0, DT):
             shown = copies.evaluate(rows, t)[:, 1]
-            assert_allclose(shown, 3 * rows[:, 0] + rows[:, 2], rtol=5 * LOOK * DT)
+            assert_allclose(shown, 3 * rows[:, 0] + rows[:, 2], rtol=5 * LAST * DT)
             assert_array_equal(copies.advance(rows, t, DT), plain(late, *SHOWS, rows, t)[1])
 
 
