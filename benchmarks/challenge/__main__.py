@@ -30,6 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--cores", type=int, default=0, help="processes per record; 0: all cores")
     parser.add_argument("--limit", type=float, default=1800.0, help="time limit per record, s")
     parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="systems to include")
+    parser.add_argument("--groups", nargs="*", default=[*SHARES], choices=SHARES, help="groups to include")
     parser.add_argument(
         "--measured", default=Measuring.name, choices=WAYS, help="how the records are measured"
     )
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stopping in (signal.SIGINT, signal.SIGTERM):  # both also end the process of the record
         signal.signal(stopping, signal.default_int_handler)
     seed = secrets.randbelow(10**6) if a.seed is None else a.seed
-    chosen = [p for p in plans(seed, a.count) if p.system in a.systems]
+    chosen = [p for p in plans(seed, a.count) if p.system in a.systems and p.group in a.groups]
     name = f"seed-{seed}-{a.count}" + (f"-{a.measured}" if a.measured != Measuring.name else "")
     challenge = Challenge(a.out / name, seed, a.limit, a.cores, a.ablate, a.measured)
     print(f"seed {seed}: {len(chosen)} records in {challenge.folder}", flush=True)
