@@ -113,10 +113,8 @@ class Case:
         _, base, noise = calibrate(problem)
         self.fit, self.weighting = base.fit, noise.weighting
         self.forces = missing_forces(problem, base.fit.theta, noise.std)
-        self.candidates = physical_candidates(
-            problem.builder.offers, problem.builder.outside(), problem.record, self.forces
-        )
-        self.candidates += fault_candidates(problem.record, noise.std)
+        self.candidates = physical_candidates(problem, problem.builder.offers, self.forces)
+        self.candidates += fault_candidates(problem.record, noise.std, problem.policy.candidates)
 
     def screen(self, count: int) -> None:
         """Screen some of the candidates, taken evenly from all, from the linearisation on."""

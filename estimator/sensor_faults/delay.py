@@ -9,8 +9,6 @@ from scipy.signal import correlate
 from estimator.record import Array
 from estimator.sensor_faults.sensor_fault import LATE, SensorFault
 
-LONGEST = 0.1  # of the record, longest delay that is looked for
-
 
 class Delay(SensorFault):
     """y(t - T)."""
@@ -26,14 +24,14 @@ class Delay(SensorFault):
         """See SensorFault.size."""
         return 3 * step
 
-    def afar(self, shown: Array, measured: Array, step: float) -> float:
+    def afar(self, shown: Array, measured: Array, step: float, longest: float) -> float:
         """See SensorFault.afar: the delay, in samples, that leaves the least sum of squares.
 
         A signal that oscillates is like itself again after each period, so that the slope at no delay does
         not lead to one beyond half a period. By correlation, as delays between two sensors are found: Knapp
         and Carter, IEEE Trans. ASSP 24 (1976) 320.
         """
-        most, level = int(LONGEST * len(shown)), float(np.mean(shown))
+        most, level = int(longest / step), float(np.mean(shown))
         y, m = shown - level, measured[most:] - level
         used = np.isfinite(m)
         m = np.where(used, m, 0.0)

@@ -37,11 +37,12 @@ class SensorFault(ABC):
         samples, s.
         """
 
-    def afar(self, shown: Array, measured: Array, step: float) -> float | None:
+    def afar(self, shown: Array, measured: Array, step: float, longest: float) -> float | None:
         """A size far from zero at which the fault explains what is measured best, where slopes at zero do not
         lead there; None if they do.
 
-        shown: (N,) simulated output; measured: (N,), nan where it is not used; step: between samples, s.
+        shown: (N,) simulated output; measured: (N,), nan where it is not used; step: between samples, s;
+        longest: time beyond which nothing is looked for, s.
         """
         return None
 

@@ -50,7 +50,7 @@ SCREENED = """
     run.y[:, 1] += 0.5 * run.y[:, 1] ** 2
     asked = problem(ModelBuilder("drive", Path("drive")), made)
     _, base, noise = calibrate(asked)
-    faults = fault_candidates(made, NOISE)
+    faults = fault_candidates(made, NOISE, asked.policy.candidates)
     screening = Screening(asked, base.fit, noise.weighting)
     best = screen(screening.fit, [((c,), g) for c, g in zip(faults, screening.changes(faults))])[0]
     print(*(c.label for c in faults), best.label, best.start["sensor_square_q_dot"])

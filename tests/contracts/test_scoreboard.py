@@ -46,9 +46,9 @@ def test_one_changed_byte_or_a_lost_file_is_seen(tmp_path: Path) -> None:
 def test_the_page_names_what_has_changed() -> None:
     board = Board.kept()
     assert "unchanged since that commit" in section(board, [])
-    said = section(board, ["estimator/closeloop/policy.py"])
+    said = section(board, ["estimator/closeloop/policy/decision.py"])
     assert "unchanged" not in said
-    assert "`estimator/closeloop/policy.py`" in said
+    assert "`estimator/closeloop/policy/decision.py`" in said
 
 
 def test_a_new_scoreboard_has_the_one_before_beside_it() -> None:
@@ -71,7 +71,7 @@ def test_a_new_scoreboard_has_the_one_before_beside_it() -> None:
 def test_the_files_that_answer_are_found_by_answering() -> None:
     found = read_for([DEMO])
     assert {
-        "estimator/closeloop/policy.py",
+        "estimator/closeloop/policy/decision.py",
         "estimator/closeloop/decision/verdict.py",
         "fmus/testrig/model.py",
         "fmus/effects/quadratic_damping.py",

@@ -14,8 +14,8 @@ PACKAGES = ("fmus", "estimator", "scenarios", "railfmi")  # each may import thos
 FILES = [file for package in PACKAGES for file in sorted((ROOT / package).rglob("*.py"))]
 CLOSELOOP = ROOT / "estimator" / "closeloop"
 ROOMS = [  # of closeloop, each may import those before it
-    "question", "hypotheses", "fitting", "screening", "detection", "decision", "search", "diagnostics",
-    "planning", "several",
+    "policy", "question", "hypotheses", "fitting", "screening", "detection", "decision", "search",
+    "diagnostics", "planning", "several",
 ]  # fmt: skip
 # in a comparison that decides: nothing, one, a pair, a half of a sum of squares, a sign, a tiny divisor
 FREE = {0, 1, -1, 2, 0.5, 1e-300}

@@ -2,6 +2,7 @@
 
 import pytest
 
+from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.screening.candidates import INERTIAS, _limited
 from fmus.models import MODELS
@@ -17,7 +18,7 @@ PARAMETERS = [
 
 
 def change_of(p: Parameter) -> Unknown:
-    return _limited(Unknown("delta", 0.0, -float("inf"), float("inf"), 0.05 * p.start), p)
+    return _limited(Unknown("delta", 0.0, -float("inf"), float("inf"), 0.05 * p.start), p, DEFAULT.candidates)
 
 
 @pytest.mark.parametrize("p", PARAMETERS)

@@ -469,11 +469,10 @@ def test_the_page_and_the_result_hold_what_stands_beside_the_finding(
     nameless: tuple[Problem, Outcome, Hypothesis | None], tmp_path: Path
 ) -> None:
     asked, outcome, curve = nameless
-    faults = fault_candidates(asked.record, NOISE)
+    faults = fault_candidates(asked.record, NOISE, asked.policy.candidates)
     forces = physical_candidates(
-        (("constant_force", "carriage"), ("periodic_force", "carriage")),
-        asked.builder.outside(), asked.record, outcome.forces,
-    )  # fmt: skip
+        asked, (("constant_force", "carriage"), ("periodic_force", "carriage")), outcome.forces
+    )
     chosen = [*faults, *forces]
     screening = Screening(asked, outcome.base.fit, Weighting.white(NOISE), outcome.forces)
     change = list(zip(chosen, screening.changes(chosen), strict=True))

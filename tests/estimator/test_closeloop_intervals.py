@@ -15,7 +15,6 @@ from estimator.closeloop.fitting.fit import fit
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import WIDTH, _reach
 from estimator.closeloop.fitting.resolution import (
-    FEWEST,
     error_of_steps,
     in_fine_steps,
     in_halved_steps,
@@ -299,7 +298,7 @@ def test_an_fmu_that_cannot_join_samples_keeps_its_steps():
 
 
 def test_a_foreign_fmu_is_coupled_a_few_times_in_a_sample_if_it_would_be_coupled_more_often():
-    often = 1 / 399 / FEWEST
+    often = 1 / 399 / DEFAULT.candidates.readings
     few = Steps(coupled=pytest.approx(often))
     long = in_long_steps(Joining(0.0, fmu_joins=False, coupling=often / 2))
     assert (long.steps, long.searched) == (few, few)

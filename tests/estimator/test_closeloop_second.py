@@ -195,7 +195,7 @@ def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_sugg
     asked = problem(ModelBuilder("drive", tmp_path), record(to_and_fro(2.0), truth, 1))
     o = looked_at("spring", asked, ("cubic_stiffness",)).found
     offers = [(kind, "carriage") for kind in ("cubic_stiffness", "harmonic_excitation")]
-    candidates = physical_candidates(offers, asked.builder.outside(), asked.record, o.forces)
+    candidates = physical_candidates(asked, offers, o.forces)
     screening = Screening(asked, o.base.fit, o.baseline.noise.weighting, o.forces)
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     found, _ = try_pairs(Fitter(o.baseline), screening, o.singles, change)

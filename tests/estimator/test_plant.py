@@ -260,7 +260,7 @@ def hypotheses_of(folder, jobs, kept):
     kinds = ("viscous_damping", "coulomb_friction", "quadratic_damping", "parameter_offset")
     offered = [(kind, at) for kind, at in asked.builder.offers if kind in kinds]
     forces = missing_forces(asked, base[0].fit.theta, base[1].std)
-    candidates = physical_candidates(offered, asked.builder.outside(), asked.record, forces)
+    candidates = physical_candidates(asked, offered, forces)
     promises = [Promise((c,), 0.0, {u.name: u.start for u in c.unknowns}) for c in candidates]
     PLANTS.kept.most = kept
     return Fitter(baseline, jobs).fitted(promises, 2)

@@ -79,12 +79,12 @@ def test_a_delay_of_many_periods_is_found_from_any_level(late, seed, level):
     rng = np.random.default_rng(seed)
     measured = FAULTS["sensor_delay"].apply(y, t, 0.005 * late) + 0.1 * rng.standard_normal(len(t))
     measured[rng.random(len(t)) < 1 / 3] = np.nan
-    assert FAULTS["sensor_delay"].afar(y, measured, 0.005) == pytest.approx(0.005 * late, abs=0.006)
+    assert FAULTS["sensor_delay"].afar(y, measured, 0.005, 1.0) == pytest.approx(0.005 * late, abs=0.006)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in FAULTS if kind != "sensor_delay"])
 def test_slopes_lead_to_every_other_fault(kind):
-    assert FAULTS[kind].afar(Y, Y, 0.005) is None
+    assert FAULTS[kind].afar(Y, Y, 0.005, 1.0) is None
 
 
 @pytest.mark.parametrize("late", [0.04, 0.45])  # s, within a period of 0.5 s and nearly one
@@ -96,7 +96,7 @@ def test_a_fit_starts_from_where_a_delay_explains_most(tmp_path, late):
     asked = problem(ModelBuilder("drive", tmp_path), replace(made, runs=(replace(run, y=shifted),)))
     _, base, noise = calibrate(asked)
     screening = Screening(asked, base.fit, noise.weighting)
-    faults = fault_candidates(asked.record, noise.std, screening.shown)
+    faults = fault_candidates(asked.record, noise.std, asked.policy.candidates, screening.shown)
     delays = [c for c in faults if c.label == "sensor_delay@q_dot"]
     assert len(delays) == 2
     promises = screen(

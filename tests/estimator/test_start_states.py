@@ -68,7 +68,8 @@ def test_the_sensor_of_a_start_state_may_be_wrong(tmp_path, bias):
     asked = replace(problem(ModelBuilder("drive", tmp_path), biased), free_states=("q", "q_dot"))
     asked = replace(asked, declared={"M": 95.0, "F_v": 200.0})
     _, base, noise = calibrate(asked)
-    [fault] = [c for c in fault_candidates(biased, noise.std) if c.label == "sensor_bias@q_dot"]
+    every = fault_candidates(biased, noise.std, asked.policy.candidates)
+    [fault] = [c for c in every if c.label == "sensor_bias@q_dot"]
     [found] = Fitter(Baseline(asked, base, noise)).finished([Promise((fault,), 0.0, base.fit.theta)])
     fit = found.fit
     assert fit.cost / len(fit.residual) == pytest.approx(1.0, abs=0.15)  # noise alone

@@ -27,8 +27,6 @@ from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array
 from estimator.weighting import Weighting
 
-FEWEST = 4  # readings of a port in a sample; with fewer, laws that are stiff, as stops are, would be unstable
-
 
 def in_long_steps(problem: Problem) -> Problem:
     """The problem in the longest steps of its FMU: over several samples, or with few readings of its ports.
@@ -37,7 +35,7 @@ def in_long_steps(problem: Problem) -> Problem:
     """
     if problem.plant.joins(problem.record.runs):
         return replace(problem, steps=JOINED, searched=JOINED)
-    rarely = problem.record.sample / FEWEST
+    rarely = problem.record.sample / problem.policy.candidates.readings
     if not 0 < problem.coupling < rarely:
         return problem
     few = Steps(coupled=rarely)

@@ -52,12 +52,10 @@ def sought(
     names = [name for p in problem.ports for name in p.motion]
     [full] = problem.simulate(theta, names)
     n_y = len(problem.record.outputs)
-    found = physical_candidates(
-        builder.offers, builder.outside(), problem.record, list(_assumed(problem, run.t, full[:, n_y:]))
-    )
+    found = physical_candidates(problem, builder.offers, list(_assumed(problem, run.t, full[:, n_y:])))
     at = [problem.record.outputs.index(name) for name in measured]
     seen = replace(problem.record, outputs=tuple(measured), runs=(replace(run, y=full[:, at]),))
-    found += fault_candidates(seen, noise)
+    found += fault_candidates(seen, noise, problem.policy.candidates)
     every = (list(some) for _, some in groupby(found, lambda c: c.label))
     return [Sought(some[0].kind, some[0].location, _variants(some, run.t)) for some in every]
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
-from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.policy import CandidatePolicy
+from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.record import Array, Record
 from estimator.sensor_faults import FAULTS
@@ -22,25 +23,17 @@ from fmus.variables import Parameter, Variable
 SHAPE_CHANGE = 0.1  # scale of a shape parameter, as share of its value
 
 
-LARGEST_CHANGE = 200.0  # bound of a parameter's change, in realistic sizes; it is ten times the parameter
-
-
 INERTIAS = ("kg", "kg.m2")  # units of what cannot vanish
-
-
-LEAST_INERTIA = 0.1  # of its start value; what has hardly any takes a thousand times as long to simulate
-
-
-NEAR_START = 0.2  # share of its start value by which a calibrated parameter may differ from it
 
 
 ONSET_SCALE = 0.01  # scale of an onset time, as share of the record's length
 
 
 def physical_candidates(
-    offers: Sequence[tuple[str, str]], site: Site, record: Record, forces: Sequence[MissingForce]
+    problem: Problem, offers: Sequence[tuple[str, str]], forces: Sequence[MissingForce]
 ) -> list[Candidate]:
     """Candidates for each pair of kind and location, one per set of start values of the shape."""
+    site, record = problem.builder.outside(), problem.record
     at = {missing.port.name: missing for missing in forces}
     found: list[Candidate] = []
     for kind, location in offers:
@@ -52,7 +45,7 @@ def physical_candidates(
             if location in record.inputs:
                 found += _of_an_input(effect, location, record)
         elif issubclass(effect, ParameterEffect):
-            found += _of_a_parameter(effect, location, site, record)
+            found += _of_a_parameter(effect, location, site, record, problem.policy.candidates)
         elif issubclass(effect, ComponentEffect):
             size = {a: effect.size(_length(record)) for a in effect.amplitudes}
             shapes = effect.guesses(_times(record))
@@ -60,7 +53,9 @@ def physical_candidates(
     return found
 
 
-def fault_candidates(record: Record, noise: Array, shown: Array | None = None) -> list[Candidate]:
+def fault_candidates(
+    record: Record, noise: Array, limits: CandidatePolicy, shown: Array | None = None
+) -> list[Candidate]:
     """Candidates for every kind of sensor fault at every measured output, one per size to start from.
 
     shown: (N, n_y) simulated outputs of the first run; without them each starts from a realistic size.
@@ -68,12 +63,14 @@ def fault_candidates(record: Record, noise: Array, shown: Array | None = None) -
     found = []
     y, run = np.vstack([run.y for run in record.runs]), record.runs[0]
     length = max(float(run.t[-1] - run.t[0]) for run in record.runs)
+    longest = limits.longest_delay * float(run.t[-1] - run.t[0])
     for j, output in enumerate(record.outputs):
         spread = float(np.std(y[:, j])) + float(noise[j])
         for fault in FAULTS.values():
             sizes = [fault.size(spread, length, run.sample)]
             if shown is not None:
-                afar = fault.afar(shown[:, j], np.where(run.fit, run.y[:, j], np.nan), run.sample)
+                measured = np.where(run.fit, run.y[:, j], np.nan)
+                afar = fault.afar(shown[:, j], measured, run.sample, longest)
                 sizes += [afar] if afar is not None and afar > sizes[0] else []
             unknowns = (Unknown(fault.name_at(output), 0.0, fault.low, fault.high, size) for size in sizes)
             found += [Candidate(fault.kind, output, (unknown,)) for unknown in unknowns]
@@ -98,7 +95,7 @@ def _of_an_input(effect: type[InputEffect], location: str, record: Record) -> It
 
 
 def _of_a_parameter(
-    effect: type[ParameterEffect], location: str, site: Site, record: Record
+    effect: type[ParameterEffect], location: str, site: Site, record: Record, limits: CandidatePolicy
 ) -> Iterator[Candidate]:
     members = effect.locations(site)[location]
     sizes = {}
@@ -109,17 +106,18 @@ def _of_a_parameter(
             sizes[own] = effect.size(value, _length(record))
     for shape in effect.guesses(_times(record)):
         found = _candidate(effect, location, sizes, shape, _length(record))
-        limited = (_limited(u, site.variables[n]) for u, n in zip(found.amplitudes, members, strict=True))
-        yield replace(found, amplitudes=tuple(limited))
+        pairs = zip(found.amplitudes, members, strict=True)
+        limited = tuple(_limited(u, site.variables[n], limits) for u, n in pairs)
+        yield replace(found, amplitudes=limited)
 
 
-def _limited(change: Unknown, of: Variable) -> Unknown:
+def _limited(change: Unknown, of: Variable, limits: CandidatePolicy) -> Unknown:
     """The change with bounds that keep the parameter within its limits, also after calibration."""
-    value, most = of.start or 0.0, LARGEST_CHANGE * change.scale
-    low = -np.inf if of.min is None else of.min - value - NEAR_START * abs(value)
+    value, most = of.start or 0.0, limits.largest_change * change.scale
+    low = -np.inf if of.min is None else of.min - value - limits.near_start * abs(value)
     if of.unit in INERTIAS:
-        low = max(low, (LEAST_INERTIA - 1) * value)
-    high = np.inf if of.max is None else of.max - value + NEAR_START * abs(value)
+        low = max(low, (limits.least_inertia - 1) * value)
+    high = np.inf if of.max is None else of.max - value + limits.near_start * abs(value)
     return replace(change, low=max(low, -most), high=min(high, most))
 
 

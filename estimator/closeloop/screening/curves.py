@@ -17,7 +17,7 @@ def reductions(
     curves: Sequence[tuple[str, str]],
 ) -> list[float]:  # fmt: skip
     """Reductions of the sum of squares by each curve, a kind and a location, beside the laws of h."""
-    candidates = physical_candidates(curves, problem.builder.outside(), problem.record, forces)
+    candidates = physical_candidates(problem, curves, forces)
     screening = Screening(built(problem, h.candidates), h.fit, weighting)
     change = screening.changes(candidates)
     found = screen(screening.fit, [((k,), g) for k, g in zip(candidates, change, strict=True)])

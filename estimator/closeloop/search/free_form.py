@@ -112,7 +112,6 @@ def resolved(calibration: Calibration, c: Candidate, g: Array) -> tuple[Candidat
 
 def _candidates(problem: Problem, d: Dependence, forces: Sequence[MissingForce]) -> list[Candidate]:
     """The candidate for a dependence, its coefficients bounded by a multiple of the largest missing force."""
-    offers, site = ((d.kind, d.location),), problem.builder.outside()
     shape = {f"{d.kind}_{d.location}_{n}": v for n, v in d.shape.items()}
     [m] = [m for m in forces if m.port.name == d.location]
     scale, most = float(np.sqrt(np.mean(m.force**2))), BOUND * float(np.abs(m.force).max())
@@ -120,7 +119,7 @@ def _candidates(problem: Problem, d: Dependence, forces: Sequence[MissingForce])
         return []
     return [
         replace(c, amplitudes=tuple(Unknown(u.name, 0.0, -most, most, scale) for u in c.amplitudes))
-        for c in physical_candidates(offers, site, problem.record, forces)
+        for c in physical_candidates(problem, ((d.kind, d.location),), forces)
         if dict(c.fixed) == shape
     ]
 

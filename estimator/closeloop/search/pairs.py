@@ -144,9 +144,9 @@ def _beside(baseline: Baseline, h: Hypothesis, others: Sequence[Candidate]) -> t
     The others have the shapes that the remaining missing force suggests.
     """
     problem = baseline.problem
-    here, builder, labels = built(problem, h.candidates), problem.builder, {c.label for c in others}
+    here, labels = built(problem, h.candidates), {c.label for c in others}
     forces = missing_forces(here, h.theta, baseline.noise.std)
-    offered = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
+    offered = physical_candidates(problem, problem.builder.offers, forces)
     partners = [c for c in offered if c.label in labels]
     screening = Screening(here, h.fit, baseline.noise.weighting, forces)
     return screening.fit, list(zip(partners, screening.changes(partners), strict=True))

@@ -115,10 +115,10 @@ class Screened:
 
 def screened(baseline: Baseline, forces: Sequence[MissingForce], tell: Progress, stages: Stages) -> Screened:
     """Screen every candidate by its effect on the linearised FMU."""
-    problem, builder = baseline.problem, baseline.problem.builder
-    candidates = physical_candidates(builder.offers, builder.outside(), problem.record, forces)
+    problem, limits = baseline.problem, baseline.problem.policy.candidates
+    candidates = physical_candidates(problem, problem.builder.offers, forces)
     screening = Screening(problem, baseline.hypothesis.fit, baseline.noise.weighting, forces)
-    candidates += fault_candidates(problem.record, baseline.noise.std, screening.shown)
+    candidates += fault_candidates(problem.record, baseline.noise.std, limits, screening.shown)
     tell("screen", f"screening {len(candidates)} candidates by their effect on the linearised FMU")
     change = list(zip(candidates, screening.changes(candidates), strict=True))
     # with a form error, a calibrated parameter at its bound says nothing about effects
