@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.challenge.ablation import table
 from benchmarks.challenge.draw import plans
 from benchmarks.challenge.match import Answer
-from benchmarks.challenge.measuring import WAYS, Measuring
+from benchmarks.challenge.measuring import EACH, WAYS, Measuring
 from benchmarks.challenge.reliability import diagram
 from benchmarks.challenge.run import Challenge, run
 from benchmarks.challenge.table import markdown, text
@@ -32,7 +32,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--systems", nargs="*", default=SYSTEMS, choices=SYSTEMS, help="systems to include")
     parser.add_argument("--groups", nargs="*", default=[*SHARES], choices=SHARES, help="groups to include")
     parser.add_argument(
-        "--measured", default=Measuring.name, choices=WAYS, help="how the records are measured"
+        "--measured",
+        default=Measuring.name,
+        choices=(*WAYS, EACH),
+        help="how the records are measured; each: in all ways but white noise in turn",
     )
     parser.add_argument("--only-make", action="store_true", help="write the records without closing them")
     parser.add_argument("--so-far", action="store_true", help="the scoreboard of the records closed so far")
@@ -41,9 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stopping in (signal.SIGINT, signal.SIGTERM):  # both also end the process of the record
         signal.signal(stopping, signal.default_int_handler)
     seed = secrets.randbelow(10**6) if a.seed is None else a.seed
-    chosen = [p for p in plans(seed, a.count) if p.system in a.systems and p.group in a.groups]
+    chosen = [p for p in plans(seed, a.count, a.measured) if p.system in a.systems and p.group in a.groups]
     name = f"seed-{seed}-{a.count}" + (f"-{a.measured}" if a.measured != Measuring.name else "")
-    challenge = Challenge(a.out / name, seed, a.limit, a.cores, a.ablate, a.measured)
+    challenge = Challenge(a.out / name, seed, a.limit, a.cores, a.ablate)
     print(f"seed {seed}: {len(chosen)} records in {challenge.folder}", flush=True)
     if a.only_make:
         for plan in chosen:

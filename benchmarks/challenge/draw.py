@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import cycle, islice
 from typing import TypeVar
 
 import numpy as np
 
+from benchmarks.challenge.measuring import EACH, WAYS, Measuring
 from benchmarks.challenge.menu import (
     FAULTS,
     MENU,
@@ -31,6 +33,7 @@ class Plan:
     conditions: tuple[str, ...] = ()
     quiet: bool = False
     note: str = ""
+    way: str = Measuring.name  # how the record is measured, one of WAYS
 
     @property
     def name(self) -> str:
@@ -49,18 +52,19 @@ def counts(count: int) -> dict[str, int]:
     return found
 
 
-def plans(seed: int, count: int) -> list[Plan]:
-    """The plans of the whole set, equal for equal seed and count."""
+def plans(seed: int, count: int, way: str = Measuring.name) -> list[Plan]:
+    """The plans of the whole set, equal for equal seed, count and way of measuring, one of WAYS or EACH.
+
+    With EACH, the records of a group are measured in the ways beyond white noise, one after the other.
+    """
     rng = np.random.default_rng([seed, count])
     made: list[Plan] = []
+    ways = [w for w in WAYS if w != Measuring.name] if way == EACH else [way]
     for group, n in counts(count).items():
-        made += [next(source) for source in [DRAWN[group](rng)] for _ in range(n)]
+        drawn = islice(DRAWN[group](rng), n)
+        made += [replace(plan, way=w) for plan, w in zip(drawn, cycle(ways), strict=False)]
     order = rng.permutation(len(made))
-    return [_numbered(made[i], index) for index, i in enumerate(order)]
-
-
-def _numbered(plan: Plan, index: int) -> Plan:
-    return Plan(index, plan.group, plan.system, plan.entries, plan.conditions, plan.quiet, plan.note)
+    return [replace(made[i], index=index) for index, i in enumerate(order)]
 
 
 def deal(things: Sequence[Thing], rng: np.random.Generator) -> Iterator[Thing]:

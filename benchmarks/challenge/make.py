@@ -16,7 +16,7 @@ from benchmarks.challenge.bench import (
     bench,
 )
 from benchmarks.challenge.draw import Plan
-from benchmarks.challenge.measuring import Measuring
+from benchmarks.challenge.measuring import WAYS
 from benchmarks.challenge.menu import OUTPUTS
 from benchmarks.challenge.truth import Item, Truth
 from estimator.record import Array
@@ -39,7 +39,7 @@ IDENTIFY = 0.6  # share of the record that is the part to identify
 LATE = 0.1  # smallest ratio of the effect's size in the part to identify to that in the whole record
 
 
-def make(plan: Plan, seed: int, records: Path, truths: Path, way: type[Measuring] = Measuring) -> Truth:
+def make(plan: Plan, seed: int, records: Path, truths: Path) -> Truth:
     """Write the folder of a record, then the file with its truth; an existing record is kept.
 
     Sizes are drawn again if the system leaves the range of its model (a wheel locks, a flange touches), if a
@@ -53,7 +53,7 @@ def make(plan: Plan, seed: int, records: Path, truths: Path, way: type[Measuring
     draws = (here for here in (plan, *elsewhere(plan)) for _ in range(ATTEMPTS))
     for attempt, here in enumerate(draws):
         try:
-            truth, text, columns = tried(here, np.random.default_rng([seed, plan.index, attempt]), way)
+            truth, text, columns = tried(here, np.random.default_rng([seed, plan.index, attempt]))
         except ValueError as error:
             why = error
             continue
@@ -74,9 +74,7 @@ def elsewhere(plan: Plan) -> list[Plan]:
     return [replace(plan, entries=((fault, o),)) for o in (*outputs[own + 1 :], *outputs[:own])]
 
 
-def tried(
-    plan: Plan, rng: np.random.Generator, way: type[Measuring] = Measuring
-) -> tuple[Truth, str, Outputs]:
+def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
     """A record with one draw of conditions and sizes: its truth, experiment.toml and data columns."""
     raw = [(e, location, e.sizes(rng)) for e, location in plan.entries]
     here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
@@ -84,7 +82,7 @@ def tried(
     truth, with_it = measure(plan, items, here)
     if plan.group == "sensor" and truth.largest_snr < FAINT:
         raise ValueError(f"the fault is {truth.largest_snr:.2f} times the noise")
-    measuring, text = way(rng), here.toml(plan.name, effect_of(items, here))
+    measuring, text = WAYS[plan.way](rng), here.toml(plan.name, effect_of(items, here))
     seen = measuring.outputs(here.t, with_it, here.noise)
     columns = {"time": here.t, **measuring.inputs(here.t, here.inputs), **seen}
     return truth, measuring.said(text), columns
@@ -188,6 +186,7 @@ def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Ou
         plan.note,
         tuple(each),
         left_over(here, alone, sound, more) if plan.group in LEFT else (),
+        plan.way,
     )
     return truth, with_it
 

@@ -117,3 +117,4 @@ class Clock(Measuring):
 WAYS: dict[str, type[Measuring]] = {
     way.name: way for way in (Measuring, Correlated, Undeclared, Unknown, Quantised, Inputs, Clock)
 }
+EACH = "each"  # of the ways beyond white noise, in turn

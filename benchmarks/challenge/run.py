@@ -20,7 +20,6 @@ from joblib.externals.loky import ProcessPoolExecutor  # sends plans, which hold
 
 from benchmarks.challenge.draw import Plan
 from benchmarks.challenge.make import make
-from benchmarks.challenge.measuring import WAYS, Measuring
 from benchmarks.challenge.truth import Truth
 
 Tell = Callable[[str], None]
@@ -39,11 +38,10 @@ class Challenge:
     limit: float = 1800.0
     cores: int = 0  # processes per record, 0: all cores
     ablate: bool = False  # judge the fits of each record again by the policies of the ablation
-    way: str = Measuring.name  # how the records are measured, one of WAYS
 
     def truth(self, plan: Plan) -> Truth:
         """The truth of a record; record and truth are made if they do not exist."""
-        return make(plan, self.seed, self.folder / "records", self.folder / "truth", WAYS[self.way])
+        return make(plan, self.seed, self.folder / "records", self.folder / "truth")
 
     def one(self, plan: Plan, makers: Executor | None = None) -> tuple[Truth, Kept]:
         """Truth and answer of a record; makers: processes that make records that do not exist."""

@@ -57,6 +57,7 @@ class Truth:
     note: str = ""
     each: tuple[float, ...] = ()  # for several effects, the largest signal-to-noise ratio of each alone
     left: tuple[float, ...] = ()  # the ratio of each effect that is left after calibration, see `left_over`
+    way: str = "white"  # how the record is measured
 
     @property
     def largest_snr(self) -> float:

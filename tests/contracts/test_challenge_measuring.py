@@ -1,12 +1,18 @@
 """Ways in which the challenge measures its records: each does to noise, inputs and clocks what it says."""
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from benchmarks.challenge.draw import Plan
+from benchmarks.challenge.draw import Plan, plans
 from benchmarks.challenge.make import make
-from benchmarks.challenge.measuring import WAYS, Measuring
+from benchmarks.challenge.match import Answer
+from benchmarks.challenge.measuring import EACH, WAYS, Measuring
+from benchmarks.challenge.truth import SHARES, Item, Truth
+from benchmarks.challenge.ways import rows
 
 T = np.arange(12001) * 0.005
 CLEAN = {"y": 3.0 * np.sin(2.0 * T)}
@@ -80,11 +86,39 @@ def test_only_what_is_not_declared_is_left_out_of_the_experiment():
 def test_a_record_differs_between_ways_by_its_measurement_alone(tmp_path):
     plan = Plan(5, "none", "rig", conditions=("plain",))
     truths, data = [], {}
-    for name, kind in WAYS.items():
-        truths.append(make(plan, 3, tmp_path / name, tmp_path / f"{name}-truth", kind))
+    for name in WAYS:
+        here = replace(plan, way=name)
+        truths.append(make(here, 3, tmp_path / name, tmp_path / f"{name}-truth"))
         data[name] = np.genfromtxt(tmp_path / name / plan.name / "data.csv", delimiter=",", names=True)
-    assert all(t == truths[0] for t in truths)
+    assert [replace(t, way="white") for t in truths] == len(WAYS) * truths[:1]
     assert Measuring.name in WAYS
     for name in set(WAYS) - {"inputs"}:
         assert_array_equal(data[name]["T_P"], data[Measuring.name]["T_P"])
     assert np.any(data["inputs"]["T_P"] != data[Measuring.name]["T_P"])
+
+
+def test_a_set_in_each_way_has_the_same_records_and_every_way_as_often():
+    white, each = plans(5, 240), plans(5, 240, EACH)
+    assert [replace(p, way="white") for p in each] == white
+    for group in SHARES:
+        often = Counter(p.way for p in each if p.group == group)
+        assert set(often) == set(WAYS) - {Measuring.name}
+        assert max(often.values()) - min(often.values()) <= 1
+
+
+def test_answers_are_counted_by_way():
+    effect = Item("quadratic_damping", "roller", {"c": 0.3})
+    marked = [
+        (Truth("a", "none", "rig", way="clock"), Answer("traced", (("free_play", "shaft"),))),
+        (Truth("b", "none", "rig", way="inputs"), Answer("no_discrepancy")),
+        (
+            Truth("c", "single", "rig", (effect,), snr={"w": 5.0}, way="clock"),
+            Answer("traced", (effect.pair,)),
+        ),
+    ]
+    assert rows(marked[:1]) == []
+    head, _, clock, inputs, every = rows(marked)
+    assert head.startswith("| measured | false finds |")
+    assert clock.startswith("| clock | 1 of 1 | 0 of 1 | 1 of 1 |")
+    assert inputs.startswith("| inputs | 0 of 1 | 0 of 1 | 0 of 0 |")
+    assert every.startswith("| all | 1 of 2 | 0 of 2 | 1 of 1 |")
