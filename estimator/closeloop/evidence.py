@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Literal
 
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -141,10 +142,17 @@ class Judgement:
         reason = f"this record cannot tell apart {names}"
         return cls(checks, tuple(members), reason, splitting(members))
 
-    def most_probable_first(self, probability: Mapping[str, float]) -> Judgement:
-        """The same judgement, its members, at least one, sorted by their probability, which is by label."""
-        members = sorted(self.members, key=lambda m: -probability.get(m.label, 0.0))
-        return replace(self, members=tuple(members), reason=Judgement.naming(members).reason)
+    def credible(self, probability: Mapping[str, float], left_out: float) -> Judgement:
+        """The same judgement with the fewest members, best first, that leave out no more than a share.
+
+        probability: by label, not zero for all members; left_out: largest share of the members' probability.
+        """
+        ranked = sorted(self.members, key=lambda m: -probability.get(m.label, 0.0))
+        held = list(accumulate(probability.get(m.label, 0.0) for m in ranked))
+        enough = (1 - left_out) * held[-1]
+        named = Judgement.naming([m for m, h in zip(ranked, [0.0, *held], strict=False) if h < enough])
+        anew = {c.name: c for c in named.checks}
+        return replace(named, checks=tuple(anew.get(c.name, c) for c in self.checks))
 
     @property
     def verdict(self) -> Verdict:

@@ -18,7 +18,6 @@ from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
-from estimator.closeloop.fitting.refined import arrived
 from estimator.closeloop.fitting.resolution import in_fine_steps, over_steps
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
@@ -92,19 +91,21 @@ class Chain:
             return self._over_forms(found, shown)
         singles, pairs = self._search(shown).run()
         leading = [*singles[:1], *pairs[:1]]
-        if again := self._late(shown, leading) or self._moved(shown.problem, leading):
+        if again := self._late(shown, singles, pairs) or self._moved(shown.problem, leading):
             return again.run()
         return self._over_forms(self._answer(found, shown, before, singles, pairs), shown)
 
-    def _late(self, shown: Screened, leading: Sequence[Hypothesis]) -> "Chain | None":
-        """The same with an offset of the outputs' clock, if the best single effect lacks one.
+    def _late(
+        self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]
+    ) -> "Chain | None":
+        """The same with an offset of the outputs' clock, if one beside the best single effect shows.
 
-        It leaves more than noise then. A second effect may explain the same, but an offset needs no effect.
+        A second effect may explain as much, but an offset needs no effect.
         """
-        fitter = self.fitter(shown.baseline, self.jobs)
-        if not leading or arrived(fitter, leading[0]):
+        if not singles:
             return None
-        most = self.stages.done("late", lambda: clock_beside(fitter, leading[0]))
+        fitter, pair = self.fitter(shown.baseline, self.jobs), next(iter(pairs), None)
+        most = self.stages.done("late", lambda: clock_beside(fitter, singles[0], pair))
         return self._clocked(most) if most else None
 
     def _clocked(self, most: float) -> "Chain":

@@ -374,18 +374,27 @@ def test_what_is_independent_between_outputs_is_noise_whatever_the_form(form, co
     assert judge(b, [], [], 8).after(DETECTED).verdict == "unexplained"  # noise is declared to be smaller
 
 
-@given(st.permutations((0.0, 0.2, 0.2, 0.6)))
-def test_a_class_is_listed_with_its_most_probable_member_first(shares):
-    kinds = ("constant_force", "viscous_damping", "coulomb_friction", "cubic_stiffness")
-    members = [law(kind, 0, 0.0) for kind in kinds]
-    told = Judgement.naming(members)
-    found = told.most_probable_first({m.label: p for m, p in zip(members, shares, strict=True) if p})
-    listed = [shares[members.index(m)] for m in found.members]
-    assert listed == sorted(shares, reverse=True)
-    assert sorted(map(members.index, found.members)) == [0, 1, 2, 3]
+@pytest.mark.parametrize(
+    ("shares", "kept", "verdict"),
+    [
+        ((0.5, 0.3, 0.1), 3, "ambiguous"),
+        ((0.6, 0.2, 0.004), 2, "ambiguous"),
+        ((0.3, 0.0015, 0.0014), 1, "traced"),  # of 0.3029, the last two hold less than a hundredth
+        ((0.3, 0.004, 0.0035), 3, "ambiguous"),  # the last one holds more
+        ((0.06, 0.0, 0.0), 1, "traced"),
+    ],
+)
+@given(order=st.permutations((0, 1, 2)))
+def test_a_class_holds_its_most_probable_members_alone(shares, kept, verdict, order):
+    members = [law(kind, 0, 0.0) for kind in ("constant_force", "viscous_damping", "cubic_stiffness")]
+    told = Judgement.naming([members[i] for i in order]).after(DETECTED)
+    found = told.credible({m.label: p for m, p in zip(members, shares, strict=True) if p}, 0.01)
+    assert list(found.members) == members[:kept]
+    assert found.verdict == verdict
+    assert found.checks[: len(DETECTED)] == tuple(DETECTED)
     places = [found.reason.index(m.label) for m in found.members]
     assert places == sorted(places)
-    assert found.checks == told.checks
+    assert (found.next_experiment == "") == (kept == 1)
 
 
 def test_a_pair_becomes_a_simpler_one_in_either_order():

@@ -151,7 +151,7 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, leas
         baseline=baseline(SimpleNamespace(policy=DEFAULT)),
         hypotheses=lambda promises, _: fitted.extend(promises) or [],
     )
-    beside(asking, Hypothesis((best,), found, ()), Seen(), change, least)
+    beside(asking, [Hypothesis((best,), found, ())], Seen(), change, least)
     assert [p.candidates[1].label for p in fitted] == asked
     assert all(p.candidates[0] is best for p in fitted)
 

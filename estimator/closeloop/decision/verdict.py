@@ -50,14 +50,14 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
 def probable(
     baseline: Baseline, found: Judgement, probability: Mapping[str, float], began: bool
 ) -> Judgement:
-    """The judgement with its most probable member first; without an answer if its members are improbable.
+    """The judgement with its most probable members alone; without an answer if all of them are improbable.
 
     found: with at least one member; probability: by label; began: see `judge`.
     """
     together = sum(probability.get(m.label, 0.0) for m in found.members)
     check = Check.least("not improbable", together, baseline.policy.decision.probable)
     if check.passed:
-        found = found.most_probable_first(probability)
+        found = found.credible(probability, baseline.policy.decision.left_out)
         return replace(found, checks=(*found.checks, check))
     return _nothing(baseline, began, found.members[0]).after([*found.checks, check])
 

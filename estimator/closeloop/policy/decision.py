@@ -58,6 +58,12 @@ class DecisionPolicy:
         "probability of the effects of an answer together, below which none is named",
         "convention, as the level of a test; a right pair beside undeclared noise rarely has more than 0.17",
     )
+    left_out: float = limit(
+        0.01,
+        "share of the probability of a class",
+        "share that the least probable members of a class hold together, which are left out of it",
+        "convention: a credible set, with the level of detection",
+    )
     open_alike: float = limit(
         0.25,
         "share of what the best one leaves beyond noise",

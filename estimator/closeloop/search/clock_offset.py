@@ -1,17 +1,20 @@
 """Whether the outputs of a record are of other times than said, by a sample at most: more is a delay.
 
 Before the search, an offset of the outputs' clock is shown if it explains more than chance would, and as much
-as the best effect does: what an offset explains needs no effect. After it, an offset is shown if a fit of the
-best single effect with one explains more than chance would, and more than it leaves, of what that effect
-alone leaves beyond noise. If it explained the smaller part, the larger one would have another cause, which
-may explain the rest as well.
+as the best effect does: what an offset explains needs no effect. After it, an offset is shown if a fit of one
+effect with an offset explains more than chance would, and more than it leaves, of what the best single effect
+leaves beyond noise. If it explained the smaller part, the larger one would have another cause, which may
+explain the rest as well. The effects are the best single one and those of the best pair. No offset is shown
+if that pair explains clearly more.
 """
 
 import numpy as np
 
 from estimator.closeloop.fitting.fitter import Fitter, from_there
+from estimator.closeloop.fitting.refined import arrived
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
+from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.clock import read_later
 from estimator.closeloop.question.problem import clock_within
 from estimator.closeloop.screening.regressors import Calibration
@@ -37,16 +40,23 @@ def clock_of(shown: Screened) -> float:
     return step if alone else 0.0
 
 
-def clock_beside(fitter: Fitter, best: Hypothesis) -> float:
-    """The same if a fit of the best hypothesis, which does not explain the record, shows an offset."""
+def clock_beside(fitter: Fitter, best: Hypothesis, pair: Hypothesis | None) -> float:
+    """The same if a fit of one effect shows an offset; best, pair: the best single hypothesis and pair.
+
+    The offset is looked for if the best single one leaves more than noise, or the pair is better.
+    """
     baseline = fitter.baseline
-    if not _open(baseline):
+    outdone = pair is not None and baseline.beats(pair, best)
+    if not _open(baseline) or (arrived(fitter, best) and not outdone):
         return 0.0
     step = baseline.problem.record.sample
-    found = fitter.alone.finished(from_there([best]), [*best.others, clock_within(step)])
+    ones = from_there([best])
+    ones += [Promise((c,), 0.0, pair.fit.theta) for c in pair.candidates] if pair else []
+    found = fitter.alone.finished(ones, [*best.others, clock_within(step)])
     samples, left = len(best.fit.residual), min(map(cost, [best, *found]))
     beyond = left - samples - baseline.policy.detection.chance * float(np.sqrt(2 * samples))
-    return step if _clear(baseline, cost(best), left, samples) and cost(best) - left > beyond else 0.0
+    shown = _clear(baseline, cost(best), left, samples) and cost(best) - left > beyond
+    return step if shown and not (pair and _clear(baseline, left, cost(pair), samples)) else 0.0
 
 
 def _open(baseline: Baseline) -> bool:

@@ -25,19 +25,18 @@ def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     limits = fitter.baseline.policy.search
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     worst = limits.dated_rival * cost(found[0]) if found else 0.0
-    tried = [h for h in found[: limits.dated] if h.onset_names and cost(h) < worst]
-    onsets = Parallel(n_jobs=fitter.jobs)(delayed(_onset)(problem, h, weighting) for h in tried)
+    tried = [(h, name) for h in found[: limits.dated] for name in h.onset_names if cost(h) < worst]
+    onsets = Parallel(n_jobs=fitter.jobs)(delayed(_onset)(problem, h, n, weighting) for h, n in tried)
     again = [
-        Promise(h.candidates, 0.0, {**h.fit.theta, h.onset_names[0]: onset})
-        for h, onset in zip(tried, onsets, strict=True)
+        Promise(h.candidates, 0.0, {**h.fit.theta, name: onset})
+        for (h, name), onset in zip(tried, onsets, strict=True)
         if onset is not None
     ]
     return best_by_label([*found, *fitter.finished(again)]) if again else list(found)
 
 
-def _onset(problem: Problem, h: Hypothesis, weighting: Weighting) -> float | None:
-    """An onset time with a lower sum of squares on the identify part, all else unchanged; or None."""
-    [name, *_] = h.onset_names
+def _onset(problem: Problem, h: Hypothesis, name: str, weighting: Weighting) -> float | None:
+    """An onset time, by its name, with a lower sum of squares on the identify part, all else unchanged."""
     here, length, now = built(problem, h.candidates), problem.record.runs[0].fit_time(1.0), h.theta[name]
     inside = [t for t in onsets_near(now, length) if 0.0 < t < length and t != now]
     tried = in_turn(here, [{**h.theta, name: t} for t in inside], weighting)

@@ -16,15 +16,35 @@ from joblib import Parallel, delayed
 from estimator.closeloop.fitting.fit import NEAR_NOISE, fit
 from estimator.closeloop.fitting.fitter import Fitter, from_there, hypothesis, together
 from estimator.closeloop.fitting.slopes import FINE_STEP
+from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost, mean_square
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.screening.changes import Screening
+from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.closeloop.screening.screen import screen
 from estimator.weighting import Weighting
 
 Parts = tuple[tuple[float, int], ...]  # shares of the part to identify, and evaluations for each
 FIRST: Parts = ((0.125, 8), (0.25, 6))
 THEN: Parts = ((0.5, 5), (1.0, 5), (0.125, 8), (0.25, 6), (0.5, 5), (1.0, 5))
 GROWN_SHAPES = 2  # shapes tried for each label; for an effect with an onset time, only the best one
+
+
+def at_the_beginning(
+    baseline: Baseline, candidates: Sequence[Candidate], forces: Sequence[MissingForce]
+) -> list[Promise]:
+    """Promises of the candidates by what they explain of the first part of the record, best first.
+
+    Motion that an effect changes departs from its linearisation with time, and what sets in later does not
+    act there yet. Over the whole record, one effect of two can therefore explain less than a wrong one.
+    """
+    problem, weighting = baseline.problem.beginning(FIRST[0][0]), baseline.noise.weighting
+    calibrated = fit(problem, baseline.hypothesis.fit.unknowns, weighting)
+    screening = Screening(problem, calibrated, weighting, forces)
+    changes = screening.changes(candidates)
+    return screen(screening.fit, [((c,), g) for c, g in zip(candidates, changes, strict=True)])
 
 
 def from_the_beginning(

@@ -23,6 +23,7 @@ from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.grouped import grouped_fit
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.screen import screen
+from estimator.closeloop.search.dating import dated
 from estimator.record import Array
 
 QUICK = 3e6  # candidates times samples up to which every leading effect is built in and screened again
@@ -45,7 +46,7 @@ def try_pairs(
     promises = _from_base(baseline.problem, screening.fit, physical)
     if alone:
         promises += _partners(baseline, screening, list(alone.values())[: limits.paired], physical)
-    found = fitter.hypotheses(promises, limits.finalist_pairs)
+    found = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs))
     reached = min((cost(h) for h in singles), default=cost(baseline.hypothesis))
     certain = [h for h in found if not baseline.idle(h)]
     doubtful = [h for h in found if baseline.idle(h) and cost(h) < reached]
@@ -79,23 +80,26 @@ def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
 
 
 def beside(
-    fitter: Fitter, best: Hypothesis, screening: Screening, change: Changes, least: float
+    fitter: Fitter, found: Sequence[Hypothesis], screening: Screening, change: Changes, least: float
 ) -> list[Hypothesis]:
     """Fitted pairs of a hypothesis that explains and a second effect, whose members are both needed.
 
-    The second effect is nominated by the residual of the hypothesis. screening, change: of the base, whose
-    linearisation is accurate enough to see whether there is a second effect; least: share of the remaining
-    residual beyond noise that the second effect has to explain.
+    found: those that explain, best first. Beside the best one, those with fewer unknowns are tried, since a
+    law with more may have taken up what a second effect does; the pair must promise more than that law
+    reaches. The second effect is nominated by the residual of the hypothesis. screening, change: of the base,
+    whose linearisation is accurate enough to see whether there is a second effect; least: share of the
+    remaining residual beyond noise that the second effect has to explain.
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
-    fit = grouped_fit(best.fit, len(screening.weighting), screening.group)
-    enough = limits.second_effect**2 * len(best.fit.residual) / len(screening.weighting)
-    promises = [
-        p
-        for p in _with(baseline.problem, best, fit, change)
-        if p.gain > max(enough, least * fit.beyond_noise)
-    ]
-    found = fitter.hypotheses(promises, limits.finalist_pairs) if promises else []
+    best, enough = found[0], limits.second_effect**2 * len(found[0].fit.residual) / len(screening.weighting)
+    promises = []
+    for h in found[: limits.finalists]:
+        if h is not best and len(h.own) >= len(best.own):
+            continue
+        fit = grouped_fit(h.fit, len(screening.weighting), screening.group)
+        needed = max(enough, least * fit.beyond_noise, cost(h) - cost(best))
+        promises += [p for p in _with(baseline.problem, h, fit, change) if p.gain > needed]
+    found = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs)) if promises else []
     return [h for h in found if not baseline.idle(h)]
 
 

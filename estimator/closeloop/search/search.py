@@ -15,7 +15,7 @@ from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.search.dating import dated
 from estimator.closeloop.search.duration import duration_said
-from estimator.closeloop.search.growing import from_the_beginning
+from estimator.closeloop.search.growing import at_the_beginning, from_the_beginning
 from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.search.nomination import nominated, overlooked
 from estimator.closeloop.search.onset import since
@@ -41,7 +41,7 @@ class Search:
         self.tell("simpler", "fitting simpler laws and similar laws")
         ones = s.stages.done("simpler", lambda: self._replaced(singles))
         if s.explained(ones[:1]):
-            pairs = [*pairs, *self._beside(ones[0])]
+            pairs = [*pairs, *self._beside([h for h in ones if s.explained([h])])]
         twos = s.stages.done("simpler pairs", lambda: self._replaced(pairs))
         return ones, twos
 
@@ -150,7 +150,8 @@ class Search:
         alone = s.stages.done("declared", lambda: self._from_declared(dates))
         if s.baseline.noise.known and not (s.explained(alone) and arrived(fitter, alone[0])):
             self.tell("growing", "fitting the leading effects to a growing part of the record")
-            found, hopes = alone, [*sudden, *self._promises]
+            early = s.stages.done("early", self._early)
+            found, hopes = alone, [*sudden, *early]
             alone = s.stages.done("growing", lambda: from_the_beginning(fitter, found, hopes))
         if s.explained(alone) or s.baseline.seen_by_several(s.baseline.hypothesis) is False:
             return alone, []
@@ -160,18 +161,24 @@ class Search:
         pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, paired, self._in_pairs))
         return best_by_label([*alone, *freed]), pairs
 
+    def _early(self) -> list[Promise]:
+        """Promises of the effects by the first part of the record."""
+        s = self.screened
+        physical = [c for c, _ in self._single if not c.is_fault]
+        return at_the_beginning(s.baseline, physical, s.screening.forces)
+
     def _from_declared(self, found: list[Hypothesis]) -> list[Hypothesis]:
         """The hypotheses, best first, the leading ones also begun at the declared values if none explains."""
         if self.screened.explained(found):
             return found
         return best_by_label(evenly(self.fitter, found, from_declared))
 
-    def _beside(self, one: Hypothesis) -> list[Hypothesis]:
-        """Pairs of one effect that explains and a second effect."""
+    def _beside(self, ones: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Pairs of one effect that explains and a second effect; ones: those that do, best first."""
         s = self.screened
         self.tell("second", "looking for a second effect in the remaining residual")
         least = 0.0 if self._form.exact else s.problem.policy.decision.most
-        return s.stages.done("beside", lambda: beside(self.fitter, one, s.screening, self._in_pairs, least))
+        return s.stages.done("beside", lambda: beside(self.fitter, ones, s.screening, self._in_pairs, least))
 
     def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:
         """Sensor faults that account for the residual, fitted to the end, and the candidates still to be
