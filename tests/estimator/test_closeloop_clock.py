@@ -1,6 +1,7 @@
 """Errors of a record's times: an offset of the outputs' clock is fitted, jitter is noise."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
+from estimator.closeloop.hypotheses.candidate import Candidate
+from estimator.closeloop.hypotheses.fitted import Fit
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.pipeline import trace
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question import clock
 from estimator.closeloop.question.clock import CLOCK, jitter, read_later, times_said
+from estimator.closeloop.search import clock_offset
 from estimator.record import Record, Run
 from fmus.export.builders.hypotheses import ModelBuilder
 from tests.helpers.carriage import DT, NOISE, SAMPLES, T, coulomb, motion, problem, to_and_fro
@@ -116,6 +121,44 @@ def test_a_clock_is_held_where_a_part_is_simulated_with_the_values_before(builde
     held = replace(asked, declared={**asked.declared, CLOCK: 0.7 * DT})
     [plain], [later] = asked.simulate({}), held.simulate({})
     assert_allclose(later, read_later(plain, T, 2, 0.7 * DT))
+
+
+@pytest.mark.parametrize(
+    ("pair", "member", "shown"),
+    [
+        (None, 1010.0, False),  # nothing calls for an offset where one effect leaves noise
+        (1030.0, 1010.0, True),  # what a second effect explains, an offset beside its partner does too
+        (1000.0, 1100.0, False),  # a second effect explains clearly more
+        (1030.0, 2000.0, False),  # an offset explains nothing beside either effect
+    ],
+)
+def test_an_offset_takes_the_place_of_a_second_effect_unless_that_explains_more(
+    monkeypatch, pair, member, shown
+):
+    """Sums of squares of the best pair and of an offset beside a member of it; 2000 by one effect alone."""
+
+    def fitted(squares, *kinds):
+        left = np.full(1000, np.sqrt(squares / 1000))
+        candidates = tuple(Candidate(kind, "wheel", ()) for kind in kinds)
+        return Hypothesis(candidates, Fit((), np.zeros(0), np.zeros((0, 0)), left, ()), ())
+
+    monkeypatch.setattr(clock_offset, "_open", lambda _: True)
+    monkeypatch.setattr(clock_offset, "arrived", lambda fitter, h: pair is None)
+    judging = SimpleNamespace(
+        beats=lambda h, other: cost(h) < cost(other),
+        policy=DEFAULT,
+        problem=SimpleNamespace(record=SimpleNamespace(sample=DT)),
+    )
+    beside = {"viscous_damping": member, "constant_force": 1900.0, "step_force": 2000.0}
+
+    def finished(promises, others):
+        assert [u.name for u in others] == [CLOCK]
+        return [fitted(beside[p.candidates[0].kind], p.candidates[0].kind) for p in promises]
+
+    fitter = SimpleNamespace(baseline=judging, alone=SimpleNamespace(finished=finished))
+    two = fitted(pair, "viscous_damping", "constant_force") if pair else None
+    found = clock_offset.clock_beside(fitter, fitted(2000.0, "step_force"), two)
+    assert found == (DT if shown else 0.0)
 
 
 def test_what_is_said_of_the_times():

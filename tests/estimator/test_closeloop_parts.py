@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from estimator.closeloop.decision.model_form import gap_closed
 from estimator.closeloop.fitting.fit import fit
-from estimator.closeloop.fitting.resolution import FEWEST, in_long_steps
+from estimator.closeloop.fitting.resolution import in_long_steps
 from estimator.closeloop.hypotheses.fitted import sandwich
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.levers import Course, shifts
@@ -85,7 +85,7 @@ def test_a_foreign_fmu_that_is_coupled_rarely_moves_alone_as_before_and_with_an_
     asked = problem(drive, np.zeros(SAMPLES), np.random.default_rng(3))
     damped = asked.with_effects([("viscous_damping", "carriage")])
     rare = in_long_steps(asked).steps
-    assert rare == Steps(coupled=pytest.approx(DT / FEWEST))
+    assert rare == Steps(coupled=pytest.approx(DT / asked.policy.candidates.readings))
     [alone], [now] = asked.simulate({}), asked.in_steps(rare).simulate({})
     assert_allclose(now, alone, rtol=1e-9, atol=1e-12)
     theta = {"viscous_damping_carriage_c": 200.0}  # as much as the drive has itself

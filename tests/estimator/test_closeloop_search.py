@@ -456,7 +456,7 @@ def test_an_answer_that_leaves_more_than_noise_does_not_end_the_search(monkeypat
     monkeypatch.setattr(search, "dated", lambda _, found: found)
     monkeypatch.setattr(search, "from_the_beginning", lambda _, found, promises: [right, *found])
     asked = search.Search(screened, fitter, lambda *_: None)
-    monkeypatch.setattr(search.Search, "_promises", [])
+    monkeypatch.setattr(search.Search, "_early", lambda _: [])
     singles, pairs = asked._finished([answer], [])
     assert singles[0] is (right if grows else answer)
     assert pairs == []

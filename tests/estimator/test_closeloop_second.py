@@ -156,6 +156,31 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, leas
     assert all(p.candidates[0] is best for p in fitted)
 
 
+@pytest.mark.parametrize(("further", "asked"), [(1, True), (0, False)])
+def test_a_second_effect_is_asked_for_beside_a_law_with_fewer_unknowns_than_the_best(further, asked):
+    """A law with a further unknown may have taken up some of it; another law of one unknown has not."""
+    rng = np.random.default_rng(3)
+    simple, second, rich = (one("viscous_damping"), one("viscous_damping", "roller"), one("bump_stop"))
+    rich = replace(rich, shape=further * (Unknown("bump_stop_wheel_gap", 1.0, 0.0, np.inf, 1.0),))
+    column = rng.standard_normal((4000, 1))
+    g, noise = column[:, 0] / np.linalg.norm(column), rng.standard_normal(4000)
+
+    def fitted(law, left):
+        n = len(law.unknowns)
+        slopes = rng.standard_normal((4000, n))
+        found = fit_with(law.unknowns, np.ones(n), np.eye(n), noise - left * g, slopes)
+        return Hypothesis((law,), found, ())
+
+    promised = []
+    asking = SimpleNamespace(
+        baseline=baseline(SimpleNamespace(policy=DEFAULT)),
+        hypotheses=lambda promises, _: promised.extend(promises) or [],
+    )
+    beside(asking, [fitted(rich, 10.0), fitted(simple, 30.0)], Seen(), [(second, column)], 0.0)
+    labels = [[c.label for c in p.candidates] for p in promised]
+    assert (["viscous_damping@wheel", "viscous_damping@roller"] in labels) is asked
+
+
 @pytest.mark.parametrize(
     ("freed", "alone", "idle"),
     [

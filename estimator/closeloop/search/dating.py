@@ -26,6 +26,8 @@ def dated(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     worst = limits.dated_rival * cost(found[0]) if found else 0.0
     tried = [(h, name) for h in found[: limits.dated] for name in h.onset_names if cost(h) < worst]
+    if not tried:
+        return list(found)
     onsets = Parallel(n_jobs=fitter.jobs)(delayed(_onset)(problem, h, n, weighting) for h, n in tried)
     again = [
         Promise(h.candidates, 0.0, {**h.fit.theta, name: onset})
