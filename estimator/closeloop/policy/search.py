@@ -153,7 +153,7 @@ class SearchPolicy:
     grown: int = limit(
         4,
         "effects",
-        "leading effects of the fits, and as many of the screening, that are fitted to a growing part",
+        "leading effects of the fits, and as many of the beginning, that are fitted to a growing part",
         CHALLENGE,
     )
     grown_survivors: int = limit(
