@@ -26,7 +26,7 @@ from estimator.closeloop.hypotheses.promise import distinct
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.planning.advice import next_experiment
 from estimator.closeloop.progress import Progress, Tell
-from estimator.closeloop.question.moments import identified_at
+from estimator.closeloop.question.moments import chosen_where_seen, identified_at
 from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce, missing_forces
 from estimator.closeloop.search.calibrated import in_its_steps
@@ -83,12 +83,13 @@ class Chain:
         detection = self._detected(shown)
         diagnostics = self._diagnosed(shown, detection)
         before, early = without_fits(baseline, detection)
-        found = Outcome(
-            declared, baseline, detection, tuple(forces), tuple(shown.promises), (), (),
-            early or Judgement(tuple(before), (), ""), diagnostics,
-        )  # fmt: skip
+        nothing = early or Judgement(tuple(before), (), "")
+        seen = tuple(forces), tuple(shown.promises)
+        found = Outcome(declared, baseline, detection, *seen, (), (), nothing, diagnostics)
         if early:
             return self._over_forms(found, shown)
+        if again := self._seen(shown.baseline):
+            return again.run()
         singles, pairs = self._search(shown).run()
         leading = [*singles[:1], *pairs[:1]]
         if again := self._late(shown, singles, pairs) or self._moved(shown.problem, leading):
@@ -124,6 +125,16 @@ class Chain:
                 )
                 return replace(self, problem=other, stages=self.stages.under("moved"), moved=True)
         return None
+
+    def _seen(self, baseline: Baseline) -> "Chain | None":
+        """The same with some of the discrepancy in the part to choose; None if it is, or cannot be."""
+        if self.moved or baseline.noise_alone("fit") or not baseline.noise_alone("choose"):
+            return None
+        left = baseline.hypothesis.residuals[0] / baseline.noise.std
+        if (other := chosen_where_seen(baseline.problem, left)) is None:
+            return None
+        self.tell("parts", "the part to choose shows only noise: beginning anew with other parts")
+        return replace(self, problem=other, stages=self.stages.under("seen"), moved=True)
 
     def _over_forms(self, found: Outcome, shown: Screened) -> Outcome:
         """The outcome with errors that allow for the steps of the simulation and the form of the model."""

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.closeloop.question.moments import identified_at
+from estimator.closeloop.question.moments import chosen_where_seen, identified_at
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Record, Run
 from scenarios.experiment.parts import spread
@@ -75,3 +75,47 @@ def test_the_following_samples_are_taken_where_those_before_are_too_few() -> Non
     [run] = moved.record.runs
     assert run.fit[:200].all()
     assert run.choose.sum() == 100
+
+
+def left_at(problem: Problem, *moments: int) -> np.ndarray:
+    """A residual of noise alone, but for 20 samples from each of some samples on."""
+    left = np.random.default_rng(0).standard_normal((len(problem.record.runs[0].t), 1))
+    for at in moments:
+        left[at : at + 20] += 30.0
+    return left
+
+
+@given(st.integers(2000, 9000), st.lists(st.floats(0.0, 1.0), min_size=3, max_size=6, unique=True))
+def test_what_only_the_fits_see_comes_into_the_part_to_choose(samples: int, shares: list[float]) -> None:
+    problem = usual(samples)
+    [before] = problem.record.runs
+    fitted = np.flatnonzero(before.fit)
+    left = left_at(problem, *(int(fitted[int(share * (len(fitted) - 30))]) for share in shares))
+    left[before.choose] = 0.5  # the events reach into no sample to choose
+    moved = chosen_where_seen(problem, left)
+    if moved is None:
+        return
+    [after] = moved.record.runs
+    beyond = (left**2 - 1)[:, 0]
+    assert beyond[after.choose].sum() > 0
+    assert beyond[after.fit].sum() > beyond[before.fit].sum() / 2 - len(left)
+    assert (after.fit.sum(), after.choose.sum()) == (before.fit.sum(), before.choose.sum())
+    assert not (after.fit & after.choose).any()
+    np.testing.assert_array_equal(after.test, before.test)
+    assert "shows only noise" in moved.record.notes[-1].sentence
+
+
+def test_of_several_events_one_is_chosen_by_and_a_single_one_is_identified() -> None:
+    problem = usual(6000)
+    [run] = problem.record.runs
+    length = problem.record.stretches("choose")[0]
+    first = int(np.flatnonzero(run.choose)[0])
+    events = [first + k * length + 30 for k in (1, 3, 6, 8, 11) if run.fit[first + k * length + 30]]
+    assert len(events) >= 3
+    moved = chosen_where_seen(problem, left_at(problem, *events))
+    assert moved is not None
+    assert sum(bool(moved.record.runs[0].choose[at]) for at in events) == 1
+    assert (
+        chosen_where_seen(problem, left_at(problem, events[0])) is None
+        or not (chosen_where_seen(problem, left_at(problem, events[0])).record.runs[0].choose[events[0]])
+    )

@@ -175,10 +175,10 @@ def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
     checks = tuple(form_of(baseline).calls_for_effect(began))
     if failed := next((c for c in checks if not c.passed), None):
         return Judgement(checks, (), f"{NO_EFFECT[failed.name]}, and no effect explains most of it")
-    if _noise_alone(baseline, "fit"):
+    if baseline.noise_alone("fit"):
         reason = "the part to identify shows only noise: the discrepancy begins after it"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")
-    if _noise_alone(baseline, "choose"):
+    if baseline.noise_alone("choose"):
         reason = "the part to choose shows only noise: the discrepancy is not in it and cannot be confirmed"
         return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to choose")
     why = "no effect of the library accounts for the residual; best fit: "
@@ -191,13 +191,6 @@ def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: i
     What is left of an error of the model's form lets almost any second effect win on a part of the record.
     """
     return baseline.beats(pair, single) and more_probable(baseline, pair, single, kinds)
-
-
-def _noise_alone(baseline: Baseline, part: Part) -> bool:
-    """Whether the residual of the calibrated FMU on a part of the record is only noise."""
-    residual = baseline.hypothesis.of(baseline.problem, part)
-    scatter = baseline.policy.decision.scatter * np.sqrt(baseline.noise.redundancy / (2 * len(residual)))
-    return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * baseline.noise.std))
 
 
 def one_curve(h: Hypothesis) -> bool:

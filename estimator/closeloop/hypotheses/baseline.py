@@ -80,6 +80,12 @@ class Baseline:
         chance = self.policy.detection.chance
         return bool(h.fit.beyond_noise < chance * np.sqrt(2 * len(h.fit.residual)))
 
+    def noise_alone(self, part: Part) -> bool:
+        """Whether the residual of the calibrated FMU on a part of the record is only noise."""
+        residual = self.hypothesis.of(self.problem, part)
+        scatter = self.policy.decision.scatter * np.sqrt(self.noise.redundancy / (2 * len(residual)))
+        return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * self.noise.std))
+
     def seen_by_several(self, h: Hypothesis) -> bool | None:
         """Whether what h leaves depends between outputs, as noise of sensors does not.
 
