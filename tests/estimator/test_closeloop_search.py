@@ -454,9 +454,8 @@ def test_an_answer_that_leaves_more_than_noise_does_not_end_the_search(monkeypat
     stages = SimpleNamespace(done=lambda _, work: work())
     screened = SimpleNamespace(baseline=known, stages=stages, explained=lambda _: True)
     monkeypatch.setattr(search, "dated", lambda _, found: found)
-    monkeypatch.setattr(search, "from_the_beginning", lambda _, found, promises: [right, *found])
     asked = search.Search(screened, fitter, lambda *_: None)
-    monkeypatch.setattr(search.Search, "_early", lambda _: [])
+    monkeypatch.setattr(search.Search, "_from_the_beginning", lambda _, found, __: ([right, *found], []))
     singles, pairs = asked._finished([answer], [])
     assert singles[0] is (right if grows else answer)
     assert pairs == []

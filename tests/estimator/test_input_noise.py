@@ -102,6 +102,20 @@ def test_draws_of_what_is_left_are_as_large_as_what_is_left(seed):
     assert "u0: white noise" in record.notes[-1].sentence
 
 
+@pytest.mark.parametrize("share", [0.005, 0.02])
+def test_draws_have_no_bias_where_details_are_lost(share):
+    """Of a signal with power at every frequency, smoothing takes away details that a smoothed one lacks."""
+    rng, found = np.random.default_rng(7), []
+    for _ in range(12):
+        clean = np.cumsum(gaussian_filter1d(rng.standard_normal(N), 8))
+        std = share * clean.std()
+        noise = InputNoise(np.array([std]), LIMITS.levels)
+        seen = smoothed(clean + std * rng.standard_normal(N), std, LIMITS.levels)
+        draws = [np.std(noise.left(seen[:, None], rng)) for _ in range(4)]
+        found.append(np.mean(draws) / np.std(seen - clean))
+    assert np.mean(found) == pytest.approx(1.0, abs=0.06)
+
+
 def shared_noise(rng, sensors):
     """Slow noise that two outputs share in unequal parts, and white noise of their sensors, (N, 2)."""
     slow = gaussian_filter1d(rng.standard_normal(N), 30)

@@ -47,39 +47,44 @@ def at_the_beginning(
     return screen(screening.fit, [((c,), g) for c, g in zip(candidates, changes, strict=True)])
 
 
-def from_the_beginning(
-    fitter: Fitter, found: Sequence[Hypothesis], promises: Sequence[Promise]
-) -> list[Hypothesis]:
-    """All hypotheses, best first on the part to identify, with the leading ones fitted again if that is
-    better.
+def begun(
+    fitter: Fitter, found: Sequence[Hypothesis], *promises: Sequence[Promise]
+) -> list[tuple[Hypothesis, Problem]]:
+    """The leading hypotheses, and those of each list of promises, fitted to the first parts of the record.
+
+    Each is given with the problem whose FMU holds its effect, the best one there first.
     """
-    limits, jobs = fitter.baseline.policy.search, fitter.jobs
-    problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
-    physical = [p for p in promises if not p.candidates[0].is_fault]
-    fitted = [h.label for h in found if not h.candidates[0].is_fault]
-    leading = dict.fromkeys(
-        [*fitted[: limits.grown], *list(dict.fromkeys(p.label for p in physical))[: limits.grown]]
-    )
-    unknowns = fitter.baseline.hypothesis.fit.unknowns
-    declared = {u.name: u.start for u in unknowns}
+    limits, problem = fitter.baseline.policy.search, fitter.baseline.problem
+    weighting = fitter.baseline.noise.weighting
+    named = [[h.label for h in found if not h.candidates[0].is_fault]]
+    named += [[p.label for p in some] for some in promises]
+    leading = dict.fromkeys(x for labels in named for x in list(dict.fromkeys(labels))[: limits.grown])
+    others, declared = _others(fitter)
     states = {n: v for n, v in declared.items() if n in problem.free_states}
     started = replace(problem, declared={**problem.declared, **states})
-    others = [u for u in unknowns if u.name not in states]
     starts = [
         replace(p, start={**p.start, **declared})
         for label in leading
-        for p in _shapes([p for p in physical if p.label == label])
+        for p in _shapes([p for some in promises for p in some if p.label == label])
     ]
     tried = list(zip(together(started, starts), starts, strict=True))
-    begun = Parallel(n_jobs=jobs)(delayed(_begun)(here, others, p, weighting) for here, p in tried)
-    alive = [(h, here) for h, (here, _) in zip(begun, tried, strict=True) if h is not None]
-    alive.sort(key=lambda pair: mean_square(pair[0]))
+    first = Parallel(n_jobs=fitter.jobs)(delayed(_begun)(here, others, p, weighting) for here, p in tried)
+    alive = [(h, here) for h, (here, _) in zip(first, tried, strict=True) if h is not None]
+    return sorted(alive, key=lambda pair: mean_square(pair[0]))
+
+
+def from_the_beginning(
+    fitter: Fitter, found: Sequence[Hypothesis], alive: Sequence[tuple[Hypothesis, Problem]]
+) -> list[Hypothesis]:
+    """All hypotheses, best first on the part to identify, with those of `begun` that are better there."""
+    limits, weighting = fitter.baseline.policy.search, fitter.baseline.noise.weighting
+    others, _ = _others(fitter)
     tasks = (
         delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), weighting, THEN)
         for h, here in alive[: limits.grown_survivors]
         if mean_square(h) < limits.grown_rival * mean_square(alive[0][0])
     )
-    grown = best_by_label(h for h in Parallel(n_jobs=jobs)(tasks) if h is not None)
+    grown = best_by_label(h for h in Parallel(n_jobs=fitter.jobs)(tasks) if h is not None)
     again = fitter.finished(from_there(grown[: limits.grown]))
     best = best_by_label([*found, *grown, *again])
     rugged = [
@@ -88,6 +93,12 @@ def from_the_beginning(
         if mean_square(h) > NEAR_NOISE and cost(h) < limits.grown_rival * cost(best[0])
     ]
     return best_by_label([*best, *fitter.finished(from_there(rugged), step=FINE_STEP)])
+
+
+def _others(fitter: Fitter) -> tuple[list[Unknown], dict[str, float]]:
+    """The unknowns of the calibrated FMU without its start states, and the declared values of all."""
+    unknowns, states = fitter.baseline.hypothesis.fit.unknowns, fitter.baseline.problem.free_states
+    return [u for u in unknowns if u.name not in states], {u.name: u.start for u in unknowns}
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:

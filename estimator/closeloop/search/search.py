@@ -15,7 +15,8 @@ from estimator.closeloop.screening.onset_times import at_their_onsets
 from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.closeloop.search.dating import dated
 from estimator.closeloop.search.duration import duration_said
-from estimator.closeloop.search.growing import at_the_beginning, from_the_beginning
+from estimator.closeloop.search.followed import followed
+from estimator.closeloop.search.growing import at_the_beginning, begun, from_the_beginning
 from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.search.nomination import nominated, overlooked
 from estimator.closeloop.search.onset import since
@@ -147,25 +148,33 @@ class Search:
         self.tell("long fits", "fitting the leading effects until convergence")
         finals = s.stages.done("singles", lambda: fitter.to_the_end(brief))
         dates = s.stages.done("dated", lambda: dated(fitter, finals))
-        alone = s.stages.done("declared", lambda: self._from_declared(dates))
+        alone, two = s.stages.done("declared", lambda: self._from_declared(dates)), list[Hypothesis]()
         if s.baseline.noise.known and not (s.explained(alone) and arrived(fitter, alone[0])):
             self.tell("growing", "fitting the leading effects to a growing part of the record")
-            early = s.stages.done("early", self._early)
-            found, hopes = alone, [*sudden, *early]
-            alone = s.stages.done("growing", lambda: from_the_beginning(fitter, found, hopes))
-        if s.explained(alone) or s.baseline.seen_by_several(s.baseline.hypothesis) is False:
-            return alone, []
+            found = alone
+            alone, two = s.stages.done("growing", lambda: self._from_the_beginning(found, sudden))
+        if s.explained([*alone, *two]) or s.baseline.seen_by_several(s.baseline.hypothesis) is False:
+            return alone, two
         self.tell("pairs", "trying pairs of effects")
         labels = {c.label for c, _ in self._in_pairs}
         paired = [h for h in alone if h.label in labels]
         pairs, freed = s.stages.done("pairs", lambda: try_pairs(fitter, s.screening, paired, self._in_pairs))
-        return best_by_label([*alone, *freed]), pairs
+        return best_by_label([*alone, *freed]), best_by_label([*two, *pairs])
 
-    def _early(self) -> list[Promise]:
-        """Promises of the effects by the first part of the record."""
-        s = self.screened
+    def _from_the_beginning(
+        self, found: Sequence[Hypothesis], sudden: Sequence[Promise]
+    ) -> tuple[list[Hypothesis], list[Hypothesis]]:
+        """Single hypotheses with fits to a growing part of the record, and pairs of which one effect sets in.
+
+        If such a pair explains the record, no single effect is fitted to growing parts.
+        """
+        s, fitter = self.screened, self.fitter
         physical = [c for c, _ in self._single if not c.is_fault]
-        return at_the_beginning(s.baseline, physical, s.screening.forces)
+        early = at_the_beginning(s.baseline, physical, s.screening.forces)
+        alive = begun(fitter, found, sudden, early)
+        second = [c for c, _ in self._in_pairs if not c.is_fault]
+        pairs = followed(fitter, [h for h, _ in alive], second)
+        return list(found) if s.explained(pairs) else from_the_beginning(fitter, found, alive), pairs
 
     def _from_declared(self, found: list[Hypothesis]) -> list[Hypothesis]:
         """The hypotheses, best first, the leading ones also begun at the declared values if none explains."""
@@ -225,14 +234,15 @@ class Search:
         found = self._form.ranked(best_by_label(found))
         if not found:
             return found
-        every = [c for c, _ in (self._single if len(found[0].candidates) < 2 else self._in_pairs)]
+        change = self._single if len(found[0].candidates) < 2 else self._in_pairs
+        every = [c for c, _ in change]
         if whole := self.fitter.finished(in_groups(found, every)):
             found = self._form.ranked(best_by_label([*found, *whole]))
         if s.baseline.noise.known and not s.explained(found[:1]):
             return found
         leading = found[: s.problem.policy.search.finalists]
         promises = [*simpler(found, every), *from_the_start(leading, every)]
-        promises += lookalikes(s.screening, Calibration.of(s.fit), found, self._single)
+        promises += lookalikes(s.screening, Calibration.of(s.fit), found, change)
         more = self.fitter.finished(distinct(promises))
         return self._form.ranked(best_by_label([*found, *more]))
 
