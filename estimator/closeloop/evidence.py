@@ -26,6 +26,7 @@ Name = Literal[
     "the residual is large enough to matter",
     "every sensor moves",
     "the size is clear of zero",
+    "the reported size is clear of zero",
     "better than without it on the part to choose",
     "outputs left above their noise",
     "not improbable",
@@ -50,6 +51,7 @@ MORE: tuple[Name, ...] = (
 # an answer must pass all of these
 ANSWER: tuple[Name, ...] = (
     "the size is clear of zero",
+    "the reported size is clear of zero",
     "better than without it on the part to choose",
     "outputs left above their noise",
     "not improbable",

@@ -6,19 +6,23 @@ from functools import partial
 from itertools import count
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import confirmed
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import confirmed_on_test, judge, probable, without_fits
+from estimator.closeloop.decision.verdict import (
+    clear_as_reported,
+    confirmed_on_test,
+    judge,
+    probable,
+    without_fits,
+)
 from estimator.closeloop.detection.detect import Detection, detect
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.fitter import Fitter
-from estimator.closeloop.fitting.likelihood_profile import profiled
 from estimator.closeloop.fitting.other_forms import over_forms
-from estimator.closeloop.fitting.resolution import in_fine_steps, over_steps
+from estimator.closeloop.fitting.resolution import over_steps
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
@@ -32,7 +36,7 @@ from estimator.closeloop.screening.missing_force import MissingForce, missing_fo
 from estimator.closeloop.search.calibrated import in_its_steps
 from estimator.closeloop.search.clock_offset import clock_beside, clock_of
 from estimator.closeloop.search.free_form import free_form
-from estimator.closeloop.search.pairs import with_worth
+from estimator.closeloop.search.profiles import finer, with_profiles
 from estimator.closeloop.search.rivals import with_rivals
 from estimator.closeloop.search.screened import Screened, screened
 from estimator.closeloop.search.search import Search
@@ -224,11 +228,12 @@ class Chain:
         member are taken from its likelihood profile, which may also move its fit. If it does, the nearest
         rivals are fitted again too. The hypotheses are then judged again, until every member has been judged
         with its profiled values. Each hypothesis is profiled once at most for each length of the steps, so
-        that the loop ends.
+        that the loop ends. If the errors that are reported leave open whether a second effect is there, so do
+        they of any other, and one effect alone is judged.
         """
         form = form_of(shown.baseline)
         asked: set[tuple[str, ...]] = set()
-        tried = False
+        tried, refused = False, list[Hypothesis]()
         for turn in count():
             self.tell("verdict", "testing whether the force follows the curve of the law")
             leading, judgement = self._judged(shown, forces, singles, pairs, f"verdict {turn}")
@@ -240,12 +245,17 @@ class Chain:
             members = shown.twins.reduced(judgement.members, singles)
             new = [h for h in members if h.key not in asked]
             if not new:
-                break
+                sized = self._sized(shown, judgement)
+                if sized.members or not pairs or not any(len(m.candidates) > 1 for m in judgement.members):
+                    judgement = sized
+                    break
+                pairs, refused = [], [*pairs]
+                continue
             self.tell("intervals", "computing standard errors from the likelihood profile")
             fitter = self.fitter(shown.baseline, self.jobs)
-            shown, again = _in_fine_steps(fitter, shown, new, members)
+            shown, again = finer(fitter, shown, new, members)
             fitter = self.fitter(shown.baseline, self.jobs)
-            found = self.stages.done(f"intervals {turn}", partial(_profiled, fitter, again, singles))
+            found = self.stages.done(f"intervals {turn}", partial(with_profiles, fitter, again, singles))
             asked |= {h.key for h in again}
             if any(new.theta != old.theta for new, old in zip(found, again, strict=True)):
                 self.tell("rivals", "fitting the rivals of the answer as carefully as the answer")
@@ -257,9 +267,16 @@ class Chain:
         return (
             shown.baseline,
             list(singles),
-            list(pairs),
+            [*pairs, *refused],
             judgement.of([*shown.twins.joined(singles), *pairs]),
         )
+
+    def _sized(self, shown: Screened, judgement: Judgement) -> Judgement:
+        """The judgement after the check of the best member's size by the errors that are reported."""
+        if not judgement.members:
+            return judgement
+        reported = shown.over_form(over_steps(shown.baseline, judgement.members[0]))
+        return clear_as_reported(shown.baseline, judgement, reported, shown.began)
 
     def _judged(
         self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
@@ -269,32 +286,3 @@ class Chain:
         ones, kinds = shown.twins.joined(singles), len(distinct(shown.promises))
         leading = judge(shown.baseline, ones, pairs, kinds, shown.began)
         return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))
-
-
-def _in_fine_steps(
-    fitter: Fitter, shown: Screened, new: Sequence[Hypothesis], members: Sequence[Hypothesis]
-) -> tuple[Screened, list[Hypothesis]]:
-    """The problem in steps that are fine enough for the new members of an answer, and those to be profiled.
-
-    If the steps become finer, these are all members, since hypotheses are compared in the same steps. If they
-    stay as they are, so does the screening.
-    """
-    before = shown.baseline
-    finer = in_fine_steps(fitter, new)
-    if finer.steps == before.problem.steps:
-        return shown, list(new)
-    return replace(shown, baseline=before.asked(finer)), list(members)
-
-
-def _profiled(
-    fitter: Fitter, members: Sequence[Hypothesis], singles: Sequence[Hypothesis]
-) -> list[Hypothesis]:
-    """Hypotheses with their standard errors taken from the likelihood profile.
-
-    These may leave a doubt whether a pair needs both of its members, which the fits without them answer.
-    """
-    tasks = (delayed(profiled)(fitter.alone, h) for h in members)
-    found = list(Parallel(min(fitter.jobs, len(members)))(tasks))
-    pairs, _ = with_worth(fitter, [h for h in found if len(h.candidates) > 1], singles)
-    valued = {h.key: h for h in pairs}
-    return [valued.get(h.key, h) for h in found]

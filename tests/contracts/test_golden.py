@@ -15,6 +15,7 @@ LIMITS = {  # of the checks whose limit is one of the policy
     "the residual is more than noise": DEFAULT.detection.level,
     "the outputs move out of their noise": DECISION.excited,
     "the size is clear of zero": DECISION.significant,
+    "the reported size is clear of zero": DECISION.telling,
     "better than without it on the part to choose": DECISION.telling,
     "not improbable": DECISION.probable,
     "better than without it on the test part": DECISION.telling,

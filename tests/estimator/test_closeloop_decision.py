@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from estimator.closeloop.decision.equivalence import equivalent
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import judge, probable
+from estimator.closeloop.decision.verdict import clear_as_reported, judge, probable
 from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -395,6 +395,31 @@ def test_a_class_holds_its_most_probable_members_alone(shares, kept, verdict, or
     places = [found.reason.index(m.label) for m in found.members]
     assert places == sorted(places)
     assert (found.next_experiment == "") == (kept == 1)
+
+
+@pytest.mark.parametrize(("wider", "named"), [(1.0, True), (2.4, True), (2.6, False), (100.0, False)])
+def test_an_effect_is_named_if_its_reported_size_is_clear_of_zero(wider, named):
+    """Of 5 standard errors as it was judged; those that are reported are wider."""
+    judged = law("constant_force", 0, 0.0)
+    judged = replace(judged, fit=replace(judged.fit, covariance=0.04 * np.eye(1)))
+    reported = replace(judged, fit=replace(judged.fit, covariance=0.04 * wider**2 * np.eye(1)))
+    b = replace(baseline(asked(), left(5.0, 5.0), NOISE), hypothesis=judged)  # worth nothing beside its size
+    found = clear_as_reported(b, Judgement.naming([judged]).after(DETECTED), reported, False)
+    assert (found.verdict == "traced") is named
+    [check] = [c for c in found.checks if c.name == "the reported size is clear of zero"]
+    assert check.value == pytest.approx(5.0 / wider)
+    assert check.limit == DEFAULT.decision.telling
+
+
+def test_a_stiffness_without_bounds_is_judged_by_what_its_lack_costs():
+    """Its errors are as large as it is, and those that are reported are no wider."""
+    stop = law("bump_stop", 0, 0.0)
+    b = baseline(asked(), left(5.0, 5.0), NOISE)
+    assert cost(b.hypothesis) <= cost(stop)
+    worth = replace(stop, worth={stop.label: 900.0})
+    found = clear_as_reported(b, Judgement.naming([worth]).after(DETECTED), worth, False)
+    assert found.verdict == "traced"
+    assert clear_as_reported(b, Judgement.naming([stop]), stop, False).members == ()
 
 
 def test_a_pair_becomes_a_simpler_one_in_either_order():

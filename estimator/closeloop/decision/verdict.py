@@ -62,6 +62,18 @@ def probable(
     return _nothing(baseline, began, found.members[0]).after([*found.checks, check])
 
 
+def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis, began: bool) -> Judgement:
+    """The judgement after the check of sizes by reported errors, which allow for the steps and the form."""
+    best = found.members[0]
+    each = best.significance(baseline.hypothesis), best.significance(), reported.significance()
+    sizes = (z * now / was if 0 < was < np.inf else z for z, was, now in zip(*each, strict=True))
+    limit = baseline.policy.decision.telling
+    check = Check.least("the reported size is clear of zero", min(sizes, default=0.0), limit)
+    if check.passed:
+        return replace(found, checks=(*found.checks, check))
+    return _nothing(baseline, began, best).after([*found.checks, check])
+
+
 def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part, sign: float = 1.0) -> Check:
     """The check that h is better than the calibrated FMU on a part, in standard errors of the log score.
 
@@ -116,11 +128,9 @@ def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
         return found
     best = found.members[0]
     silent = not baseline.shows(best, "test")
-    checks = [
-        better("no worse than without it on the test part", baseline, best, "test", -1.0)
-        if silent
-        else better("better than without it on the test part", baseline, best, "test")
-    ]
+    usual: Name = "better than without it on the test part"
+    wanted: Name = "no worse than without it on the test part" if silent else usual
+    checks = [better(wanted, baseline, best, "test", -1.0 if silent else 1.0)]
     if len(best.candidates) > 1:
         checks.append(above_noise("outputs left above their noise on the test part", baseline, best, "test"))
     if all(c.passed for c in checks):
@@ -213,8 +223,5 @@ def no_law(h: Hypothesis, law: Candidate | None = None, check: Check | None = No
 
 
 def _not_all(m: Hypothesis, richer: Hypothesis) -> Judgement:
-    reason = (
-        f"{m.label} accounts for the residual on the part to choose, but not on the part to identify, where "
-        f"{richer.label} fits better"
-    )
-    return Judgement((), (), reason)
+    where = "accounts for the residual on the part to choose, but not on the part to identify, where"
+    return Judgement((), (), f"{m.label} {where} {richer.label} fits better")

@@ -16,6 +16,9 @@ MEANINGS: Mapping[Name, tuple[str, str]] = {  # how the value stands to the limi
     "the residual is large enough to matter": (LEAST, "its size over the smallest size that matters"),
     "every sensor moves": (MOST, "number of sensors that show one value all the time"),
     "the size is clear of zero": (LEAST, "size of the effect over its standard error"),
+    "the reported size is clear of zero": (
+        LEAST, "the same with the errors that are reported, which allow for steps and form",
+    ),
     "better than without it on the part to choose": (ABOVE, GAIN),
     "outputs left above their noise": (MOST, "number of outputs with declared noise that stay above it"),
     "not improbable": (LEAST, "probability of the effects that are named, together"),
