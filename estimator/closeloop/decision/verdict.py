@@ -65,10 +65,10 @@ def probable(
 def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis, began: bool) -> Judgement:
     """The judgement after the check of sizes by reported errors, which allow for the steps and the form."""
     best = found.members[0]
-    each = best.significance(baseline.hypothesis), best.significance(), reported.significance()
-    sizes = (z * now / was if 0 < was < np.inf else z for z, was, now in zip(*each, strict=True))
-    limit = baseline.policy.decision.telling
-    check = Check.least("the reported size is clear of zero", min(sizes, default=0.0), limit)
+    limits, base = baseline.policy.decision, baseline.hypothesis
+    each = zip(best.significance(base), best.significance(), reported.significance(), strict=True)
+    sizes = (now if was >= limits.significant else z * now / (was or 1.0) for z, was, now in each)
+    check = Check.least("the reported size is clear of zero", min(sizes, default=0.0), limits.telling)
     if check.passed:
         return replace(found, checks=(*found.checks, check))
     return _nothing(baseline, began, best).after([*found.checks, check])
