@@ -28,9 +28,9 @@ from estimator.closeloop.fitting.transition import unresolved, with_duration
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise, built
-from estimator.closeloop.pipeline import _in_fine_steps
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.search.profiles import finer
 from estimator.closeloop.search.screened import Screened
 from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array, Run
@@ -427,7 +427,7 @@ def test_a_screening_is_done_again_only_if_the_steps_become_finer(true):
     fitter = Refitter(baseline(Held(0.1, true_finer=true), noise=SIZE))
     [h] = fitter.finished([Promise((c,), 0.0, {})])
     shown = Screened(fitter.baseline, None, h.fit, [], [], Stages(), lambda: None)
-    after, again = _in_fine_steps(fitter, shown, [h], [h, h])
+    after, again = finer(fitter, shown, [h], [h, h])
     assert (after is shown) == (true == 1)
     assert after.came is shown.came
     assert after.problem.steps.parts == true
