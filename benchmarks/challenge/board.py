@@ -126,7 +126,9 @@ def _state(board: Board, different: Sequence[str]) -> str:
     many = len(board.code)
     if not different:
         return f"**The code that answers is unchanged since that commit**: {many} files that an answer reads."
-    listed = ", ".join(f"`{f}`" for f in different)
+    there = [f for f in different if (ROOT / f).is_file()]
+    gone = len(different) - len(there)
+    listed = ", ".join(f"`{f}`" for f in there) + (f", and {gone} that no longer exist" if gone else "")
     return (
         f"**The code that answers has changed since that commit**, in {len(different)} of the {many} files "
         f"that an answer reads: {listed}."

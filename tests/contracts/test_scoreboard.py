@@ -49,6 +49,10 @@ def test_the_page_names_what_has_changed() -> None:
     said = section(board, ["estimator/closeloop/policy/decision.py"])
     assert "unchanged" not in said
     assert "`estimator/closeloop/policy/decision.py`" in said
+    moved = section(board, ["estimator/plant.py", "estimator/moved/away.py"])
+    assert "in 2 of" in moved
+    assert "`estimator/plant.py`, and 1 that no longer exist" in " ".join(moved.split())
+    assert "estimator/moved/away.py" not in moved
 
 
 def test_a_new_scoreboard_has_the_one_before_beside_it() -> None:
