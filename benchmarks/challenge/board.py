@@ -128,7 +128,8 @@ def _state(board: Board, different: Sequence[str]) -> str:
         return f"**The code that answers is unchanged since that commit**: {many} files that an answer reads."
     there = [f for f in different if (ROOT / f).is_file()]
     gone = len(different) - len(there)
-    listed = ", ".join(f"`{f}`" for f in there) + (f", and {gone} that no longer exist" if gone else "")
+    more = f", and {gone} that no longer exist{'s' if gone == 1 else ''}" if gone else ""
+    listed = ", ".join(f"`{f}`" for f in there) + more
     return (
         f"**The code that answers has changed since that commit**, in {len(different)} of the {many} files "
         f"that an answer reads: {listed}."

@@ -91,16 +91,16 @@ def beside(
     remaining residual beyond noise that the second effect has to explain.
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
-    best, enough = found[0], limits.second_effect**2 * len(found[0].fit.residual) / len(screening.weighting)
-    promises = []
+    best, outputs, promises = found[0], len(screening.weighting), list[Promise]()
+    enough = limits.second_effect**2 * len(best.fit.residual) / outputs
     for h in found[: limits.finalists]:
         if h is not best and len(h.own) >= len(best.own):
             continue
-        fit = grouped_fit(h.fit, len(screening.weighting), screening.group)
+        fit = grouped_fit(h.fit, outputs, screening.group)
         needed = max(enough, least * fit.beyond_noise, cost(h) - cost(best))
         promises += [p for p in _with(baseline.problem, h, fit, change) if p.gain > needed]
-    found = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs)) if promises else []
-    return [h for h in found if not baseline.idle(h)]
+    pairs = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs)) if promises else []
+    return [h for h in pairs if not baseline.idle(h)]
 
 
 def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:

@@ -22,10 +22,10 @@ def finer(
     stay as they are, so does the screening.
     """
     before = shown.baseline
-    finer = in_fine_steps(fitter, new)
-    if finer.steps == before.problem.steps:
+    problem = in_fine_steps(fitter, new)
+    if problem.steps == before.problem.steps:
         return shown, list(new)
-    return replace(shown, baseline=before.asked(finer)), list(members)
+    return replace(shown, baseline=before.asked(problem)), list(members)
 
 
 def with_profiles(
