@@ -6,7 +6,9 @@ Four questions are answered one after the other, each with the prior of the poli
    criterion of G. Schwarz (Annals of Statistics 6 (1978), 461-464), which approximates marginal likelihoods
    with a prior that is worth one sample, narrowed by the bounds of the unknowns. Residuals that are not white
    noise of the stated size carry less evidence: log likelihoods are divided by the dispersion along the
-   difference of two hypotheses (R. W. M. Wedderburn, Biometrika 61 (1974), 439-447).
+   difference of two hypotheses (R. W. M. Wedderburn, Biometrika 61 (1974), 439-447). If the model form is
+   open, a second effect has no evidence where what the first one leaves would not matter in a record without
+   effects: the form always leaves as much.
 2. An effect, or none? By the same criterion.
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
@@ -16,32 +18,31 @@ Four questions are answered one after the other, each with the prior of the poli
    policy, and imitations of a mechanism outside as a rule. If they refuse all, that is evidence.
 
 A residual that is too small to matter is not searched. Whether an effect left it, which the calibration
-compensates or which is weak, or the form of a right model, is told by its size alone: see `odds_of_effect`.
+compensates or which is weak, or the form of a right model, is told by its size alone: see `size_odds`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import comb
 
 import numpy as np
 from scipy.special import logsumexp
 
 from estimator.closeloop.detection.detect import Detection
-from estimator.closeloop.detection.importance import TINY, signal_size
+from estimator.closeloop.detection.importance import TINY, beyond_noise, material
 from estimator.closeloop.evidence import Judgement, refuted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import BLOCKS
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise, distinct
-from estimator.closeloop.hypotheses.relations import becomes, includes
+from estimator.closeloop.hypotheses.relations import becomes, extends, includes
+from estimator.closeloop.size_odds import WHOLE, odds_by_size
 from estimator.record import Array
 
 NO_DISCREPANCY = "no_discrepancy"
-WHOLE: tuple[Part, ...] = ("fit", "unseen")  # the whole record
 SHARES = 4001  # points of the grid of shares that an answer may leave
-SIZES = 2001  # points of the grid of sizes that a residual may have
-LEAST = 1e-6  # of a signal, the smallest size of that grid: no logger resolves less
 SHOWN = 1e-3  # answers that are less probable are not listed
 
 
@@ -82,55 +83,8 @@ def _is(h: Hypothesis, member: Hypothesis) -> bool:
 def _of_size(baseline: Baseline) -> float:
     """Probability that no effect left a residual that is too small to be searched."""
     prior = baseline.policy.prior
-    odds = _odds_by_size(baseline) * prior.effect / (1 - prior.effect)
+    odds = odds_by_size(baseline) * prior.effect / (1 - prior.effect)
     return float(1 / (1 + odds))
-
-
-def _odds_by_size(baseline: Baseline) -> float:
-    """How much more probable an effect makes the size of the residual of the calibrated FMU.
-
-    The mean square of a residual has the scatter of noise. The output and the part of the record that leave
-    the largest share of their signal count.
-    """
-    b = baseline
-    noise, signal = b.noise.std**2, np.maximum(signal_size(b.problem) ** 2, TINY)
-    shares, errors = [], []
-    for part in WHOLE:
-        residual = b.hypothesis.of(b.problem, part)
-        error = noise * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
-        shares.append((np.mean(residual**2, axis=0) - noise) / signal)
-        errors.append(error / signal)
-    share, error = np.array(shares).ravel(), np.array(errors).ravel()
-    most = int(np.argmax(share))
-    form = max(b.policy.prior.material, b.problem.form_error)
-    return odds_of_effect(float(share[most]), float(error[most]), form)
-
-
-def odds_of_effect(share: float, error: float, form: float) -> float:
-    """How much more probable an effect makes what is left of a signal than the form of a right model does.
-
-    share: of the mean square of a signal that is left beyond noise; error: its standard error. What an effect
-    leaves may have any order of magnitude up to the signal itself. What the form of a right model leaves is
-    exponentially distributed; its mean may have any order of magnitude up to `form`, in root mean squares
-    over that of the signal. Orders of magnitude begin at the smallest size that the record can show.
-    """
-    least = _smallest(error, form)
-    size = np.geomspace(least, 1.0, SIZES)  # each order of magnitude weighs alike
-    share = min(share, 1.0)
-    step = 2 * np.log(1 / least) / SIZES  # of the square, relative; what lies between two sizes counts too
-    seen = np.exp(-0.5 * ((share - size**2) / max(error, step * share)) ** 2)
-    of_form = np.exp(-size / form) - np.exp(-size / least)
-    form_left = float(seen @ of_form / np.sum(of_form))
-    tiny = np.finfo(float).tiny
-    return max(float(np.mean(seen)), tiny) / max(form_left, tiny)
-
-
-def _smallest(error: float, form: float) -> float:
-    """Smallest size, over the signal, that a record can show, at most a hundredth of what a form leaves.
-
-    error: standard error of the share of the mean square.
-    """
-    return float(np.clip(np.sqrt(error), LEAST, form / 100))
 
 
 def _of_screening(baseline: Baseline, promises: Sequence[Promise]) -> float:
@@ -194,7 +148,7 @@ def _unlike_any(baseline: Baseline) -> tuple[float, float]:
     share = float(np.log(prior.effect * prior.outside / (1 - prior.effect)))
     several = baseline.seen_by_several(baseline.hypothesis)
     if several is None:
-        return share + float(np.log(_odds_by_size(baseline))), 0.0
+        return share + float(np.log(odds_by_size(baseline))), 0.0
     rare, usual = float(np.log(level)), float(np.log(1 - level))
     return (share + usual, rare) if several else (share + rare, usual)
 
@@ -243,6 +197,8 @@ def _price(h: Hypothesis, most: float) -> float:
 
 def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
     """Log likelihood of h minus that of the best one, over the dispersion of what the best one leaves."""
+    if _rest_is_form(baseline, best, h):
+        return 0.0
     lead = apart = scatter = 0.0
     for part in ("fit", "choose"):
         one, other = (baseline.weighted(x, part) for x in (best, h))
@@ -252,6 +208,18 @@ def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
         apart += float(np.sum(difference**2))
         scatter += float(np.sum(np.square(along)))
     return -lead * min(1.0, apart / scatter) if scatter > 0 else -lead
+
+
+def _rest_is_form(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> bool:
+    """Whether the best one is h with a further effect, which does no more than an open form may always do.
+
+    What h leaves would then not matter if it were the residual of a record without effects.
+    """
+    if not baseline.problem.form_error or not extends(best, h):
+        return False
+    b = replace(baseline, hypothesis=h)
+    left = np.maximum(beyond_noise(b, "fit"), beyond_noise(b, "choose"))
+    return material(b, left, b.noise.std) < 1.0
 
 
 def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:

@@ -17,8 +17,9 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
-from estimator.closeloop.probability import NO_DISCREPANCY, odds_of_effect, probabilities
+from estimator.closeloop.probability import NO_DISCREPANCY, probabilities
 from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.size_odds import odds_of_effect
 from estimator.record import Array, Record, Run
 from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.verdicts import judged
@@ -194,6 +195,23 @@ def test_what_the_form_leaves_is_no_second_effect():
         complete += completes(on(measured), two, one, LIBRARY)
     assert better > 50
     assert complete < 5
+
+
+@pytest.mark.parametrize(
+    ("form", "size", "least", "most"), [(0.0, 0.6, 30, 50), (0.05, 0.6, 0, 2), (0.05, 2.0, 49, 50)]
+)
+def test_an_open_form_takes_a_second_effect_that_would_not_matter_alone(form, size, least, most):
+    """However certain it is: another contact leaves as much in every record."""
+    complete = named = 0
+    for seed in range(50):
+        measured = np.random.default_rng(seed).standard_normal(SAMPLES) + 30 * LAWS[2] + size * LAWS[6]
+        problem = replace(asked(), form_error=form)
+        found = baseline(problem, fitted(measured), np.ones(1))
+        one, two = fitted(measured, 2), fitted(measured, 2, 6)
+        complete += completes(found, two, one, LIBRARY)
+        said = probabilities(found, SEEN, judged("several"), promised(measured), [one, two])
+        named += said.get(two.label, 0.0) > 0.5
+    assert least <= complete <= named <= most
 
 
 def test_without_fits_the_screening_says_whether_there_is_an_effect():

@@ -22,15 +22,15 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
     the parts to choose and to test together.
     """
     b, limits, share = baseline, baseline.policy.detection, baseline.problem.form_error
-    beyond = _beyond(b, "unseen")
+    beyond = beyond_noise(b, "unseen")
     if not share:
-        return _material(b, np.maximum(beyond, _beyond(b, "fit")), b.noise.std)
+        return material(b, np.maximum(beyond, beyond_noise(b, "fit")), b.noise.std)
     form = np.maximum(share * signal_size(b.problem), TINY)
     noises = b.hypothesis.rms(b.problem, "unseen") / (limits.open_form_noises * b.noise.std)
     large = float(np.max(np.minimum(beyond / form, noises)))
     if could_be_form(b, likeness) and not sets_in:
         return large
-    return max(large, _material(b, beyond, b.noise.std))
+    return max(large, material(b, beyond, b.noise.std))
 
 
 def importance_as_noise(baseline: Baseline) -> float:
@@ -40,11 +40,11 @@ def importance_as_noise(baseline: Baseline) -> float:
     for a single output, noise may be larger than its white part, so that only a share of the signal matters.
     """
     b, unsaid = baseline, ~baseline.noise.declared
-    beyond = np.maximum(_beyond(b, "unseen"), _beyond(b, "fit"))
+    beyond = np.maximum(beyond_noise(b, "unseen"), beyond_noise(b, "fit"))
     several = b.seen_by_several(b.hypothesis)
     if several is None:
-        return _material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
-    return _material(b, beyond if several else np.where(unsaid, 0.0, beyond), b.noise.std)
+        return material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
+    return material(b, beyond if several else np.where(unsaid, 0.0, beyond), b.noise.std)
 
 
 def could_be_form(baseline: Baseline, likeness: float) -> bool:
@@ -58,7 +58,7 @@ def signal_size(problem: Problem) -> Array:
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
-def _beyond(b: Baseline, part: Part) -> Array:
+def beyond_noise(b: Baseline, part: Part) -> Array:
     """Rms (n_y,) of the calibrated FMU's residual on a part, beyond noise and its chance scatter."""
     residual = b.hypothesis.of(b.problem, part)
     chance = 1 + b.policy.detection.chance * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
@@ -66,7 +66,7 @@ def _beyond(b: Baseline, part: Part) -> Array:
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
-def _material(b: Baseline, beyond: Array, noise: Array) -> float:
+def material(b: Baseline, beyond: Array, noise: Array) -> float:
     """Size beyond noise (n_y,) over the smallest size that matters; noise: (n_y,) standard deviations."""
     limits = b.policy.detection
     lowest = np.minimum(limits.signal_share * signal_size(b.problem), limits.noise_share * noise)

@@ -41,9 +41,22 @@ def becomes(h: Hypothesis, other: Hypothesis) -> bool:
 
 def _member_by_member(candidates: Sequence[Candidate], others: Sequence[Candidate]) -> bool:
     pairs = list(zip(candidates, others, strict=True))
-    same = [a.label == b.label for a, b in pairs]
-    simpler = [a.location == b.location and b.kind in limits(a.kind) for a, b in pairs]
-    return any(simpler) and all(x or y for x, y in zip(same, simpler, strict=True))
+    return any(_simpler(a, b) for a, b in pairs) and all(_same_or_simpler(a, b) for a, b in pairs)
+
+
+def _simpler(a: Candidate, b: Candidate) -> bool:
+    return a.location == b.location and b.kind in limits(a.kind)
+
+
+def _same_or_simpler(a: Candidate, b: Candidate) -> bool:
+    return a.label == b.label or _simpler(a, b)
+
+
+def extends(h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether h has all effects of `other`, or laws with these as limits, and at least one more."""
+    if len(h.candidates) <= len(other.candidates):
+        return False
+    return all(any(_same_or_simpler(a, b) for a in h.candidates) for b in other.candidates)
 
 
 def reversal(kind: str, other: str) -> bool:
