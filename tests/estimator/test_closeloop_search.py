@@ -31,7 +31,7 @@ from estimator.closeloop.screening.regressors import Calibration
 from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.screening.smoothing import WALKS, _first_guess, smooth
 from estimator.closeloop.search import search
-from estimator.closeloop.search.lookalikes import lookalikes
+from estimator.closeloop.search.lookalikes import lookalikes, over_the_same
 from estimator.closeloop.search.nomination import overlooked
 from estimator.closeloop.search.onset import ONSET_BLOCKS, onset
 from estimator.closeloop.search.simpler import from_the_start, in_groups
@@ -312,6 +312,26 @@ def test_a_law_that_looks_like_the_best_one_starts_where_that_one_is(seed, ratio
     assert pair.candidates == (far, alike)
     done = replace(stuck, fit=replace(fit, unknowns=alike.unknowns))  # as good as the best one
     assert lookalikes(screening, calibration, [found[0], done], change) == []
+
+
+def test_in_a_pair_each_law_is_replaced_by_those_over_its_motion_at_its_place():
+    rng = np.random.default_rng(1)
+    kinds = (("coulomb_friction", "a"), ("stribeck_friction", "a"), ("cubic_stiffness", "a"))
+    friction, richer, stiff = (candidate(k, at) for k, at in kinds)
+    elsewhere, step = candidate("stribeck_friction", "b"), candidate("parameter_step", "mu0")
+    every = [friction, richer, stiff, elsewhere, step]
+    columns = dict(zip((c.label for c in every), rng.standard_normal((5, 400)), strict=True))
+    columns[richer.label] = 2 * columns[friction.label]
+    change = [(c, columns[c.label][:, None]) for c in every]
+    own = (*step.unknowns, *friction.unknowns)
+    fit = replace(nothing_calibrated(np.ones(400)), unknowns=own, values=np.array([3.0, 7.0]))
+    h, nothing = Hypothesis((step, friction), fit, ()), Calibration(np.zeros((400, 0)))
+    [promise] = over_the_same(Columns(columns), nothing, h, change)
+    assert promise.candidates == (step, richer)
+    assert promise.start[richer.amplitudes[0].name] == pytest.approx(3.5)
+    assert promise.start[step.amplitudes[0].name] == 3.0
+    alone = replace(fit, unknowns=step.unknowns, values=np.array([3.0]))
+    assert over_the_same(Columns(columns), nothing, Hypothesis((step,), alone, ()), change) == []
 
 
 def test_at_another_place_a_law_is_looked_at_in_the_shape_that_it_has():

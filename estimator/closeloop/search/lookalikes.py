@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from estimator.closeloop.decision.law_form import motion, over_what
+from estimator.closeloop.decision.law_form import over_what
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import Promise, distinct, key
@@ -53,19 +53,20 @@ def lookalikes(
 def over_the_same(
     screening: Screening, calibration: Calibration, h: Hypothesis, change: Changes
 ) -> list[Promise]:
-    """Promises of other laws over the motion of a single law, at the same place, the most similar first.
+    """Promises of h with one of its laws replaced by another law over the same motion, most similar first.
 
-    Otherwise as `lookalikes`. Empty if the effect is not a law over a velocity or displacement.
+    Otherwise as `lookalikes`. Empty if no effect is a law over a velocity or displacement.
     """
-    [c], (location, over) = h.candidates, motion(h)
-    if not over:
-        return []
-    response = _response(screening, calibration, _shaped(c, _shape(c, h.theta)), h.theta)
-    promises = []
-    for other, g in change:
-        if other.location == location and other.kind != c.kind and over_what(other) == over:
-            missed, start = _nearest(other, calibration.without(g), response)
-            promises.append(Promise((other,), -missed, {**h.theta, **start}))
+    promises: list[Promise] = []
+    for i, c in enumerate(h.candidates):
+        if not (over := over_what(c)):
+            continue
+        response = _response(screening, calibration, _shaped(c, _shape(c, h.theta)), h.theta)
+        for other, g in change:
+            if other.location == c.location and other.kind != c.kind and over_what(other) == over:
+                missed, start = _nearest(other, calibration.without(g), response)
+                laws = (*h.candidates[:i], other, *h.candidates[i + 1 :])
+                promises.append(Promise(laws, -missed, {**h.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
     return distinct(promises)[: screening.problem.policy.search.lookalikes]
 

@@ -228,7 +228,8 @@ class Search:
     def _replaced(self, found: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Hypotheses ranked, with simpler and similar laws fitted in place of those of the best one.
 
-        If the noise is declared, this is done only if the best hypothesis explains the residual.
+        If the noise is declared, this is done only if the best hypothesis explains the residual. Of a pair
+        that does not, the laws over the same motions are fitted, as `instead` does for single effects.
         """
         s = self.screened
         found = self._form.ranked(best_by_label(found))
@@ -238,11 +239,15 @@ class Search:
         every = [c for c, _ in change]
         if whole := self.fitter.finished(in_groups(found, every)):
             found = self._form.ranked(best_by_label([*found, *whole]))
-        if s.baseline.noise.known and not s.explained(found[:1]):
+        calibration = Calibration.of(s.fit)
+        if not s.baseline.noise.known or s.explained(found[:1]):
+            leading = found[: s.problem.policy.search.finalists]
+            promises = [*simpler(found, every), *from_the_start(leading, every)]
+            promises += lookalikes(s.screening, calibration, found, change)
+        elif len(found[0].candidates) > 1:
+            promises = over_the_same(s.screening, calibration, found[0], change)
+        else:
             return found
-        leading = found[: s.problem.policy.search.finalists]
-        promises = [*simpler(found, every), *from_the_start(leading, every)]
-        promises += lookalikes(s.screening, Calibration.of(s.fit), found, change)
         more = self.fitter.finished(distinct(promises))
         return self._form.ranked(best_by_label([*found, *more]))
 
