@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.decision.law_form import (
@@ -15,6 +16,7 @@ from estimator.closeloop.decision.law_form import (
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.evidence import Judgement
 from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.progress import Progress
@@ -104,11 +106,31 @@ def test_a_law_that_is_near_is_not_named(builder, resistance, kind, over, seed):
     assert f"best fit: {kind}@carriage" in told.reason
 
 
-def test_it_is_not_asked_where_what_is_left_is_no_measure(builder):
-    traced = asked(builder, root(60.0, 120.0), "coulomb_friction", 1)
-    o = traced.found
-    noise = replace(o.baseline.noise, declared=np.array([True, False]))
-    assert confirmed(replace(o.baseline, noise=noise), o.judgement, o.forces) is o.judgement
+@pytest.mark.parametrize(
+    ("resistance", "kind", "slow", "told"),
+    [
+        (coulomb(40.0), "coulomb_friction", 0.0, "traced"),
+        (coulomb(40.0), "coulomb_friction", 3.0, "traced"),
+        (cubic(3e3), "cubic_stiffness", 0.0, "traced"),
+        (cubic(3e3), "cubic_stiffness", 3.0, "traced"),
+        (root(80.0, 80.0), "coulomb_friction", 0.0, "unexplained"),
+        (root(80.0, 80.0), "coulomb_friction", 3.0, "traced"),  # of which noise hides the difference
+        (root(60.0, 120.0), "coulomb_friction", 0.0, "unexplained"),
+        (root(60.0, 120.0), "coulomb_friction", 3.0, "unexplained"),
+    ],
+)
+def test_noise_that_is_not_declared_is_no_law_and_hides_none(builder, resistance, kind, told, slow):
+    """slow: size of noise over ten samples, over that of the white noise."""
+    made = record(to_and_fro(2.0), resistance, 1)
+    [run] = made.runs
+    white = np.random.default_rng(2).standard_normal(run.y.shape)
+    more = slow * made.noise_std * lfilter([1.0], [1.0, -0.9], white, axis=0) * np.sqrt(1 - 0.9**2)
+    made = replace(made, runs=(replace(run, y=run.y + more),), noise_std=np.full(2, np.nan))
+    o = looked_at("one", problem(builder, made), (kind,)).found
+    noise = noise_of_best(o.baseline, [o.singles])
+    base, [[best]] = reweighted(Fitter(o.baseline), [o.singles], noise)
+    b = replace(o.baseline, hypothesis=base, noise=noise)
+    assert confirmed(b, judged("traced", (best,)), o.forces).verdict == told
 
 
 @pytest.mark.parametrize(("truth", "told"), [(coulomb(40.0), "traced"), (root(60.0, 120.0), "unexplained")])

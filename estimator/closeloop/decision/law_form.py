@@ -8,6 +8,7 @@ import numpy as np
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.decision.verdict import no_law
 from estimator.closeloop.evidence import Check, Judgement, Name
+from estimator.closeloop.fitting.reweighted import over_white_noise
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
@@ -24,19 +25,17 @@ def confirmed(baseline: Baseline, judgement: Judgement, forces: Sequence[Missing
     """The judgement after the test that the force follows the law of the best member.
 
     If the best member fails, the members that pass stay in the answer. For a single law they stay only if
-    one of them is a law over the same motion; otherwise the verdict is `unexplained`. The test is made only
-    if noise is declared, since the residual has no reference otherwise.
+    one of them is a law over the same motion; otherwise the verdict is `unexplained`.
     """
-    if not judgement.members or not baseline.noise.known:
+    if not judgement.members:
         return judgement
     best, *others = judgement.members
     check = _follows(baseline, best, forces)
     if check.passed:
         return replace(judgement, checks=(*judgement.checks, check))
     rest = [m for m in others if _follows(baseline, m, forces).passed]
-    if len(best.candidates) == 1 and not any(motion(m) == motion(best) for m in rest):
-        rest = []
-    if rest:
+    same = len(best.candidates) > 1 or any(motion(m) == motion(best) for m in rest)
+    if rest and same:
         return Judgement.naming(rest).after(judgement.checks)
     wrong = doubted(baseline, best, forces)
     return no_law(best, wrong[0] if wrong else None, check).after(judgement.checks)
@@ -47,8 +46,9 @@ def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) 
     wrong = doubted(baseline, h, forces)
     if wrong or len(h.candidates) > 1:
         return Check.most(FORCE_FOLLOWS, len(wrong), 0)
-    own, elsewhere = curvature(baseline, h, forces)
-    return Check.most(FORCE_FOLLOWS, own, form_of(baseline).curve_limit(h, elsewhere))
+    white, left = over_white_noise(baseline, h)
+    own, elsewhere = curvature(white, left, forces)
+    return Check.most(FORCE_FOLLOWS, own, form_of(white).curve_limit(left, elsewhere))
 
 
 def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:

@@ -71,6 +71,19 @@ def rescaled(
     return moved
 
 
+def over_white_noise(baseline: Baseline, h: Hypothesis) -> tuple[Baseline, Hypothesis]:
+    """The baseline and h in units of the white noise if noise is not declared, else as they are.
+
+    In weights from the residual of h itself, h leaves only noise, whatever it leaves.
+    """
+    noise = baseline.noise
+    if noise.known:
+        return baseline, h
+    white, stretches = Weighting.white(noise.std), baseline.problem.record.stretches("fit")
+    base, left = rescaled([baseline.hypothesis, h], noise.weighting, white, stretches)
+    return replace(baseline, hypothesis=base, noise=replace(noise, weighting=white)), left
+
+
 def _calibrated_again(problem: Problem, base: Hypothesis, weighting: Weighting) -> Hypothesis:
     found = fit(problem, base.fit.unknowns, weighting, base.fit.theta)
     return Hypothesis((), found, tuple(problem.residuals(found.theta)))

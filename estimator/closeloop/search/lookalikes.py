@@ -28,11 +28,11 @@ def lookalikes(
     """Promises of the best of `found`, best first, with one of its laws replaced by a similar one.
 
     calibration: of the screening's fit; change: of the candidates that may replace a law. Candidates that
-    were already fitted nearly as well are left out. The gain of a promise is negative: minus the sum of
-    squares by which the replacement misses the law's response.
+    were fitted until convergence and nearly as well are left out. The gain of a promise is negative: minus
+    the sum of squares by which the replacement misses the law's response.
     """
     best, limits = found[0], screening.problem.policy.search
-    known = {h.key for h in found if cost(h) < limits.lookalike_worse * cost(best)}
+    known = {h.key for h in found if h.fit.converged and cost(h) < limits.lookalike_worse * cost(best)}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):
         if c.is_fault:
