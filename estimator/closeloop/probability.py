@@ -24,21 +24,20 @@ compensates or which is weak, or the form of a right model, is told by its size 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import comb
 
 import numpy as np
 from scipy.special import logsumexp
 
 from estimator.closeloop.detection.detect import Detection
-from estimator.closeloop.detection.importance import TINY, beyond_noise, material
+from estimator.closeloop.detection.importance import TINY
 from estimator.closeloop.evidence import Judgement, refuted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import becomes, extends, includes
-from estimator.closeloop.size_odds import WHOLE, odds_by_size
+from estimator.closeloop.size_odds import WHOLE, calls_for_more, odds_by_size
 from estimator.record import Array
 
 NO_DISCREPANCY = "no_discrepancy"
@@ -197,7 +196,7 @@ def _price(h: Hypothesis, most: float) -> float:
 
 def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
     """Log likelihood of h minus that of the best one, over the dispersion of what the best one leaves."""
-    if _rest_is_form(baseline, best, h):
+    if extends(best, h) and not calls_for_more(baseline, h):
         return 0.0
     lead = apart = scatter = 0.0
     for part in ("fit", "choose"):
@@ -208,18 +207,6 @@ def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
         apart += float(np.sum(difference**2))
         scatter += float(np.sum(np.square(along)))
     return -lead * min(1.0, apart / scatter) if scatter > 0 else -lead
-
-
-def _rest_is_form(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> bool:
-    """Whether the best one is h with a further effect, which does no more than an open form may always do.
-
-    What h leaves would then not matter if it were the residual of a record without effects.
-    """
-    if not baseline.problem.form_error or not extends(best, h):
-        return False
-    b = replace(baseline, hypothesis=h)
-    left = np.maximum(beyond_noise(b, "fit"), beyond_noise(b, "choose"))
-    return material(b, left, b.noise.std) < 1.0
 
 
 def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:

@@ -1,16 +1,31 @@
-"""How much more probable an effect makes the size of a residual than the form of a right model does."""
+"""What the size of a residual says: whether it would matter alone, and how probable an effect makes it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from estimator.closeloop.detection.importance import TINY, signal_size
+from estimator.closeloop.detection.importance import TINY, beyond_noise, material, signal_size
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Part
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
 
 WHOLE: tuple[Part, ...] = ("fit", "unseen")  # the whole record
 SIZES = 2001  # points of the grid of sizes that a residual may have
 LEAST = 1e-6  # of a signal, the smallest size of that grid: no logger resolves less
+
+
+def calls_for_more(baseline: Baseline, h: Hypothesis) -> bool:
+    """Whether what h leaves may be of a further effect, on the parts to identify and to choose.
+
+    An open form always leaves something. Beside it, a further effect is only looked for in what would matter
+    if it were the residual of a record without effects.
+    """
+    if not baseline.problem.form_error:
+        return True
+    b = replace(baseline, hypothesis=h)
+    left = np.maximum(beyond_noise(b, "fit"), beyond_noise(b, "choose"))
+    return material(b, left, b.noise.std) >= 1.0
 
 
 def odds_by_size(baseline: Baseline) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,13 +19,13 @@ from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
 from estimator.closeloop.policy import DEFAULT
-from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
 from estimator.closeloop.search.pairs import beside, try_pairs, with_worth
-from estimator.record import Run
+from estimator.record import Record, Run
 from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
 from fmus.export.builders.hypotheses import ModelBuilder
@@ -129,16 +130,17 @@ class Seen:
 
 
 @pytest.mark.parametrize(
-    ("second", "least", "asked"),
+    ("second", "form", "asked"),
     [
         (0.0, 0.0, []),
         (4.0, 0.0, []),
         (12.0, 0.0, []),
         (20.0, 0.0, ["viscous_damping@roller"]),
-        (20.0, 0.99, []),
+        (20.0, 0.02, []),  # a third of the noise: another form leaves as much
+        (50.0, 0.02, ["viscous_damping@roller"]),
     ],
 )
-def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, least, asked):
+def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, form, asked):
     rng = np.random.default_rng(3)
     laws = [one(kind, at) for kind in ("viscous_damping", "cubic_stiffness") for at in ("wheel", "roller")]
     change = [(c, rng.standard_normal((4000, 1))) for c in laws]
@@ -146,12 +148,16 @@ def test_a_second_effect_is_asked_for_where_the_residual_is_like_it(second, leas
     g = {c.label: column[:, 0] / np.linalg.norm(column) for c, column in change}
     residual = rng.standard_normal(4000) - second * g["viscous_damping@roller"]
     found = fit_with(best.unknowns, np.ones(1), np.eye(1), residual, change[0][1])
+    t, every = np.arange(4000.0), np.ones(4000, bool)
+    measured = 100 * np.sin(t)[:, None]
+    run = Run(t, measured[:, :0], measured, every, every, every)
+    made = Record((run,), (), ("y",), np.ones(1))
+    at = Problem(lambda _: Path(), made, {}, {}, form_error=form)
     fitted = []
     asking = SimpleNamespace(
-        baseline=baseline(SimpleNamespace(policy=DEFAULT)),
-        hypotheses=lambda promises, _: fitted.extend(promises) or [],
+        baseline=baseline(at), hypotheses=lambda promises, _: fitted.extend(promises) or []
     )
-    beside(asking, [Hypothesis((best,), found, ())], Seen(), change, least)
+    beside(asking, [Hypothesis((best,), found, (residual[:, None],))], Seen(), change)
     assert [p.candidates[1].label for p in fitted] == asked
     assert all(p.candidates[0] is best for p in fitted)
 
@@ -173,10 +179,10 @@ def test_a_second_effect_is_asked_for_beside_a_law_with_fewer_unknowns_than_the_
 
     promised = []
     asking = SimpleNamespace(
-        baseline=baseline(SimpleNamespace(policy=DEFAULT)),
+        baseline=baseline(SimpleNamespace(policy=DEFAULT, form_error=0.0)),
         hypotheses=lambda promises, _: promised.extend(promises) or [],
     )
-    beside(asking, [fitted(rich, 10.0), fitted(simple, 30.0)], Seen(), [(second, column)], 0.0)
+    beside(asking, [fitted(rich, 10.0), fitted(simple, 30.0)], Seen(), [(second, column)])
     labels = [[c.label for c in p.candidates] for p in promised]
     assert (["viscous_damping@wheel", "viscous_damping@roller"] in labels) is asked
 

@@ -196,10 +196,4 @@ class SearchPolicy:
         "a law with a smaller error is similar in any case, because noise could hide the difference",
         CHALLENGE,
     )
-    lookalike_worse: float = limit(
-        1.5,
-        "times the best sum of squares",
-        "a similar law whose fit is worse than this is fitted again from the best law's values",
-        CHALLENGE,
-    )
     lookalikes: int = limit(3, "laws", "laws similar to the best one that are fitted in its place", CHALLENGE)

@@ -27,12 +27,12 @@ def lookalikes(
 ) -> list[Promise]:
     """Promises of the best of `found`, best first, with one of its laws replaced by a similar one.
 
-    calibration: of the screening's fit; change: of the candidates that may replace a law. Candidates that
-    were fitted until convergence and nearly as well are left out. The gain of a promise is negative: minus
-    the sum of squares by which the replacement misses the law's response.
+    calibration: of the screening's fit; change: of the candidates that may replace a law. The gain of a
+    promise is negative: minus the sum of squares by which the replacement misses the law's response. Those
+    that were fitted as well as this promises, to within what noise could hide, are left out.
     """
     best, limits = found[0], screening.problem.policy.search
-    known = {h.key for h in found if h.fit.converged and cost(h) < limits.lookalike_worse * cost(best)}
+    reached = {h.key: cost(h) - cost(best) for h in found}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):
         if c.is_fault:
@@ -41,10 +41,10 @@ def lookalikes(
         response = _response(screening, calibration, fitted, best.theta)
         for other, g in _others(screening, fitted, change):
             laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
-            if key(laws) in known:
-                continue
             missed, start = _nearest(other, calibration.without(g), response)
-            if missed < max(limits.lookalike_squares, limits.lookalike**2 * float(response @ response)):
+            arrived = reached.get(key(laws), np.inf) < missed + limits.lookalike_squares
+            alike = max(limits.lookalike_squares, limits.lookalike**2 * float(response @ response))
+            if missed < alike and not arrived:
                 promises.append(Promise(laws, -missed, {**best.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
     return distinct(promises)[: screening.problem.policy.search.lookalikes]

@@ -24,6 +24,7 @@ from estimator.closeloop.screening.grouped import grouped_fit
 from estimator.closeloop.screening.missing_force import missing_forces
 from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.search.dating import dated
+from estimator.closeloop.size_odds import calls_for_more
 from estimator.record import Array
 
 QUICK = 3e6  # candidates times samples up to which every leading effect is built in and screened again
@@ -80,24 +81,23 @@ def _worth(h: Hypothesis, least: Mapping[str, float]) -> dict[str, float]:
 
 
 def beside(
-    fitter: Fitter, found: Sequence[Hypothesis], screening: Screening, change: Changes, least: float
+    fitter: Fitter, found: Sequence[Hypothesis], screening: Screening, change: Changes
 ) -> list[Hypothesis]:
     """Fitted pairs of a hypothesis that explains and a second effect, whose members are both needed.
 
     found: those that explain, best first. Beside the best one, those with fewer unknowns are tried, since a
     law with more may have taken up what a second effect does; the pair must promise more than that law
     reaches. The second effect is nominated by the residual of the hypothesis. screening, change: of the base,
-    whose linearisation is accurate enough to see whether there is a second effect; least: share of the
-    remaining residual beyond noise that the second effect has to explain.
+    whose linearisation is accurate enough to see whether there is a second effect.
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
     best, outputs, promises = found[0], len(screening.weighting), list[Promise]()
     enough = limits.second_effect**2 * len(best.fit.residual) / outputs
     for h in found[: limits.finalists]:
-        if h is not best and len(h.own) >= len(best.own):
+        if (h is not best and len(h.own) >= len(best.own)) or not calls_for_more(baseline, h):
             continue
         fit = grouped_fit(h.fit, outputs, screening.group)
-        needed = max(enough, least * fit.beyond_noise, cost(h) - cost(best))
+        needed = max(enough, cost(h) - cost(best))
         promises += [p for p in _with(baseline.problem, h, fit, change) if p.gain > needed]
     pairs = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs)) if promises else []
     return [h for h in pairs if not baseline.idle(h)]

@@ -186,8 +186,7 @@ class Search:
         """Pairs of one effect that explains and a second effect; ones: those that do, best first."""
         s = self.screened
         self.tell("second", "looking for a second effect in the remaining residual")
-        least = 0.0 if self._form.exact else s.problem.policy.decision.most
-        return s.stages.done("beside", lambda: beside(self.fitter, ones, s.screening, self._in_pairs, least))
+        return s.stages.done("beside", lambda: beside(self.fitter, ones, s.screening, self._in_pairs))
 
     def _faults_first(self, chosen: Sequence[Promise]) -> tuple[list[Hypothesis], list[Promise]]:
         """Sensor faults that account for the residual, fitted to the end, and the candidates still to be
