@@ -190,10 +190,4 @@ class SearchPolicy:
         "a law that reproduces this response with a smaller error is similar to it",
         CHALLENGE,
     )
-    lookalike_squares: float = limit(
-        20.0,
-        "sum of squares, in units of the noise",
-        "a law with a smaller error is similar in any case, because noise could hide the difference",
-        CHALLENGE,
-    )
     lookalikes: int = limit(3, "laws", "laws similar to the best one that are fitted in its place", CHALLENGE)

@@ -28,10 +28,12 @@ def lookalikes(
     """Promises of the best of `found`, best first, with one of its laws replaced by a similar one.
 
     calibration: of the screening's fit; change: of the candidates that may replace a law. The gain of a
-    promise is negative: minus the sum of squares by which the replacement misses the law's response. Those
-    that were fitted as well as this promises, to within what noise could hide, are left out.
+    promise is negative: minus the sum of squares by which the replacement misses the law's response. Similar
+    is what reproduces the response, and what the decision could not tell from the best one if its fit were as
+    good as that promises. Those that were fitted as well, to within what noise does, are left out.
     """
     best, limits = found[0], screening.problem.policy.search
+    decision = screening.problem.policy.decision
     reached = {h.key: cost(h) - cost(best) for h in found}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):
@@ -42,8 +44,9 @@ def lookalikes(
         for other, g in _others(screening, fitted, change):
             laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
             missed, start = _nearest(other, calibration.without(g), response)
-            arrived = reached.get(key(laws), np.inf) < missed + limits.lookalike_squares
-            alike = max(limits.lookalike_squares, limits.lookalike**2 * float(response @ response))
+            arrived = reached.get(key(laws), np.inf) < missed + decision.noticed
+            told = max(decision.noticed, decision.alike * cost(best))
+            alike = max(told, limits.lookalike**2 * float(response @ response))
             if missed < alike and not arrived:
                 promises.append(Promise(laws, -missed, {**best.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
