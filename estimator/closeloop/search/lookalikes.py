@@ -34,6 +34,7 @@ def lookalikes(
     """
     best, limits = found[0], screening.problem.policy.search
     decision = screening.problem.policy.decision
+    told = max(decision.noticed, decision.alike * cost(best))
     reached = {h.key: cost(h) - cost(best) for h in found}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):
@@ -41,16 +42,15 @@ def lookalikes(
             continue
         fitted = _shaped(c, _shape(c, best.theta))
         response = _response(screening, calibration, fitted, best.theta)
+        alike = max(told, limits.lookalike**2 * float(response @ response))
         for other, g in _others(screening, fitted, change):
             laws = (*best.candidates[:i], other, *best.candidates[i + 1 :])
             missed, start = _nearest(other, calibration.without(g), response)
             arrived = reached.get(key(laws), np.inf) < missed + decision.noticed
-            told = max(decision.noticed, decision.alike * cost(best))
-            alike = max(told, limits.lookalike**2 * float(response @ response))
             if missed < alike and not arrived:
                 promises.append(Promise(laws, -missed, {**best.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
-    return distinct(promises)[: screening.problem.policy.search.lookalikes]
+    return distinct(promises)[: limits.lookalikes]
 
 
 def over_the_same(
