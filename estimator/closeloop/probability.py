@@ -7,8 +7,8 @@ Four questions are answered one after the other, each with the prior of the poli
    with a prior that is worth one sample, narrowed by the bounds of the unknowns. Residuals that are not white
    noise of the stated size carry less evidence: log likelihoods are divided by the dispersion along the
    difference of two hypotheses (R. W. M. Wedderburn, Biometrika 61 (1974), 439-447). If the model form is
-   open, a second effect has no evidence where what the first one leaves would not matter in a record without
-   effects: the form always leaves as much.
+   open, two effects have no more evidence than the best single one, where what that leaves would not matter
+   in a record without effects: the form always leaves as much.
 2. An effect, or none? By the same criterion.
 3. The library, or a mechanism outside of it? The best answer leaves a share of the sum of squares that the
    calibrated FMU leaves beyond noise. A right answer leaves hardly any; a mechanism outside can leave any
@@ -34,10 +34,10 @@ from estimator.closeloop.detection.importance import TINY
 from estimator.closeloop.evidence import Judgement, refuted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import BLOCKS
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis
+from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise, distinct
-from estimator.closeloop.hypotheses.relations import becomes, extends, includes
-from estimator.closeloop.size_odds import WHOLE, calls_for_more, odds_by_size
+from estimator.closeloop.hypotheses.relations import becomes, includes
+from estimator.closeloop.size_odds import calls_for_more, odds_by_size
 from estimator.record import Array
 
 NO_DISCREPANCY = "no_discrepancy"
@@ -160,8 +160,13 @@ def more_probable(baseline: Baseline, h: Hypothesis, other: Hypothesis, kinds: i
 
 
 def _closest(baseline: Baseline, some: Sequence[Hypothesis]) -> Hypothesis:
-    """The hypothesis with the smallest sum of squares on the parts to identify and to choose."""
-    return min(some, key=lambda h: h.fit.cost - 2 * baseline.score(h))
+    """The hypothesis with the smallest sum of squares on the parts to identify and to choose.
+
+    It is a single effect where what the best of these leaves calls for no other.
+    """
+    ranked = sorted(some, key=lambda h: h.fit.cost - 2 * baseline.score(h))
+    alone = next((h for h in ranked if len(h.candidates) == 1), None)
+    return ranked[0] if alone is None or calls_for_more(baseline, alone) else alone
 
 
 def _one_of_its_size(baseline: Baseline, best: Hypothesis, h: Hypothesis, kinds: int) -> float:
@@ -195,9 +200,10 @@ def _price(h: Hypothesis, most: float) -> float:
 
 
 def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
-    """Log likelihood of h minus that of the best one, over the dispersion of what the best one leaves."""
-    if extends(best, h) and not calls_for_more(baseline, h):
-        return 0.0
+    """Log likelihood of h minus that of the best one, over the dispersion of what the best one leaves.
+
+    At most 0: where the best one calls for no other effect, what two effects fit better is no evidence.
+    """
     lead = apart = scatter = 0.0
     for part in ("fit", "choose"):
         one, other = (baseline.weighted(x, part) for x in (best, h))
@@ -206,7 +212,7 @@ def _evidence(baseline: Baseline, best: Hypothesis, h: Hypothesis) -> float:
         lead += float(np.sum(other**2) - np.sum(one**2)) / 2
         apart += float(np.sum(difference**2))
         scatter += float(np.sum(np.square(along)))
-    return -lead * min(1.0, apart / scatter) if scatter > 0 else -lead
+    return min(0.0, -lead * min(1.0, apart / scatter) if scatter > 0 else -lead)
 
 
 def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:

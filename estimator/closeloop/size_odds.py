@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from estimator.closeloop.detection.importance import TINY, beyond_noise, material, signal_size
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
+from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis
 
-WHOLE: tuple[Part, ...] = ("fit", "unseen")  # the whole record
 SIZES = 2001  # points of the grid of sizes that a residual may have
 LEAST = 1e-6  # of a signal, the smallest size of that grid: no logger resolves less
 
@@ -23,9 +20,8 @@ def calls_for_more(baseline: Baseline, h: Hypothesis) -> bool:
     """
     if not baseline.problem.form_error:
         return True
-    b = replace(baseline, hypothesis=h)
-    left = np.maximum(beyond_noise(b, "fit"), beyond_noise(b, "choose"))
-    return material(b, left, b.noise.std) >= 1.0
+    left = np.maximum(beyond_noise(baseline, h, "fit"), beyond_noise(baseline, h, "choose"))
+    return material(baseline, left, baseline.noise.std) >= 1.0
 
 
 def odds_by_size(baseline: Baseline) -> float:

@@ -573,3 +573,19 @@ def test_a_brief_fit_that_is_worse_than_without_its_effect_begins_there(mu, begi
     [found] = fitter.briefly([Promise((bias,), 0.0, {"mu": begin, "bias": 0.0})])
     assert cost(found) < 1.3 * len(t)
     assert found.theta["bias"] == pytest.approx(0.05, abs=0.005)
+
+
+@settings(deadline=None, max_examples=50)
+@given(seed=st.integers(0, 2**32 - 1), apart=st.floats(1e-5, 1.0), slow=st.integers(1, 50))
+def test_no_value_moves_by_more_errors_than_the_residual_by_units_of_noise(seed, apart, slow):
+    """However alike two unknowns are, and however correlated the residual that sizes their errors."""
+    rng = np.random.default_rng(seed)
+    first, second, change = rng.standard_normal((3, 600))
+    jacobian = np.column_stack([first, first + apart * second])
+    residual = np.convolve(rng.standard_normal(600 + slow - 1), np.ones(slow), "valid")
+    scale, width = np.ones(2), np.full(2, 2e3)
+    covariance = sandwich(residual, jacobian, scale, width)
+    unknowns = [Unknown(n, 0.0, -1e3, 1e3, 1.0) for n in "ab"]
+    found = fit_with(unknowns, np.zeros(2), covariance, residual, jacobian)
+    moved = np.abs(found.moved_by(change)) / np.sqrt(np.diag(covariance))
+    assert np.all(moved <= np.linalg.norm(change) * (1 + 1e-6))

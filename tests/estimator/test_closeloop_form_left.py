@@ -1,13 +1,20 @@
 """Errors that allow for what the form of the model lacks: they hold where effects nobody named act."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from estimator.closeloop.fitting.form_left import over_form
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
+from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.screening.changes import Screening
+from fmus.export.builders.hypotheses import ModelBuilder
+from tests.helpers.carriage import coulomb, looked_at, problem, record, to_and_fro
 
 SAMPLES, RESPONSES = 1000, 40
 UNKNOWNS = tuple(
@@ -86,3 +93,22 @@ def test_a_fit_without_unknowns_or_without_responses_stays_as_it_is():
     assert over_form(nothing, nothing, responses, declared=True, trusted=0.15) is nothing
     assert over_form(fit, fit, [], declared=True, trusted=0.15) is fit
     assert over_form(fit, fit, [0 * g for g in responses], declared=True, trusted=0.15) is fit
+
+
+def test_the_responses_to_laws_are_not_made_of_the_noise_in_the_residual(tmp_path):
+    """The motion that follows the record would be; that of the answer is nearly the true one without it."""
+    here = problem(ModelBuilder("drive", tmp_path), record(to_and_fro(), coulomb(30.0), 4))
+    o = looked_at("one", here, ("coulomb_friction",)).found
+    [h] = o.singles
+    rng = np.random.default_rng(5)
+    noisy = [replace(m, motion=m.motion + 0.1 * rng.standard_normal(m.motion.shape)) for m in o.forces]
+    found = []
+    for forces in (o.forces, noisy):
+        screening = Screening(here, o.base.fit, o.baseline.noise.weighting, forces)
+        courses = screening.courses_with(built(here, h.candidates), h.theta)
+        found.append((screening.changes(h.candidates)[0], screening.changes(h.candidates, courses)[0]))
+    (along_record, along_answer), (along_noise, still) = found
+    assert_array_equal(still, along_answer)
+    assert np.linalg.norm(along_noise - along_record) > 0.01 * np.linalg.norm(along_record)
+    alike = np.vdot(along_record, along_answer) / np.linalg.norm(along_record) / np.linalg.norm(along_answer)
+    assert alike > 0.9

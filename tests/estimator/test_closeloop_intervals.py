@@ -194,6 +194,30 @@ def test_steps_are_halved_until_no_unknown_moves_by_half_its_error(size):
 
 
 @dataclass(frozen=True)
+class Valley(Stiff):
+    """The same with unknowns that are hardly told from the slope, one of them by slow noise alone."""
+
+    def identify_residual(self, theta: Mapping[str, float]) -> Array:
+        [run] = self.record.runs
+        slow, fast = (run.t + 1e-3 * np.sin(w * run.t) for w in (9.0, 300.0))
+        noise = 0.05 * np.sin(np.outer(run.t, [13.0, 16.0, 19.0]) ** 1.1).sum(axis=1)
+        slope = theta["slope"] + self.error / self.steps.parts**2
+        line = slope * run.t + theta["slow"] * slow + theta["fast"] * fast
+        return (run.y.ravel() + noise - line)[:, None]
+
+
+def test_steps_that_hardly_move_the_residual_move_no_unknown():
+    """However alike the unknowns are, and however unlike the inflation of their errors."""
+    weighting = Weighting.white(SIZE)
+    unknowns = [Unknown(name, 0.3, -1e3, 1e3, 1.0) for name in ("slope", "slow", "fast")]
+    length = float(np.linalg.norm(Stiff(0.0).record.runs[0].t)) / SIZE[0]
+    problem = Valley(0.4 / length)  # the residual moves by 0.3 units of the noise
+    h = Hypothesis((), fit(problem, unknowns, weighting), ())
+    assert h.fit.inflation.max() > 2 * h.fit.inflation.min()
+    assert resolved(problem, [h], weighting).steps == problem.steps
+
+
+@dataclass(frozen=True)
 class Rarely(Stiff):
     """The same with an error of first order, also from how rarely the FMU is coupled."""
 

@@ -214,6 +214,18 @@ def test_an_open_form_takes_a_second_effect_that_would_not_matter_alone(form, si
     assert least <= complete <= named <= most
 
 
+def test_what_an_open_form_leaves_is_no_evidence_for_a_pair_by_any_name():
+    """Nor is it any against the best single effect beside others of which it is told."""
+    measured = np.random.default_rng(7).standard_normal(SAMPLES) + 30 * LAWS[2] + 0.6 * LAWS[6]
+    found = baseline(replace(asked(), form_error=0.05), fitted(measured), np.ones(1))
+    one, near, two = fitted(measured, 2), fitted(measured, 1), fitted(measured, 2, 6)
+    pair = replace(two, candidates=(replace(two.candidates[0], location="twin"), two.candidates[1]))
+    assert not completes(found, pair, one, LIBRARY)
+    said = probabilities(found, SEEN, judged("traced"), promised(measured), [one, near, pair])
+    assert said[one.label] > 0.9
+    assert said.get(near.label, 0.0) < 0.01
+
+
 def test_without_fits_the_screening_says_whether_there_is_an_effect():
     rng, early = np.random.default_rng(7), judged("no_discrepancy")
     quiet = rng.standard_normal(SAMPLES)

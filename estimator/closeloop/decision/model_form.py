@@ -113,7 +113,7 @@ class Closed(ModelForm):
     def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
         """See ModelForm; h is worse by more than a small error of form, or a limit that best outgrows."""
         b, limits = self.baseline, self.baseline.policy.decision
-        worse = cost(h) - cost(best) > max(limits.noticed, limits.alike * cost(best))
+        worse = cost(h) - cost(best) > limits.told(cost(best))
         large = b.lead(best, h)[0] >= limits.alike * -b.score(best)
         return (h.fit.converged and (worse or self.outgrown(h, best))) or (large and self.prefers(best, h))
 

@@ -7,7 +7,7 @@ must also be more than another form would leave, unless it is like an effect or 
 import numpy as np
 
 from estimator.closeloop.hypotheses.baseline import Baseline
-from estimator.closeloop.hypotheses.hypothesis import Part
+from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis, Part
 from estimator.closeloop.question.problem import Problem
 from estimator.record import Array
 
@@ -22,9 +22,9 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
     the parts to choose and to test together.
     """
     b, limits, share = baseline, baseline.policy.detection, baseline.problem.form_error
-    beyond = beyond_noise(b, "unseen")
+    beyond = beyond_noise(b, b.hypothesis, "unseen")
     if not share:
-        return material(b, np.maximum(beyond, beyond_noise(b, "fit")), b.noise.std)
+        return material(b, np.maximum(beyond, beyond_noise(b, b.hypothesis, "fit")), b.noise.std)
     form = np.maximum(share * signal_size(b.problem), TINY)
     noises = b.hypothesis.rms(b.problem, "unseen") / (limits.open_form_noises * b.noise.std)
     large = float(np.max(np.minimum(beyond / form, noises)))
@@ -40,7 +40,7 @@ def importance_as_noise(baseline: Baseline) -> float:
     for a single output, noise may be larger than its white part, so that only a share of the signal matters.
     """
     b, unsaid = baseline, ~baseline.noise.declared
-    beyond = np.maximum(beyond_noise(b, "unseen"), beyond_noise(b, "fit"))
+    beyond = np.maximum(*(beyond_noise(b, b.hypothesis, part) for part in WHOLE))
     several = b.seen_by_several(b.hypothesis)
     if several is None:
         return material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
@@ -58,9 +58,9 @@ def signal_size(problem: Problem) -> Array:
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
-def beyond_noise(b: Baseline, part: Part) -> Array:
-    """Rms (n_y,) of the calibrated FMU's residual on a part, beyond noise and its chance scatter."""
-    residual = b.hypothesis.of(b.problem, part)
+def beyond_noise(b: Baseline, h: Hypothesis, part: Part) -> Array:
+    """Rms (n_y,) of the residual of a hypothesis on a part, beyond noise and its chance scatter."""
+    residual = h.of(b.problem, part)
     chance = 1 + b.policy.detection.chance * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
     squares = np.mean(residual**2, axis=0) - chance * b.noise.std**2
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))

@@ -198,8 +198,7 @@ def _resolved(problem: Problem, h: Hypothesis, weighting: Weighting) -> Problem:
             if shorter.steps.parts > limits.parts_of_a_step:
                 break
             now = weighted(built(shorter, h.candidates), h.theta, weighting)
-            moved = h.fit.covariance @ (h.fit.jacobian.T @ (now - residual))
-            if np.all(np.abs(moved) <= limits.moved_by_steps * error):
+            if np.all(np.abs(h.fit.moved_by(now - residual)) <= limits.moved_by_steps * error):
                 break
             problem, residual = shorter, now
     return problem

@@ -14,6 +14,7 @@ from estimator.record import Array
 from fmus.aside import let_go
 
 Part = Literal["fit", "choose", "test", "unseen"]  # parts of a record, named as the masks of a Run
+WHOLE: tuple[Part, ...] = ("fit", "unseen")  # the whole record
 
 
 @dataclass(frozen=True, eq=False)

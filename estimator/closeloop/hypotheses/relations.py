@@ -52,13 +52,6 @@ def _same_or_simpler(a: Candidate, b: Candidate) -> bool:
     return a.label == b.label or _simpler(a, b)
 
 
-def extends(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether h has all effects of `other`, or laws with these as limits, and at least one more."""
-    if len(h.candidates) <= len(other.candidates):
-        return False
-    return all(any(_same_or_simpler(a, b) for a in h.candidates) for b in other.candidates)
-
-
 def reversal(kind: str, other: str) -> bool:
     """Whether two kinds are the same in a motion that keeps its sign, and differ where it turns round."""
     pairs = ((kind, other), (other, kind))

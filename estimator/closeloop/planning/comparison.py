@@ -73,7 +73,7 @@ class Test:
         """
         limits_, z = self.policy.decision, float(norm.ppf(self.power))
         score = max(limits_.alike * choose / 2, limits_.open_alike * form / 2)
-        squares = max(limits_.noticed, limits_.alike * fit) if not form else np.inf
+        squares = limits_.told(fit) if not form else np.inf
         chosen = max(2 * (limits_.telling + z), z + np.sqrt(z**2 + 2 * score))
         return float(z + np.sqrt(z**2 + squares)), float(chosen)
 

@@ -130,3 +130,8 @@ class DecisionPolicy:
         "p-value below which the estimates of several records differ, so that no common value is given",
         "convention, as the level of detection",
     )
+
+    def told(self, least: float) -> float:
+        """Sum of squares by which a hypothesis must be worse than the best one, whose is `least`, to be told
+        from it if the form is right."""
+        return max(self.noticed, self.alike * least)

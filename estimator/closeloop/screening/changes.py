@@ -70,18 +70,23 @@ class Screening:
         self._made: dict[str, Around] = {}
         self._local: tuple[Linearised, dict[str, Influence]] | None = None
 
-    def changes(self, candidates: Sequence[Candidate]) -> list[Array]:
-        """Change of the residual of `fit` by each candidate's amplitudes at their scales, (m, k) each."""
+    def changes(
+        self, candidates: Sequence[Candidate], courses: Mapping[str, Course] | None = None
+    ) -> list[Array]:
+        """Change of the residual of `fit` by each candidate's amplitudes at their scales, (m, k) each.
+
+        courses: by port, in place of those with the smoothed motion.
+        """
         physical = [c for c in candidates if not c.is_fault]
-        columns = self._columns(physical)
+        columns = self._columns(physical, self._courses if courses is None else courses)
         own = {c: set_aside(np.column_stack([next(columns) for _ in c.amplitudes])) for c in physical}
         own |= {c: set_aside(self._fault(c)) for c in candidates if c.is_fault}
         return [own[c] for c in candidates]
 
-    def _columns(self, physical: Sequence[Candidate]) -> Iterator[Array]:
+    def _columns(self, physical: Sequence[Candidate], courses: Mapping[str, Course]) -> Iterator[Array]:
         """Change of the residual by each amplitude, one candidate after the other, (m,) each."""
         levers = list(dict.fromkeys(name for c in physical for name in self._around(c).told))
-        moved = (change for c in physical for change in self._moved(c))
+        moved = (change for c in physical for change in self._moved(c, courses))
         at_once = TOGETHER // (8 * len(self.weighting) * len(self.samples))
         while some := list(islice(moved, min(max(1, at_once), CHANGES_AT_ONCE))):
             yield from self._answers(some, levers)
@@ -102,9 +107,9 @@ class Screening:
         """Length of the fitted run, s."""
         return float(self._free.t[-1])
 
-    def _moved(self, c: Candidate) -> list[dict[str, Array]]:
+    def _moved(self, c: Candidate, courses: Mapping[str, Course]) -> list[dict[str, Array]]:
         """Changes of the inputs and parameters of the FMU by each amplitude of a candidate."""
-        made, course = self._around(c), self._courses.get(c.location, self._free)
+        made, course = self._around(c), courses.get(c.location, self._free)
         return [shifts(made, course, {**c.given, u.name: u.scale}) for u in c.amplitudes]
 
     def _around(self, c: Candidate) -> Around:
@@ -129,8 +134,7 @@ class Screening:
         description = problem.builder.outside().description
         names = [*description.inputs, *description.parameters]
         plant, run, last = problem.plant, problem.record.runs[0], _last(problem)
-        motion = [name for p in problem.ports for name in p.motion]
-        [full, *_] = problem.simulate(theta, motion)
+        motion = self._motion(problem, theta)
         known = plant.fmu.description.variables
         start = {n: v.start or 0.0 for n, v in known.items()} | problem.start(theta)
         columns = {name: run.u[:last, j] for j, name in enumerate(plant.inputs)}
@@ -145,12 +149,23 @@ class Screening:
         t = run.t[:last] - run.t[0]
         speed = columns.get(SPEED, np.zeros(last))
         way = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
-        return Course(t[at], set_aside(full[at, len(plant.outputs) :]), given, way[at])
+        return Course(t[at], motion, given, way[at])
+
+    def _motion(self, problem: Problem, theta: Mapping[str, float]) -> Array:
+        """The motion of all ports in the simulation of the first run, see Course."""
+        names = [name for p in problem.ports for name in p.motion]
+        [full, *_] = problem.simulate(theta, names)
+        return set_aside(full[self.samples, len(problem.plant.outputs) :])
 
     @cached_property
     def _courses(self) -> dict[str, Course]:
         """For each port the course with the smoothed motion."""
         return {m.port.name: _along(self._free, m) for m in self.forces if m.motion is not None}
+
+    def courses_with(self, effects: Problem, theta: Mapping[str, float]) -> dict[str, Course]:
+        """The same with the simulated motion of the FMU with effects, in which there is no noise."""
+        course = replace(self._free, motion=self._motion(effects, theta))
+        return dict.fromkeys(self._courses, course)
 
     @cached_property
     def _states(self) -> Array | None:

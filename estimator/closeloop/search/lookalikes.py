@@ -34,7 +34,7 @@ def lookalikes(
     """
     best, limits = found[0], screening.problem.policy.search
     decision = screening.problem.policy.decision
-    told = max(decision.noticed, decision.alike * cost(best))
+    told = decision.told(cost(best))
     reached = {h.key: cost(h) - cost(best) for h in found}
     promises: list[Promise] = []
     for i, c in enumerate(best.candidates):

@@ -15,7 +15,7 @@ from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit, loose
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
-from estimator.closeloop.hypotheses.promise import Promise
+from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.hypotheses.twins import Twins
 from estimator.closeloop.progress import Progress
 from estimator.closeloop.question.problem import Problem
@@ -90,14 +90,18 @@ class Screened:
     def over_form(self, h: Hypothesis) -> Hypothesis:
         """The hypothesis with errors that allow for what the form lacks, see `form_left`.
 
-        They stay as they are where the screening cannot be weighted as the hypothesis is.
+        They stay as they are where the screening cannot be weighted as the hypothesis is. Laws are evaluated
+        along its motion: along one that follows the record they would be made of the noise in the residual.
         """
-        first: dict[str, Array] = {}
+        first: dict[str, tuple[Candidate, Array]] = {}
         for c, g in self.change:
             if not c.is_fault:
-                first.setdefault(c.label, g)
+                first.setdefault(c.label, (c, g))
+        courses = self.screening.courses_with(built(self.problem, h.candidates), h.theta)
+        laws = [c for c, _ in first.values() if c.location in courses]
+        along = dict(zip(laws, self.screening.changes(laws, courses), strict=True))
         noise = self.baseline.noise
-        responses = [self.screening.weighted_as(noise.weighting, g) for g in first.values()]
+        responses = [self.screening.weighted_as(noise.weighting, along.get(c, g)) for c, g in first.values()]
         known = [g for g in responses if g is not None]
         seen = grouped_fit(h.fit, len(noise.std), self.screening.group)
         trusted = self.problem.policy.interval.bent
