@@ -32,6 +32,7 @@ from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Unknown
 from estimator.closeloop.search.profiles import finer
 from estimator.closeloop.search.screened import Screened
+from estimator.noise import Noise
 from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array, Run
 from estimator.weighting import Weighting
@@ -308,12 +309,17 @@ class Joining(Stiff):
         return run.y - (theta["slope"] + error) * run.t[:, None]
 
 
+def noise_of(unit: Array) -> Noise:
+    """Noise of the usual size; unit: (n_y,) of residuals, another one where it is not declared."""
+    return Noise(SIZE, Weighting.white(unit), unit == SIZE)
+
+
 def hold(problem: Joining) -> bool:
     """Whether steps over several samples hold on the record of a problem, once it is fitted in them."""
-    weighting, joined = Weighting.white(SIZE), in_long_steps(problem)
+    noise, joined = noise_of(SIZE), in_long_steps(problem)
     assert (joined.steps, joined.searched) == (JOINED, JOINED)
-    found = fit(joined, [Unknown("slope", 1.0, -10.0, 10.0, 1.0)], weighting)
-    return long_steps_hold(joined, Hypothesis((), found, ()), weighting)
+    found = fit(joined, [Unknown("slope", 1.0, -10.0, 10.0, 1.0)], noise.weighting)
+    return long_steps_hold(joined, Hypothesis((), found, ()), noise)
 
 
 def test_an_fmu_that_cannot_join_samples_keeps_its_steps():
@@ -366,15 +372,17 @@ def test_steps_go_over_several_samples_unless_the_record_was_clearly_made_with_h
 
 
 @pytest.mark.parametrize("recorded", [True, False])
-def test_what_a_model_lacks_does_not_decide_about_the_steps_but_its_answer_does(recorded):
+@pytest.mark.parametrize("unit", [1.0, 16.0])  # of residuals, in noises: 1, or their own size
+def test_what_a_model_lacks_does_not_decide_about_the_steps_but_its_answer_does(recorded, unit):
     """What is lacking looks as if inputs were held, and is much larger than what these make."""
     problem = in_long_steps(Interpolating(0.0, size=30.0, recorded=recorded, lacking=10.0))
-    fitter, weighting = Refitter(baseline(problem, noise=SIZE)), Weighting.white(SIZE)
+    noise = noise_of(unit * SIZE)
+    fitter, weighting = Refitter(replace(baseline(problem), noise=noise)), noise.weighting
     c = Candidate("viscous_damping", "here", (Unknown("slope", 1.0, -10.0, 10.0, 1.0),))
     without, found = (
         Hypothesis(some, fit(built(problem, some), c.unknowns, weighting), ()) for some in ((), (c,))
     )
-    assert long_steps_hold(problem, without, weighting)
+    assert long_steps_hold(problem, without, noise)
     assert in_fine_steps(fitter, [without]).steps == JOINED
     assert in_fine_steps(fitter, [found]).steps == (JOINED if recorded else USUAL)
 

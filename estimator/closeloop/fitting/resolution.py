@@ -23,6 +23,7 @@ from estimator.closeloop.hypotheses.fitted import relaxed
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
+from estimator.noise import Noise
 from estimator.plant import JOINED, USUAL, Steps
 from estimator.record import Array
 from estimator.weighting import Weighting
@@ -42,17 +43,17 @@ def in_long_steps(problem: Problem) -> Problem:
     return replace(problem, steps=few, searched=few)
 
 
-def long_steps_hold(long: Problem, base: Hypothesis, weighting: Weighting) -> bool:
+def long_steps_hold(long: Problem, base: Hypothesis, noise: Noise) -> bool:
     """Whether such steps are exact on a record, and what is left does not come from them.
 
     base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
     it is long, whatever the slopes of the unknown are. How long it is, shorter steps show.
     """
     shorter = in_halved_steps(long) if long.steps.joined else long.in_steps(USUAL)
-    here, there = (weighted(p, base.theta, weighting) for p in (long, shorter))
+    here, there = (weighted(p, base.theta, noise.weighting) for p in (long, shorter))
     if not float(np.linalg.norm(here - there)) <= long.policy.search.moved_by_steps:
         return False
-    return not inputs_held(long, base, weighting)
+    return not inputs_held(long, base, noise)
 
 
 def in_settled_steps(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Problem | None:
@@ -87,18 +88,22 @@ def coupled_more_often(problem: Problem) -> Problem:
 SHORTEN = (coupled_more_often, in_halved_steps)
 
 
-def inputs_held(problem: Problem, h: Hypothesis, weighting: Weighting) -> bool:
+def inputs_held(problem: Problem, h: Hypothesis, noise: Noise) -> bool:
     """Whether a record says that its inputs were held over a sample, where steps take them as continuous.
 
     It then fits better in steps of one sample, by more than chance; how well it would after another fit
     follows from the slopes of this one. As what a hypothesis lacks may look like held inputs, these must also
     be most of what it leaves beyond noise. Else a hypothesis that leaves less can tell. problem: with the
-    effects of h, which was fitted in its steps.
+    effects of h, which was fitted in its steps. Residuals count in units of the noise, also where weights are
+    not, as noise is not declared.
     """
     policy, as_held = problem.policy, problem.in_steps(problem.steps.held)
     if as_held.steps == problem.steps:
         return False
-    here, held = (relaxed(h.fit, weighted(p, h.theta, weighting)) for p in (problem, as_held))
+    stretches, weighting = problem.record.stretches("fit"), noise.weighting
+    left = (relaxed(h.fit, weighted(p, h.theta, weighting)) for p in (problem, as_held))
+    outputs = (weighting.back(r.reshape(-1, len(weighting)), stretches) for r in left)
+    here, held = (noise.floor.of(r, stretches).ravel() for r in outputs)
     apart, gained = float(np.linalg.norm(held - here)), float(here @ here - held @ held)
     beyond = float(here @ here) - len(here) - policy.detection.chance * np.sqrt(2 * len(here))
     return gained / 2 > policy.decision.telling * apart and gained > policy.decision.most * beyond
@@ -150,9 +155,9 @@ def in_fine_steps(fitter: Fitter, some: Sequence[Hypothesis]) -> Problem:
     right, the best hypothesis fits worse in fine ones; if the fine ones are right, the difference of its
     residuals only adds the noise along it.
     """
-    before, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
-    best = min(some, key=cost)
-    if inputs_held(built(before, best.candidates), best, weighting):
+    before, noise = fitter.baseline.problem, fitter.baseline.noise
+    best, weighting = min(some, key=cost), noise.weighting
+    if inputs_held(built(before, best.candidates), best, noise):
         fitter = fitter.asked(before.in_steps(before.steps.held))
         before, best = fitter.baseline.problem, in_divided_steps(fitter, best)
     elif before.steps.joined:

@@ -16,7 +16,7 @@ def in_its_steps(problem: Problem, tell: Progress, stages: Stages) -> Calibrated
     long = in_long_steps(problem)
     found = _with_its_inputs(long, tell, stages)
     there, _, base, noise = found
-    if long is problem or long_steps_hold(there, base, noise.weighting):
+    if long is problem or long_steps_hold(there, base, noise):
         return _settled(found, tell, stages)
     tell("steps", "calibrating in shorter steps")
     return _settled(_with_its_inputs(problem, tell, stages.under("held")), tell, stages)
