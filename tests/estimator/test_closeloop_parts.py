@@ -280,3 +280,18 @@ def test_a_short_delay_is_followed_at_any_sampling_rate(drive: ForeignBuilder, r
     moved = shifts(made, course, {**named, **on, delay: 0.03})["F"]
     settled = t > 1
     assert_allclose(moved[settled], (np.sin(t - 0.03) - np.sin(t))[settled], atol=2e-3)
+
+
+@pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
+def test_a_mode_far_above_the_motion_is_a_mass_at_any_sampling_rate(
+    drive: ForeignBuilder, rate: float
+) -> None:
+    """Also where it is so fast and so damped that steps of a sample would diverge."""
+    made = around(drive.outside(), [("flexible_mode", "carriage")])
+    t = np.arange(1500) / rate
+    course = Course(t, np.column_stack([-np.cos(t), np.sin(t)]), np.zeros((len(t), len(made.given))), 0 * t)
+    values = {"m": 3.0, "f": 90.0, "D": 1.99}
+    named = {p.name: p.start for p in made.parameters}
+    named |= {name: values[name.rsplit("_", 1)[1]] for name in named if name.rsplit("_", 1)[1] in values}
+    moved = shifts(made, course, named)["F_ext"]
+    assert_allclose(moved[100:], -3.0 * np.cos(t)[100:], atol=0.05)

@@ -23,6 +23,8 @@ from fmus.variables import Expr
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
 SAMPLES_AT_ONCE = 50_000  # samples whose steps CasADi makes in one call, which takes memory for each
 ROUNDING, MOST = 1e-6, 100  # tolerance of the step count; largest number of steps between two samples
+STABLE = 2.0  # of a step times the fastest rate of the states; Runge-Kutta diverges above 2.8
+LOOKED_AT = 16  # samples at which that rate is looked for
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,8 @@ def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
     names = [s.name for s in made.states]
     if set(names) <= set(known):
         return np.array([known[name] for name in names]).reshape(len(names), len(course.t))
-    n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) / LONGEST_STEP - ROUNDING)))
+    rate = max(1 / LONGEST_STEP, _fastest(made, len(course.t), m, z) / STABLE)
+    n = min(MOST, max(1, ceil(np.median(np.diff(course.t)) * rate - ROUNDING)))
     x = np.empty((len(names), len(course.t)))
     x[:, 0] = [s.start for s in made.states]
     for first in range(0, len(course.t) - 1, SAMPLES_AT_ONCE):
@@ -74,6 +77,24 @@ def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
         t, w = (_between(at, rows) for rows in (course.t[None, part], np.array(here)))
         x[:, first + 1 : last + 1] = steps(x[:, first], w, np.diff(t.ravel()))[:, n::n]
     return x
+
+
+def _fastest(made: Around, samples: int, m: Array, z: Sequence[Row]) -> float:
+    """The fastest rate of the effect's states by their linearisation at some samples of a course, 1/s."""
+    x, slopes, rates = [s.start for s in made.states], _slopes(made), list[float]()
+    for k in np.linspace(0, samples - 1, LOOKED_AT).astype(int):
+        here = [float(np.broadcast_to(row, samples)[k]) for row in z]
+        found = np.asarray(slopes(m[:, k], x, here))
+        if np.all(np.isfinite(found)):
+            rates.append(float(np.abs(np.linalg.eigvals(found)).max()))
+    return max(rates, default=0.0)
+
+
+@lru_cache(maxsize=8)
+def _slopes(made: Around) -> cs.Function:
+    """Derivatives of the rates with respect to the states, at (m, x, z)."""
+    m, x, z = (cs.SX.sym(name, made.rates.size1_in(i)) for i, name in enumerate("mxz"))
+    return cs.Function("slopes", [m, x, z], [cs.jacobian(made.rates(m, x, z), x)])
 
 
 def _between(at: Array, rows: Array) -> Array:
