@@ -1,6 +1,6 @@
 """Screens all candidates against the residual of the calibrated FMU."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -27,6 +27,8 @@ from estimator.closeloop.screening.regressors import Calibration, alike
 from estimator.closeloop.screening.screen import screen
 from estimator.closeloop.search.onset import onset
 from estimator.record import Array
+from estimator.weighting import Weighting
+from fmus.aside import set_aside
 
 SEED = 0  # of the random sums that estimate cosines
 
@@ -48,6 +50,7 @@ class Screened:
     stages: Stages
     came: Callable[[], tuple[float, Fit] | None]
     _alike: dict[tuple[str, ...], tuple[Array, Array]] = field(default_factory=dict, compare=False)
+    _weighted: dict[Weighting, list[Array]] = field(default_factory=dict, compare=False)  # see `over_form`
 
     def alike(self, fit: Fit) -> tuple[Array, Array]:
         """Lengths and cosines of all changes about a fit of the screening; see regressors.alike."""
@@ -93,19 +96,23 @@ class Screened:
         They stay as they are where the screening cannot be weighted as the hypothesis is. Laws are evaluated
         along its motion: along one that follows the record they would be made of the noise in the residual.
         """
-        first: dict[str, tuple[Candidate, Array]] = {}
-        for c, g in self.change:
-            if not c.is_fault:
-                first.setdefault(c.label, (c, g))
-        courses = self.screening.courses_with(built(self.problem, h.candidates), h.theta)
-        laws = [c for c, _ in first.values() if c.location in courses]
-        along = dict(zip(laws, self.screening.changes(laws, courses), strict=True))
-        noise = self.baseline.noise
-        responses = [self.screening.weighted_as(noise.weighting, along.get(c, g)) for c, g in first.values()]
-        known = [g for g in responses if g is not None]
-        seen = grouped_fit(h.fit, len(noise.std), self.screening.group)
+        screening, noise = self.screening, self.baseline.noise
+        first = {c.label: (c, g) for c, g in reversed(self.change) if not c.is_fault}.values()
+        courses = screening.courses_with(built(self.problem, h.candidates), h.theta)
+        laws = [c for c, _ in first if c.location in courses]
+        if noise.weighting not in self._weighted:
+            others = (g for c, g in first if c.location not in courses)
+            self._weighted.clear()
+            self._weighted[noise.weighting] = self._as_weighted(others)
+        responses = [*self._weighted[noise.weighting], *self._as_weighted(screening.changes(laws, courses))]
+        seen = grouped_fit(h.fit, len(noise.std), screening.group)
         trusted = self.problem.policy.interval.bent
-        return replace(h, fit=over_form(h.fit, seen, known, noise.known, trusted))
+        return replace(h, fit=over_form(h.fit, seen, responses, noise.known, trusted))
+
+    def _as_weighted(self, changes: Iterable[Array]) -> list[Array]:
+        """Changes (m, k) weighted as the hypotheses are, without those of which the screening cannot tell."""
+        found = (self.screening.weighted_as(self.baseline.noise.weighting, g) for g in changes)
+        return [set_aside(g) for g in found if g is not None]
 
     def explained(self, found: Sequence[Hypothesis]) -> bool:
         """Whether one of them accounts for the residual, and leaves noise as far as that can be told.
