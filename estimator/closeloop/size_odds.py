@@ -20,8 +20,7 @@ def calls_for_more(baseline: Baseline, h: Hypothesis) -> bool:
     """
     if not baseline.problem.form_error:
         return True
-    left = np.maximum(beyond_noise(baseline, h, "fit"), beyond_noise(baseline, h, "choose"))
-    return material(baseline, left, baseline.noise.std) >= 1.0
+    return material(baseline, beyond_noise(baseline, h, "fit", "choose"), baseline.noise.std) >= 1.0
 
 
 def odds_by_size(baseline: Baseline) -> float:

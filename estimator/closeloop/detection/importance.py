@@ -22,15 +22,14 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
     the parts to choose and to test together.
     """
     b, limits, share = baseline, baseline.policy.detection, baseline.problem.form_error
-    beyond = beyond_noise(b, b.hypothesis, "unseen")
     if not share:
-        return material(b, np.maximum(beyond, beyond_noise(b, b.hypothesis, "fit")), b.noise.std)
+        return material(b, beyond_noise(b, b.hypothesis, *WHOLE), b.noise.std)
+    beyond = beyond_noise(b, b.hypothesis, "unseen")
     form = np.maximum(share * signal_size(b.problem), TINY)
     noises = b.hypothesis.rms(b.problem, "unseen") / (limits.open_form_noises * b.noise.std)
     large = float(np.max(np.minimum(beyond / form, noises)))
-    if could_be_form(b, likeness) and not sets_in:
-        return large
-    return max(large, material(b, beyond, b.noise.std))
+    may_be_form = could_be_form(b, likeness) and not sets_in
+    return large if may_be_form else max(large, material(b, beyond, b.noise.std))
 
 
 def importance_as_noise(baseline: Baseline) -> float:
@@ -40,7 +39,7 @@ def importance_as_noise(baseline: Baseline) -> float:
     for a single output, noise may be larger than its white part, so that only a share of the signal matters.
     """
     b, unsaid = baseline, ~baseline.noise.declared
-    beyond = np.maximum(*(beyond_noise(b, b.hypothesis, part) for part in WHOLE))
+    beyond = beyond_noise(b, b.hypothesis, *WHOLE)
     several = b.seen_by_several(b.hypothesis)
     if several is None:
         return material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
@@ -58,12 +57,13 @@ def signal_size(problem: Problem) -> Array:
     return np.asarray(np.sqrt(np.mean(measured**2, axis=0)))
 
 
-def beyond_noise(b: Baseline, h: Hypothesis, part: Part) -> Array:
-    """Rms (n_y,) of the residual of a hypothesis on a part, beyond noise and its chance scatter."""
-    residual = h.of(b.problem, part)
-    chance = 1 + b.policy.detection.chance * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
-    squares = np.mean(residual**2, axis=0) - chance * b.noise.std**2
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+def beyond_noise(b: Baseline, h: Hypothesis, *parts: Part) -> Array:
+    """Rms (n_y,) of the residual of h beyond noise and its chance scatter, the largest of the parts."""
+    squares = np.zeros(len(b.noise.std))
+    for residual in (h.of(b.problem, part) for part in parts):
+        chance = 1 + b.policy.detection.chance * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
+        squares = np.maximum(squares, np.mean(residual**2, axis=0) - chance * b.noise.std**2)
+    return np.asarray(np.sqrt(squares))
 
 
 def material(b: Baseline, beyond: Array, noise: Array) -> float:

@@ -132,6 +132,8 @@ class DecisionPolicy:
     )
 
     def told(self, least: float) -> float:
-        """Sum of squares by which a hypothesis must be worse than the best one, whose is `least`, to be told
-        from it if the form is right."""
+        """The sum of squares by which a hypothesis must exceed the best one's, `least`, to be told from it.
+
+        It holds for a model whose form is right.
+        """
         return max(self.noticed, self.alike * least)

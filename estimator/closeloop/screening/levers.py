@@ -23,7 +23,7 @@ from fmus.variables import Expr
 LONGEST_STEP = 5e-3  # s, the longest step for the states of effects; the shortest delay needs 10 ms
 SAMPLES_AT_ONCE = 50_000  # samples whose steps CasADi makes in one call, which takes memory for each
 ROUNDING, MOST = 1e-6, 100  # tolerance of the step count; largest number of steps between two samples
-STABLE = 2.0  # of a step times the fastest rate of the states; Runge-Kutta diverges above 2.8
+STABLE = 2.0  # largest product of a step and the states' fastest rate; Runge-Kutta steps diverge above 2.8
 LOOKED_AT = 16  # samples at which that rate is looked for
 
 
@@ -81,20 +81,19 @@ def _states(made: Around, course: Course, m: Array, z: Sequence[Row]) -> Array:
 
 def _fastest(made: Around, samples: int, m: Array, z: Sequence[Row]) -> float:
     """The fastest rate of the effect's states by their linearisation at some samples of a course, 1/s."""
-    x, slopes, rates = [s.start for s in made.states], _slopes(made), list[float]()
-    for k in np.linspace(0, samples - 1, LOOKED_AT).astype(int):
-        here = [float(np.broadcast_to(row, samples)[k]) for row in z]
-        found = np.asarray(slopes(m[:, k], x, here))
-        if np.all(np.isfinite(found)):
-            rates.append(float(np.abs(np.linalg.eigvals(found)).max()))
-    return max(rates, default=0.0)
+    at = np.linspace(0, samples - 1, LOOKED_AT).astype(int)
+    here, n = np.array([np.broadcast_to(row, samples)[at] for row in z]), len(made.states)
+    rest = np.repeat([[s.start] for s in made.states], LOOKED_AT, axis=1)
+    found = np.asarray(_slopes(made)(m[:, at], rest, here)).reshape(n, LOOKED_AT, n).swapaxes(0, 1)
+    sound = found[np.isfinite(found).all(axis=(1, 2))]
+    return float(np.abs(np.linalg.eigvals(sound)).max(initial=0.0))
 
 
 @lru_cache(maxsize=8)
 def _slopes(made: Around) -> cs.Function:
-    """Derivatives of the rates with respect to the states, at (m, x, z)."""
+    """Derivatives of the rates with respect to the states, at LOOKED_AT samples of (m, x, z)."""
     m, x, z = (cs.SX.sym(name, made.rates.size1_in(i)) for i, name in enumerate("mxz"))
-    return cs.Function("slopes", [m, x, z], [cs.jacobian(made.rates(m, x, z), x)])
+    return cs.Function("slopes", [m, x, z], [cs.jacobian(made.rates(m, x, z), x)]).map(LOOKED_AT)
 
 
 def _between(at: Array, rows: Array) -> Array:

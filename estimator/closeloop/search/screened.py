@@ -102,7 +102,7 @@ class Screened:
         laws = [c for c, _ in first if c.location in courses]
         if noise.weighting not in self._weighted:
             others = (g for c, g in first if c.location not in courses)
-            self._weighted.clear()
+            self._weighted.clear()  # those of the last weighting are kept alone, as they are long
             self._weighted[noise.weighting] = self._as_weighted(others)
         responses = [*self._weighted[noise.weighting], *self._as_weighted(screening.changes(laws, courses))]
         seen = grouped_fit(h.fit, len(noise.std), screening.group)
