@@ -101,6 +101,14 @@ def _stretches(record: Record, residuals: Sequence[Array]) -> list[Array]:
     return np.split(np.concatenate(_fitted(record, residuals)), ends)
 
 
+def whitening(record: Record, residuals: Sequence[Array]) -> Weighting:
+    """Weights that make a residual (N, n_y) of each run white, whatever has left it."""
+    fitted = _stretches(record, residuals)
+    size = np.maximum(np.sqrt(np.mean(np.concatenate(fitted) ** 2, axis=0)), noise_floor(record))
+    alone = (correlation_of([r[:, j] / size[j] for r in fitted]) for j in range(len(size)))
+    return Weighting(size, tuple(alone))
+
+
 def larger(record: Record, residuals: Sequence[Array], chance: float) -> bool:
     """Whether the residual of an output is larger than its declared noise; chance: see Noise.of."""
     fitted, std = _stretches(record, residuals), record.noise_std

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
-from estimator.closeloop.fitting.calibrate import nearer, without_input_noise
+from estimator.closeloop.fitting.calibrate import without_input_noise
 from estimator.closeloop.fitting.noise_left import caused, noise_left
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_part
@@ -95,7 +95,7 @@ def test_draws_of_what_is_left_are_as_large_as_what_is_left(seed):
     record = noise.smoothed(record_of((clean + std * rng.standard_normal(N))[:, None]))
     [run] = record.runs
     true = run.u[:, 0] - clean
-    draws = [noise.left(run.u, rng)[:, 0] for _ in range(4)]
+    draws = [d[:, 0] for d in noise.left(run.u, rng, 4)]
     for sigma in (1, 60):  # also of their slow part, to which a machine answers
         sizes = [np.std(gaussian_filter1d(d, sigma)) for d in draws]
         assert 0.6 < np.mean(sizes) / np.std(gaussian_filter1d(true, sigma)) < 1.5
@@ -111,7 +111,7 @@ def test_draws_have_no_bias_where_details_are_lost(share):
         std = share * clean.std()
         noise = InputNoise(np.array([std]), LIMITS.levels)
         seen = smoothed(clean + std * rng.standard_normal(N), std, LIMITS.levels)
-        draws = [np.std(noise.left(seen[:, None], rng)) for _ in range(4)]
+        draws = [np.std(d) for d in noise.left(seen[:, None], rng, 4)]
         found.append(np.mean(draws) / np.std(seen - clean))
     assert np.mean(found) == pytest.approx(1.0, abs=0.06)
 
@@ -160,6 +160,10 @@ class LowPass:
         """See Problem."""
         return [slow(run.u) for run in self.record.runs]
 
+    def residuals(self, theta):
+        """See Problem."""
+        return [run.y - y for run, y in zip(self.record.runs, self.simulate(theta), strict=True)]
+
 
 def slow(u):
     kept = np.exp(-0.005 / 0.5)
@@ -174,29 +178,46 @@ def measured(rng, sensor, driven_by_noise=False):
     return LowPass(record_of(recorded, y, sensor))
 
 
-def residuals(problem):
-    return tuple(run.y - y for run, y in zip(problem.record.runs, problem.simulate({}), strict=True))
+def calibrated(problem):
+    """The plant without unknowns, as a fit has it."""
+    return SimpleNamespace(theta={}, residuals=tuple(problem.residuals({})))
+
+
+def smooth(problem):
+    """The problem with smoothed inputs."""
+    return without_input_noise(problem, calibrated(problem))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_record_decides_whether_the_noise_drove_the_machine(seed):
+@pytest.mark.parametrize("gain", [1.0, 1.05, 2.0])
+def test_the_record_decides_whether_the_noise_drove_the_machine(gain, seed):
+    """A wrong sensor hides what the noise does from the sum of squares, but not if that is whitened."""
     for driven in (False, True):
         raw = measured(np.random.default_rng(seed), 0.002, driven)
-        other = without_input_noise(raw, {})
-        one, two = (SimpleNamespace(residuals=residuals(p)) for p in (other, raw))
-        assert nearer(raw, one, two) is not driven
+        [run] = raw.record.runs
+        raw = replace(raw, record=replace(raw.record, runs=(replace(run, y=gain * run.y),)))
+        other = without_input_noise(raw, calibrated(raw))
+        assert (other is None) is driven
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_draws_of_one_input_are_alike_in_size(seed):
+    """The error of a constant has few degrees of freedom, and its correction must not add to its scatter."""
+    rng = np.random.default_rng(seed)
+    sizes = [np.mean(d**2) for d in InputNoise(np.ones(1), LIMITS.levels).left(np.zeros((N, 1)), rng, 16)]
+    assert np.std(sizes) < 0.6 * np.mean(sizes)
 
 
 def test_noise_that_the_sensors_do_not_show_is_left_alone():
     raw = measured(np.random.default_rng(0), 1000.0)
-    assert without_input_noise(raw, {}) is None
+    assert without_input_noise(raw, calibrated(raw)) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_noise_that_stays_in_the_inputs_is_found_at_the_outputs(seed):
     sensor = 0.002
-    problem = without_input_noise(measured(np.random.default_rng(seed), sensor), {})
-    left = residuals(problem)
+    problem = smooth(measured(np.random.default_rng(seed), sensor))
+    left = problem.residuals({})
     noise = noise_left(problem, {}, left, "noise")
     assert 0.6 < np.std(left[0]) / noise.std[0] < 1.5
     assert noise.std[0] > 3 * sensor
@@ -209,9 +230,9 @@ def test_the_noise_that_stays_in_the_inputs_is_found_at_the_outputs(seed):
 
 def test_noise_of_inputs_and_of_times_adds_up():
     rng = np.random.default_rng(6)
-    plain = without_input_noise(measured(rng, 0.002), {})
+    plain = smooth(measured(rng, 0.002))
     [run] = plain.record.runs
     late = 0.4 * 0.005 * rng.standard_normal((N, 1)) * np.gradient(slow(run.u), T, axis=0)
     both = replace(plain, record=replace(plain.record, runs=(replace(run, y=run.y + late),)))
-    alone, together = (np.mean(np.square(caused(p, {}, residuals(p)))) for p in (plain, both))
+    alone, together = (np.mean(np.square(caused(p, {}, p.residuals({})))) for p in (plain, both))
     assert_allclose(together - alone, np.mean(late**2), rtol=0.2)

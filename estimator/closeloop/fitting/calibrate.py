@@ -1,6 +1,5 @@
 """Calibration of the declared parameters within their bounds, by least squares of the simulation error."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.question.input_noise import InputNoise
 from estimator.closeloop.question.problem import Problem, Unknown, clock_within
-from estimator.noise import Noise, noise_floor, scales
+from estimator.noise import Noise, noise_floor, scales, whitening
 from estimator.weighting import Weighting
 
 ROUGH = 1e-3  # tolerance of the first fit, which is enough while the residual is large
@@ -18,23 +17,25 @@ ROUGHLY_MATCHED = 2.0  # mean square of the weighted residual, below which the f
 SEEN = 1.0  # change of the sum of squares by the error of a start state, below which it is not fitted
 
 
-def without_input_noise(problem: Problem, theta: Mapping[str, float]) -> Problem | None:
+def without_input_noise(problem: Problem, h: Hypothesis) -> Problem | None:
     """The problem with its recorded inputs smoothed; None if they have no noise that the outputs show.
 
-    theta: values with which the outputs are compared. The rounding of a file, for instance, does not show.
+    h: the calibrated FMU, with which the outputs are compared. The rounding of a file, for instance, does not
+    show. What looks like noise may be the excitation itself: the outputs then follow the recorded inputs more
+    closely. This is asked of the whitened residual, because what the FMU lacks is mostly slower.
     """
     noise = InputNoise.of(problem.record, problem.policy.inputs)
     if noise is None:
         return None
-    found = replace(problem, record=noise.smoothed(problem.record), input_noise=noise)
-    pairs = zip(problem.simulate(theta), found.simulate(theta), strict=True)
-    moved = problem.record.of([a - b for a, b in pairs], "fit") / noise_floor(problem.record)
-    return found if np.sum(moved**2) > problem.policy.inputs.seen else None
-
-
-def nearer(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether the first of two hypotheses leaves less on the part to identify, in units of the noise."""
-    return _left(problem, one)[0] < _left(problem, other)[0]
+    record = problem.record
+    found = replace(problem, record=noise.smoothed(record), input_noise=noise)
+    other = found.residuals(h.theta)
+    moved = record.of([a - b for a, b in zip(other, h.residuals, strict=True)], "fit") / noise_floor(record)
+    if np.sum(moved**2) <= problem.policy.inputs.seen:
+        return None
+    weighting, stretches = whitening(record, h.residuals), record.stretches("fit")
+    as_recorded, smoothed = (weighting.of(record.of(r, "fit"), stretches) for r in (h.residuals, other))
+    return found if np.sum(smoothed**2) < np.sum(as_recorded**2) else None
 
 
 def explains_most(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:

@@ -49,9 +49,11 @@ def _by_inputs(problem: Problem, theta: Mapping[str, float], rng: np.random.Gene
     record, noise = problem.record, problem.input_noise
     if noise is None:
         return []
+    draws = problem.policy.inputs.draws
+    errors = zip(*(noise.left(run.u, rng, draws) for run in record.runs), strict=True)
     found, still = [], problem.simulate(theta)
-    for _ in range(problem.policy.inputs.draws):
-        noisy = tuple(replace(run, u=run.u + noise.left(run.u, rng)) for run in record.runs)
+    for each in errors:
+        noisy = tuple(replace(run, u=run.u + e) for run, e in zip(record.runs, each, strict=True))
         moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
         fitted = zip(moved, still, record.runs, strict=True)
         found += [a - b for a, b, run in fitted if run.fit.any()]

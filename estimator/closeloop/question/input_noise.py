@@ -46,20 +46,24 @@ class InputNoise:
         notes = [Note("input noise", name, f"{name}: {said.format(std)}") for name, std in noisy]
         return replace(record, runs=runs, notes=(*record.notes, *notes))
 
-    def left(self, u: Array, rng: np.random.Generator) -> Array:
-        """A draw of the error that smoothing leaves in inputs (N, n_u), which have been smoothed.
+    def left(self, u: Array, rng: np.random.Generator, draws: int) -> list[Array]:
+        """Draws of the error that smoothing leaves in inputs (N, n_u), which have been smoothed.
 
         What has been smoothed has lost details that the input had, and of which the error would hold some.
-        How much smaller the error becomes by each further smoothing tells by how much this one is too small:
-        the iterated bootstrap of P. Hall, M. A. Martin, Biometrika 75 (1988), 661-671, twice.
+        How much smaller the errors become by each further smoothing tells by how much these are too small:
+        the iterated bootstrap of P. Hall, M. A. Martin, Biometrika 75 (1988), 661-671, twice. The error of an
+        input of few steps differs much from draw to draw. All draws are therefore compared together, and
+        each smoothing has the same draws of noise, in turn.
         """
-        errors = []
+        noise = [self.std * rng.standard_normal(u.shape) for _ in range(draws)]
+        errors, now = [], [u] * draws
         for _ in range(3):
-            errors.append(self._without(u + self.std * rng.standard_normal(u.shape)) - u)
-            u = u + errors[-1]
-        first, second, third = (np.std(e, axis=0) for e in errors)
+            errors.append([self._without(x + n) - x for x, n in zip(now, noise, strict=True)])
+            now = [x + e for x, e in zip(now, errors[-1], strict=True)]
+            noise = [*noise[1:], noise[0]]
+        first, second, third = (np.sqrt(np.mean(np.square(some), axis=(0, 1))) for some in errors)
         size = np.divide(first**2 * third, second**3, out=np.ones_like(first), where=second > 0)
-        return np.asarray(errors[0] * size)
+        return [e * np.maximum(size, 1.0) for e in errors[0]]
 
     def _without(self, u: Array) -> Array:
         columns = zip(u.T, self.std, strict=True)

@@ -1,7 +1,7 @@
 """Calibration of the declared parameters, with the steps and the inputs with which the FMU is nearest."""
 
 from estimator.closeloop.checkpoints import Stages
-from estimator.closeloop.fitting.calibrate import calibrate, explains_most, nearer, without_input_noise
+from estimator.closeloop.fitting.calibrate import calibrate, explains_most, without_input_noise
 from estimator.closeloop.fitting.resolution import in_long_steps, in_settled_steps, long_steps_hold
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.progress import Progress
@@ -23,17 +23,13 @@ def in_its_steps(problem: Problem, tell: Progress, stages: Stages) -> Calibrated
 
 
 def _with_its_inputs(problem: Problem, tell: Progress, stages: Stages) -> Calibrated:
-    """The same in the steps of a problem, with smoothed inputs if the FMU is nearer with these.
-
-    What looks like noise of an input may be the excitation itself, with which the FMU is nearer.
-    """
+    """The same in the steps of a problem, with smoothed inputs if they have noise."""
     found = stages.done("calibrated", lambda: calibrate(problem))
-    other = without_input_noise(problem, found[1].theta)
+    other = without_input_noise(problem, found[1])
     if other is None:
         return problem, *found
     tell("inputs", "calibrating with smoothed inputs")
-    again = stages.done("smoothed", lambda: calibrate(other))
-    return (other, *again) if nearer(other, again[1], found[1]) else (problem, *found)
+    return other, *stages.done("smoothed", lambda: calibrate(other))
 
 
 def _settled(found: Calibrated, tell: Progress, stages: Stages) -> Calibrated:
