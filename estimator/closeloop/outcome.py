@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.evidence import Judgement
@@ -58,7 +59,8 @@ class Outcome:
     def probability(self) -> dict[str, float]:
         """Probability of each answer; see `probabilities`."""
         fits = [h for h in (*self.singles, *self.pairs) if h.candidates]
-        return probabilities(self.baseline, self.detection, self.judgement, self.promises, fits)
+        refused = [h for h in fits if not explains(self.baseline, h)]
+        return probabilities(self.baseline, self.detection, self.judgement, self.promises, fits, refused)
 
     @property
     def built_in(self) -> Hypothesis | None:

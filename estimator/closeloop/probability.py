@@ -15,7 +15,8 @@ Four questions are answered one after the other, each with the prior of the poli
    share. Where noise hides so small a share, the prior decides. Where noise is not declared, it may be
    coloured, and all that a right answer leaves; outputs that depend on each other show that it is none.
 4. Did a hypothesis pass the checks of the verdict? They refuse a right one with the small probability of the
-   policy, and imitations of a mechanism outside as a rule. If they refuse all, that is evidence.
+   policy, and imitations of a mechanism outside as a rule. If they refuse all, that is evidence. If they
+   refuse some, these are less probable, and the best of the others is what all are compared with.
 
 A residual that is too small to matter is not searched. Whether an effect left it, which the calibration
 compensates or which is weak, or the form of a right model, is told by its size alone: see `size_odds`.
@@ -23,7 +24,7 @@ compensates or which is weak, or the form of a right model, is told by its size 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import comb
 
 import numpy as np
@@ -51,10 +52,12 @@ def probabilities(
     judgement: Judgement,
     promises: Sequence[Promise],
     fitted: Sequence[Hypothesis],
+    refused: Collection[Hypothesis] = (),
 ) -> dict[str, float]:
     """Probability of each answer by its label, most probable first; what is missing to 1 is none of these.
 
-    promises: the screened candidates; fitted: all hypotheses that were fitted. Empty if a dead sensor ended
+    promises: the screened candidates; fitted: all hypotheses that were fitted; refused: those among them that
+    do not account for the residual, which are all if the checks of the answer refuse it. Empty if a dead sensor ended
     the search, because nothing was compared then. Answers below a thousandth are left out.
     """
     if judgement.verdict == "sensor_fault" and not judgement.members:
@@ -67,7 +70,8 @@ def probabilities(
     named = {m.label: m for m in judgement.members}
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
-    for label, p in _of_fits(baseline, promises, fitted, refuted(judgement.checks)).items():
+    refused = fitted if refuted(judgement.checks) else refused
+    for label, p in _of_fits(baseline, promises, fitted, refused).items():
         name = same.get(label, label)
         found[name] = found.get(name, 0.0) + p
     ranked = sorted(found.items(), key=lambda item: -item[1])
@@ -112,20 +116,22 @@ def _independent(baseline: Baseline) -> float:
 
 
 def _of_fits(
-    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis], refused: bool
-) -> dict[str, float]:
-    """Probability of each label, and of no discrepancy; refused: whether checks refuse every hypothesis."""
+    baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis],
+    refused: Collection[Hypothesis],
+) -> dict[str, float]:  # fmt: skip
+    """Probability of each label, and of no discrepancy; refused: the hypotheses that their checks refuse."""
     base, prior, kinds = baseline.hypothesis, baseline.policy.prior, len(distinct(promises))
-    best = _closest(baseline, fitted)
+    best = _closest(baseline, [h for h in fitted if h not in refused] or fitted)
     known: dict[str, float] = {}
     alone: dict[str, float] = {}  # without the share of singles or pairs, which a stranger does not have
     for h in fitted:
         value = _one_of_its_size(baseline, best, h, kinds)
-        if value > alone.get(h.label, -np.inf):
-            alone[h.label], known[h.label] = value, value + _share(baseline, h)
+        stands = np.log(prior.refused if h in refused else 1 - prior.refused)
+        alone[h.label] = max(alone.get(h.label, -np.inf), value)
+        known[h.label] = max(known.get(h.label, -np.inf), value + _share(baseline, h) + stands)
     library, stranger = (float(logsumexp(list(values.values()))) for values in (known, alone))
     odds = _odds_of_outside(baseline, best)
-    within = np.log(prior.effect * (1 - prior.outside) * (prior.refused if refused else 1 - prior.refused))
+    within = np.log(prior.effect * (1 - prior.outside))
     outside = np.log(prior.effect * prior.outside) + np.log(odds) + stranger
     nothing = np.log(1 - prior.effect) + _evidence(baseline, best, base)
     if not baseline.noise.known:  # what is unlike any effect of the library may be noise

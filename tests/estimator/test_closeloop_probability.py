@@ -226,6 +226,29 @@ def test_what_an_open_form_leaves_is_no_evidence_for_a_pair_by_any_name():
     assert said.get(near.label, 0.0) < 0.01
 
 
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
+def test_what_its_own_checks_refuse_is_less_probable_by_their_error(size):
+    measured = np.random.default_rng(0).standard_normal(SAMPLES) + size * LAWS[2]
+    one = fitted(measured, 2)
+    like = replace(one, candidates=(replace(one.candidates[0], location="like"),))
+    said, after = (
+        probabilities(on(measured), SEEN, judged("traced"), promised(measured), [one, like], refused)
+        for refused in ([], [like])
+    )
+    assert said[one.label] == pytest.approx(said[like.label])
+    assert after[like.label] / after[one.label] == pytest.approx(0.01 / 0.99)
+
+
+def test_where_the_answer_is_refused_so_are_all_others():
+    measured = np.random.default_rng(3).standard_normal(SAMPLES) + LAWS[1] + LAWS[2]
+    every = [fitted(measured, i) for i in (1, 2, 3)]
+    none, all_of_them = (
+        probabilities(on(measured), SEEN, judged("unexplained"), promised(measured), every, refused)
+        for refused in ([], every)
+    )
+    assert none == all_of_them
+
+
 def test_without_fits_the_screening_says_whether_there_is_an_effect():
     rng, early = np.random.default_rng(7), judged("no_discrepancy")
     quiet = rng.standard_normal(SAMPLES)
