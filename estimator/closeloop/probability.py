@@ -38,7 +38,7 @@ from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import becomes, includes
-from estimator.closeloop.size_odds import calls_for_more, odds_by_size
+from estimator.closeloop.size_odds import calls_for_more, odds_by_size, over_form
 from estimator.record import Array
 
 NO_DISCREPANCY = "no_discrepancy"
@@ -57,8 +57,10 @@ def probabilities(
     """Probability of each answer by its label, most probable first; what is missing to 1 is none of these.
 
     promises: the screened candidates; fitted: all hypotheses that were fitted; refused: those among them that
-    do not account for the residual, which are all if the checks of the answer refuse it. Empty if a dead sensor ended
-    the search, because nothing was compared then. Answers below a thousandth are left out.
+    do not account for the residual, which are all if the checks of the answer refuse it. A hypothesis that
+    changes no more than another form of the model would leave is no discrepancy, and is not refused. Empty if
+    a dead sensor ended the search, because nothing was compared then. Answers below a thousandth are left
+    out.
     """
     if judgement.verdict == "sensor_fault" and not judgement.members:
         return {}
@@ -70,7 +72,9 @@ def probabilities(
     named = {m.label: m for m in judgement.members}
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
-    refused = fitted if refuted(judgement.checks) else refused
+    minor = [h for h in fitted if over_form(baseline, h) < 1.0]
+    same |= {h.label: NO_DISCREPANCY for h in minor}
+    refused = [h for h in (fitted if refuted(judgement.checks) else refused) if h not in minor]
     for label, p in _of_fits(baseline, promises, fitted, refused).items():
         name = same.get(label, label)
         found[name] = found.get(name, 0.0) + p

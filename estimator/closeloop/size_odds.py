@@ -1,4 +1,4 @@
-"""What the size of a residual says: whether it would matter alone, and how probable an effect makes it."""
+"""What a size says: whether a residual would matter alone, and what an effect or the form makes probable."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import numpy as np
 from estimator.closeloop.detection.importance import TINY, beyond_noise, material, signal_size
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis
+from estimator.closeloop.question.problem import Problem
+from estimator.record import BoolArray
 
 SIZES = 2001  # points of the grid of sizes that a residual may have
 LEAST = 1e-6  # of a signal, the smallest size of that grid: no logger resolves less
@@ -21,6 +23,33 @@ def calls_for_more(baseline: Baseline, h: Hypothesis) -> bool:
     if not baseline.problem.form_error:
         return True
     return material(baseline, beyond_noise(baseline, h, "fit", "choose"), baseline.noise.std) >= 1.0
+
+
+def over_form(baseline: Baseline, h: Hypothesis) -> float:
+    """What h changes over what another form of the model would leave; infinite if the form is right.
+
+    An error of form may be of any shape, but one effect does not explain most of it. Where h does, of what is
+    beyond noise, it counts too: of all outputs, or of its own if h is one faulty sensor.
+    """
+    b, share, most = baseline, baseline.problem.form_error, baseline.policy.decision.most
+    if not share:
+        return np.inf
+    form, noise = np.maximum(share * signal_size(b.problem), TINY), b.noise.std
+    fault = at_fault(b.problem, h)
+    own = fault if fault.any() else ~fault
+    found = [0.0]
+    for part in WHOLE:
+        before, after = (x.of(b.problem, part) for x in (b.hypothesis, h))
+        found.append(float(np.max(np.sqrt(np.mean((after - before) ** 2, axis=0)) / form)))
+        was, left = (float(np.sum((np.mean(x**2, axis=0) / noise**2 - 1)[own])) for x in (before, after))
+        found.append((1 - left / was) / most if was > 0 else 0.0)
+    return max(found)
+
+
+def at_fault(problem: Problem, h: Hypothesis) -> BoolArray:
+    """Mask (n_y,) of the faulty sensor's output if the hypothesis is one sensor fault, else all False."""
+    faults = [c.location for c in h.candidates if c.is_fault and len(h.candidates) == 1]
+    return np.array([y in faults for y in problem.record.outputs])
 
 
 def odds_by_size(baseline: Baseline) -> float:

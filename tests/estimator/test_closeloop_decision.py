@@ -18,6 +18,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.relations import becomes, limits
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
+from estimator.closeloop.size_odds import over_form
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.closing.result import effects_of
@@ -159,6 +160,40 @@ def test_what_is_left_where_the_effect_was_fitted_counts_too(early, found):
 def test_a_fault_of_a_sensor_takes_nearly_all_from_its_own_output(before, after, at, found):
     fault = replace(left(*after), candidates=(Candidate("sensor_gain", at, ()),))
     assert form_of(baseline(asked(FORM), left(*before), NOISE)).reached(fault).all() == found
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "at", "more"),
+    [
+        ((1.5, 1.0), (1.0, 1.0), None, True),  # weak, but all that is beyond noise
+        ((20.0, 20.0), (19.9, 19.9), None, False),  # hardly anything of what coloured noise may be
+        ((20.0, 20.0), (14.5, 14.5), None, False),  # less than half of it, and less than the form
+        ((20.0, 20.0), (13.0, 13.0), None, True),  # 7 times the noise, more than the form leaves
+        ((20.0, 5.0), (20.0, 2.0), "b", True),  # most of its own output
+        ((20.0, 5.0), (20.0, 2.0), "a", False),
+    ],
+)
+def test_what_an_effect_changes_is_more_than_form_or_most_of_the_residual(before, after, at, more):
+    one = law("constant_force", 0, 0.0) if at is None else fault_of(at)
+    one = replace(left(*after), candidates=one.candidates)
+    found = baseline(asked(FORM), left(*before), NOISE)
+    assert (over_form(found, one) >= 1.0) is more
+    assert over_form(baseline(asked(), left(*before), NOISE), one) == np.inf
+
+
+@given(st.floats(0.0, 1.0), st.floats(1.0, 50.0))
+def test_a_larger_change_is_never_less_than_form(share, size):
+    found = baseline(asked(FORM), left(size, 1.0), NOISE)
+    smaller, larger = (
+        over_form(found, replace(left(size * (1 - part), 1.0), candidates=fault_of("a").candidates))
+        for part in (share / 2, share)
+    )
+    assert larger >= smaller - 1e-9
+
+
+def fault_of(output):
+    """A gain of the sensor of an output."""
+    return replace(left(1.0, 1.0), candidates=(Candidate("sensor_gain", output, ()),))
 
 
 @pytest.mark.parametrize(

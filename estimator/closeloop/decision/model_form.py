@@ -19,7 +19,7 @@ from estimator.closeloop.evidence import Check
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
-from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.size_odds import at_fault
 from estimator.record import Array, BoolArray
 
 
@@ -160,7 +160,7 @@ class Open(ModelForm):
         left, was = ((x**2 - noise**2) / noise**2 for x in (after, before))
         share = (self.share * signal_size(b.problem) / noise) ** 2
         no_worse = after <= limits.decision.clean * before
-        if np.any(_faulty(b.problem, h) & down & (was >= limits.detection.noise_share**2)):
+        if np.any(at_fault(b.problem, h) & down & (was >= limits.detection.noise_share**2)):
             return np.asarray(down | no_worse)
         half = limits.decision.most
         of_all = b.beyond_noise_of_all(h, part) / max(b.beyond_noise_of_all(b.hypothesis, part), TINY)
@@ -204,9 +204,3 @@ def gap_closed(before: Array, after: Array, noise: Array) -> Array:
     """Share of the gap between the error before and the noise floor that is closed, per output (n_y,)."""
     gap = before - noise
     return np.where(gap > 0, (before - after) / np.where(gap > 0, gap, 1.0), 1.0)
-
-
-def _faulty(problem: Problem, h: Hypothesis) -> BoolArray:
-    """Mask (n_y,) of the faulty sensor's output if the hypothesis is one sensor fault, else all False."""
-    faults = [c.location for c in h.candidates if c.is_fault and len(h.candidates) == 1]
-    return np.array([y in faults for y in problem.record.outputs])

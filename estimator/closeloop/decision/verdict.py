@@ -16,6 +16,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.probability import more_probable
+from estimator.closeloop.size_odds import over_form
 from fmus.effects import EFFECTS
 
 NO_EFFECT: Mapping[Name, str] = {  # what a residual that fails a check may be
@@ -34,7 +35,8 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
 
     Every effect must differ clearly from zero, and the hypothesis must be better than the calibrated FMU.
     Outputs with declared noise must come down to that noise, or nearly so. The others need not: noise that is
-    not declared may be all that is left, and how probable that is, the probability of the answer says.
+    not declared may be all that is left, and how probable that is, the probability of the answer says. What
+    they change must be more than another form of the model would leave.
     """
     limits, base = baseline.policy.decision, baseline.hypothesis
     clear = min(h.significance(base), default=0.0)
@@ -44,6 +46,9 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     ]
     if baseline.noise.declared.any():
         found.append(above_noise("outputs left above their noise", baseline, h, "choose"))
+    if baseline.problem.form_error:
+        size = over_form(baseline, h)
+        found.append(Check.least("what it changes is more than another form leaves", size, 1.0))
     return found
 
 
