@@ -74,8 +74,8 @@ def probabilities(
     found: dict[str, float] = {}
     minor = [h for h in fitted if over_form(baseline, h) < 1.0]
     same |= {h.label: NO_DISCREPANCY for h in minor}
-    refused = [h for h in (fitted if refuted(judgement.checks) else refused) if h not in minor]
-    for label, p in _of_fits(baseline, promises, fitted, refused).items():
+    refused = fitted if refuted(judgement.checks) else refused
+    for label, p in _of_fits(baseline, promises, fitted, refused, minor).items():
         name = same.get(label, label)
         found[name] = found.get(name, 0.0) + p
     ranked = sorted(found.items(), key=lambda item: -item[1])
@@ -121,16 +121,16 @@ def _independent(baseline: Baseline) -> float:
 
 def _of_fits(
     baseline: Baseline, promises: Sequence[Promise], fitted: Sequence[Hypothesis],
-    refused: Collection[Hypothesis],
+    refused: Collection[Hypothesis], minor: Collection[Hypothesis],
 ) -> dict[str, float]:  # fmt: skip
-    """Probability of each label, and of no discrepancy; refused: the hypotheses that their checks refuse."""
+    """Probability of each label, and of no discrepancy; refused, minor: see `probabilities`."""
     base, prior, kinds = baseline.hypothesis, baseline.policy.prior, len(distinct(promises))
-    best = _closest(baseline, [h for h in fitted if h not in refused] or fitted)
+    best = _closest(baseline, [h for h in fitted if h not in refused and h not in minor] or fitted)
     known: dict[str, float] = {}
     alone: dict[str, float] = {}  # without the share of singles or pairs, which a stranger does not have
     for h in fitted:
         value = _one_of_its_size(baseline, best, h, kinds)
-        stands = np.log(prior.refused if h in refused else 1 - prior.refused)
+        stands = np.log(prior.refused if h in refused and h not in minor else 1 - prior.refused)
         alone[h.label] = max(alone.get(h.label, -np.inf), value)
         known[h.label] = max(known.get(h.label, -np.inf), value + _share(baseline, h) + stands)
     library, stranger = (float(logsumexp(list(values.values()))) for values in (known, alone))

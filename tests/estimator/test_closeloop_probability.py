@@ -239,6 +239,17 @@ def test_what_its_own_checks_refuse_is_less_probable_by_their_error(size):
     assert after[like.label] / after[one.label] == pytest.approx(0.01 / 0.99)
 
 
+def test_an_effect_that_changes_nothing_is_not_what_others_are_compared_with():
+    """It is no discrepancy where the form is open. What fits badly must not be as probable as the rest."""
+    measured = np.random.default_rng(0).standard_normal(SAMPLES) + 30 * LAWS[2]
+    found = baseline(replace(asked(), form_error=0.05), fitted(measured), np.ones(1))
+    right, near = fitted(measured, 2), fitted(measured, 1)
+    idle = replace(fitted(measured, 5), fit=found.hypothesis.fit, residuals=found.hypothesis.residuals)
+    said = probabilities(found, SEEN, judged("unexplained"), promised(measured), [right, near, idle])
+    assert said.get(idle.label, 0.0) == 0.0
+    assert said.get(near.label, 0.0) < 0.01 < said[right.label]
+
+
 def test_where_the_answer_is_refused_so_are_all_others():
     measured = np.random.default_rng(3).standard_normal(SAMPLES) + LAWS[1] + LAWS[2]
     every = [fitted(measured, i) for i in (1, 2, 3)]
