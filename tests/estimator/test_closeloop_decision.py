@@ -457,6 +457,21 @@ def test_a_stiffness_without_bounds_is_judged_by_what_its_lack_costs():
     assert clear_as_reported(b, Judgement.naming([stop]), stop, False).members == ()
 
 
+@given(st.floats(1.0, 20.0), st.floats(1.0, 1e4), st.floats(1.0, 50.0))
+def test_the_reported_size_falls_as_the_errors_widen_whatever_shows_it(size, gained, wider):
+    """What the fit loses without the effect counts beside its errors: there is no step where these show it."""
+    law_of = law("constant_force", 0, 0.0)
+    judged = replace(
+        law_of, fit=replace(law_of.fit, covariance=(law_of.fit.values[0] / size) ** 2 * np.eye(1))
+    )
+    reported = replace(judged, fit=replace(judged.fit, covariance=wider**2 * judged.fit.covariance))
+    before = replace(judged, fit=replace(judged.fit, residual=np.append(judged.fit.residual, gained**0.5)))
+    b = replace(baseline(asked(), left(5.0, 5.0), NOISE), hypothesis=before)
+    found = clear_as_reported(b, Judgement.naming([judged]).after(DETECTED), reported, False)
+    [check] = [c for c in found.checks if c.name == "the reported size is clear of zero"]
+    assert check.value == pytest.approx(max(judged.significance(before)) / wider)
+
+
 def test_a_pair_becomes_a_simpler_one_in_either_order():
     friction = [law(kind, 0, 0.0).candidates[0] for kind in ("stribeck_friction", "coulomb_friction")]
     offset = law("constant_force", 0, 0.0).candidates[0]

@@ -70,9 +70,9 @@ def probable(
 def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis, began: bool) -> Judgement:
     """The judgement after the check of sizes by reported errors, which allow for the steps and the form."""
     best, limits, base = found.members[0], baseline.policy.decision, baseline.hypothesis
-    # where errors show no size, as of a stop, what the fit loses without it does, less as they are wider
+    # what the fit loses without an effect may show more than its errors, and less as these are wider
     each = zip(best.significance(base), best.significance(), reported.significance(), strict=True)
-    sizes = (now if was >= limits.significant else z * now / (was or 1.0) for z, was, now in each)
+    sizes = (z * now / (was or 1.0) for z, was, now in each)
     check = Check.least("the reported size is clear of zero", min(sizes, default=0.0), limits.telling)
     if check.passed:
         return replace(found, checks=(*found.checks, check))
