@@ -459,7 +459,7 @@ def test_a_stiffness_without_bounds_is_judged_by_what_its_lack_costs():
 
 @given(st.floats(1.0, 20.0), st.floats(1.0, 1e4), st.floats(1.0, 50.0))
 def test_the_reported_size_falls_as_the_errors_widen_whatever_shows_it(size, gained, wider):
-    """What the fit loses without the effect counts beside its errors: there is no step where these show it."""
+    """What the fit loses without the effect counts beside its errors, also where these show its size."""
     law_of = law("constant_force", 0, 0.0)
     judged = replace(
         law_of, fit=replace(law_of.fit, covariance=(law_of.fit.values[0] / size) ** 2 * np.eye(1))
