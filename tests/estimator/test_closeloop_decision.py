@@ -472,6 +472,13 @@ def test_the_reported_size_falls_as_the_errors_widen_whatever_shows_it(size, gai
     assert check.value == pytest.approx(max(judged.significance(before)) / wider)
 
 
+def test_an_effect_without_a_size_is_not_judged_by_it():
+    """A delay of an input has a time alone."""
+    delay = replace(left(1.0, 1.0), candidates=(Candidate("input_delay", "u", ()),))
+    b = baseline(asked(), left(5.0, 5.0), NOISE)
+    assert clear_as_reported(b, Judgement.naming([delay]).after(DETECTED), delay, False).members
+
+
 def test_a_pair_becomes_a_simpler_one_in_either_order():
     friction = [law(kind, 0, 0.0).candidates[0] for kind in ("stribeck_friction", "coulomb_friction")]
     offset = law("constant_force", 0, 0.0).candidates[0]

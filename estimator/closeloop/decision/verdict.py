@@ -72,7 +72,7 @@ def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis
     best, limits, base = found.members[0], baseline.policy.decision, baseline.hypothesis
     # what the fit loses without an effect may show more than its errors, and less as these are wider
     each = zip(best.significance(base), best.significance(), reported.significance(), strict=True)
-    sizes = (z * now / (was or 1.0) for z, was, now in each)
+    sizes = (z * now / (was or 1.0) if np.isfinite(z) else z for z, was, now in each)
     check = Check.least("the reported size is clear of zero", min(sizes, default=0.0), limits.telling)
     if check.passed:
         return replace(found, checks=(*found.checks, check))
