@@ -58,9 +58,9 @@ def probabilities(
 
     promises: the screened candidates; fitted: all hypotheses that were fitted; refused: those among them that
     do not account for the residual, which are all if the checks of the answer refuse it. A hypothesis that
-    changes no more than another form of the model would leave is no discrepancy, and is not refused. Empty if
-    a dead sensor ended the search, because nothing was compared then. Answers below a thousandth are left
-    out.
+    changes no more than another form of the model would leave is no discrepancy, and is not refused, unless
+    the residual calls for an effect. Empty if a dead sensor ended the search, because nothing was compared
+    then. Answers below a thousandth are left out.
     """
     if judgement.verdict == "sensor_fault" and not judgement.members:
         return {}
@@ -72,7 +72,8 @@ def probabilities(
     named = {m.label: m for m in judgement.members}
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
-    minor = [h for h in fitted if over_form(baseline, h) < 1.0]
+    calls = judgement.verdict == "unexplained"  # the residual itself is more than the form leaves
+    minor = [h for h in fitted if not calls and over_form(baseline, h) < 1.0]
     same |= {h.label: NO_DISCREPANCY for h in minor}
     refused = fitted if refuted(judgement.checks) else refused
     for label, p in _of_fits(baseline, promises, fitted, refused, minor).items():

@@ -239,15 +239,32 @@ def test_what_its_own_checks_refuse_is_less_probable_by_their_error(size):
     assert after[like.label] / after[one.label] == pytest.approx(0.01 / 0.99)
 
 
-def test_an_effect_that_changes_nothing_is_not_what_others_are_compared_with():
+@pytest.mark.parametrize("verdict", ["traced", "no_discrepancy", "unexplained"])
+def test_an_effect_that_changes_nothing_is_not_what_others_are_compared_with(verdict):
     """It is no discrepancy where the form is open. What fits badly must not be as probable as the rest."""
     measured = np.random.default_rng(0).standard_normal(SAMPLES) + 30 * LAWS[2]
     found = baseline(replace(asked(), form_error=0.05), fitted(measured), np.ones(1))
     right, near = fitted(measured, 2), fitted(measured, 1)
     idle = replace(fitted(measured, 5), fit=found.hypothesis.fit, residuals=found.hypothesis.residuals)
-    said = probabilities(found, SEEN, judged("unexplained"), promised(measured), [right, near, idle])
+    said = probabilities(found, SEEN, judged(verdict), promised(measured), [right, near, idle])
     assert said.get(idle.label, 0.0) == 0.0
     assert said.get(near.label, 0.0) < 0.01 < said[right.label]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "none"), [("traced", True), ("no_discrepancy", True), ("unexplained", False)]
+)
+def test_what_changes_less_than_the_form_is_no_discrepancy_unless_the_residual_calls_for_an_effect(
+    verdict, none
+):
+    """Beside noise of unknown size, the residual does not call for one."""
+    measured = 5 * np.random.default_rng(4).standard_normal(SAMPLES) + 3 * LAWS[2]
+    found = baseline(replace(asked(), form_error=0.2), fitted(measured), np.ones(1))
+    found = replace(found, noise=replace(found.noise, declared=np.zeros(1, bool)))
+    small = fitted(measured, 2)
+    said = probabilities(found, SEEN, judged(verdict), promised(measured), [small])
+    assert (said.get(small.label, 0.0) == 0.0) is none
+    assert (said.get(NO_DISCREPANCY, 0.0) > 0.5) is none
 
 
 def test_where_the_answer_is_refused_so_are_all_others():
