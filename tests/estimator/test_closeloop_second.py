@@ -24,7 +24,7 @@ from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
-from estimator.closeloop.search.pairs import beside, try_pairs, with_worth
+from estimator.closeloop.search.pairs import beside, beyond_doubt, try_pairs, with_worth
 from estimator.record import Record, Run
 from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
@@ -215,6 +215,31 @@ def test_a_pair_that_is_clear_by_its_errors_is_fitted_without_nothing():
     pair = replace(pair, fit=replace(pair.fit, values=np.array([10.0, 10.0])))
     fitter = SimpleNamespace(baseline=baseline(SimpleNamespace(policy=DEFAULT)))
     assert with_worth(fitter, [pair], []) == ([pair], [])
+
+
+@pytest.mark.parametrize(
+    ("converged", "size", "squares", "again"),
+    [
+        (False, 1.0, 300.0, True),
+        (True, 1.0, 300.0, False),  # the record leaves it in doubt
+        (False, 10.0, 300.0, False),  # nothing is in doubt
+        (False, 1.0, 500.0, False),  # no rival of the best pair
+    ],
+)
+def test_an_unfinished_fit_leaves_no_pair_in_doubt(converged, size, squares, again):
+    best = several(("viscous_damping", "wheel"), ("bump_stop", "wheel"), squares=100.0)
+    best = replace(best, fit=replace(best.fit, values=np.array([10.0, 10.0])))
+    short = several(("viscous_damping", "wheel"), ("cubic_stiffness", "wheel"), squares=squares)
+    short = replace(short, fit=replace(short.fit, values=np.array([10.0, size]), converged=converged))
+    right = replace(short, fit=replace(short.fit, residual=0.1 * short.fit.residual))
+    asked = []
+    fitter = SimpleNamespace(
+        baseline=baseline(SimpleNamespace(policy=DEFAULT)),
+        finished=lambda promises: asked.extend(promises) or [right],
+    )
+    found = beyond_doubt(fitter, [best, short])
+    assert [p.label for p in asked] == [short.label] * again
+    assert found == ([right, best] if again else [best, short])
 
 
 def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_suggests(tmp_path):

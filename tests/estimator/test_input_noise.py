@@ -13,6 +13,8 @@ from scipy.signal import lfilter
 
 from estimator.closeloop.fitting.calibrate import without_input_noise
 from estimator.closeloop.fitting.noise_left import caused, noise_left
+from estimator.closeloop.fitting.reweighted import noise_of_best
+from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_part
 from estimator.noise import Noise
@@ -158,7 +160,7 @@ class LowPass:
 
     def simulate(self, theta):
         """See Problem."""
-        return [slow(run.u) for run in self.record.runs]
+        return [theta.get("gain", 1.0) * slow(run.u) for run in self.record.runs]
 
     def residuals(self, theta):
         """See Problem."""
@@ -226,6 +228,21 @@ def test_the_noise_that_stays_in_the_inputs_is_found_at_the_outputs(seed):
     blocks = weighed.reshape(60, -1).mean(axis=1) * np.sqrt(N / 60)
     assert np.mean(blocks**2) < 6.0  # as it is, they would have some hundred times their size
     assert np.mean((left[0] / noise.std).reshape(60, -1).mean(axis=1) ** 2) * N / 60 > 30
+
+
+def test_an_effect_that_holds_an_input_back_does_not_hide_its_noise():
+    """A saturation would, and all that do not saturate would then leave more than noise."""
+    problem = smooth(measured(np.random.default_rng(0), 0.002))
+    left = tuple(problem.residuals({}))
+    base = SimpleNamespace(theta={}, residuals=left)
+    noise = noise_left(problem, {}, left, "noise")
+    found = [
+        SimpleNamespace(theta={"gain": gain}, residuals=left, fit=SimpleNamespace(cost=1.0))
+        for gain in (1.0, 0.0)
+    ]
+    said = [noise_of_best(Baseline(problem, base, noise), [[h]]).std for h in found]
+    assert_allclose(said[1], said[0])
+    assert_allclose(said[1], noise.std)
 
 
 def test_noise_of_inputs_and_of_times_adds_up():

@@ -16,7 +16,6 @@ from estimator.closeloop.fitting.noise_left import noise_left
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, sandwich
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, best_by_label, cost
-from estimator.closeloop.hypotheses.promise import built
 from estimator.closeloop.question.problem import Problem
 from estimator.noise import Left, Noise
 from estimator.record import Array
@@ -40,14 +39,15 @@ def reweighted(
 def noise_of_best(baseline: Baseline, found: Sequence[Sequence[Hypothesis]]) -> Noise | None:
     """The noise that the best of the hypotheses leaves; None if it says no more than that of the baseline.
 
-    Noise that is not declared is taken from what it leaves, unless outputs depend on each other in that.
+    Noise that is not declared is taken from what it leaves, unless outputs depend on each other in that. What
+    noise of the inputs does is that of the calibrated FMU: a wrong best one may hold it back, as a saturation
+    does, and the right one would then leave more than noise.
     """
     if not any(found):
         return None
     best = min((h for some in found for h in some), key=cost)
-    here = built(baseline.problem, best.candidates)
     left: Left = "noise" if baseline.seen_by_several(best) is False else "form"
-    noise = noise_left(here, best.theta, best.residuals, left)
+    noise = noise_left(baseline.problem, baseline.hypothesis.theta, best.residuals, left)
     same = all(n.known and n.weighting.is_white for n in (baseline.noise, noise))
     return None if same else noise
 

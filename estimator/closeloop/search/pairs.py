@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from estimator.closeloop.fitting.fitter import Fitter
+from estimator.closeloop.fitting.fitter import Fitter, from_there
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
@@ -47,12 +47,20 @@ def try_pairs(
     promises = _from_base(baseline.problem, screening.fit, physical)
     if alone:
         promises += _partners(baseline, screening, list(alone.values())[: limits.paired], physical)
-    found = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs))
+    found = beyond_doubt(fitter, dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs)))
     reached = min((cost(h) for h in singles), default=cost(baseline.hypothesis))
     certain = [h for h in found if not baseline.idle(h)]
     doubtful = [h for h in found if baseline.idle(h) and cost(h) < reached]
     valued, freed = with_worth(fitter, doubtful, list(alone.values()))
     return best_by_label([*certain, *(h for h in valued if not baseline.idle(h))]), freed
+
+
+def beyond_doubt(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Pairs, best first, those fitted to the end whose members only an unfinished fit leaves in doubt."""
+    baseline, rival = fitter.baseline, fitter.baseline.policy.search.rival
+    near = [h for h in found if not h.fit.converged and cost(h) < rival * cost(found[0])]
+    short = [h for h in near if baseline.idle(h)]
+    return best_by_label([*found, *fitter.finished(from_there(short))]) if short else list(found)
 
 
 def with_worth(
