@@ -124,18 +124,25 @@ def test_a_clock_is_held_where_a_part_is_simulated_with_the_values_before(builde
 
 
 @pytest.mark.parametrize(
-    ("pair", "member", "shown"),
+    ("pair", "member", "both", "shown"),
     [
-        (None, 1010.0, False),  # nothing calls for an offset where one effect leaves noise
-        (1030.0, 1010.0, True),  # what a second effect explains, an offset beside its partner does too
-        (1000.0, 1100.0, False),  # a second effect explains clearly more
-        (1030.0, 2000.0, False),  # an offset explains nothing beside either effect
+        (None, 1010.0, None, False),  # nothing calls for an offset where one effect leaves noise
+        (
+            1030.0,
+            1010.0,
+            1010.0,
+            True,
+        ),  # what a second effect explains, an offset beside its partner does too
+        (1000.0, 1100.0, 1000.0, False),  # a second effect explains clearly more
+        (1030.0, 2000.0, 1030.0, False),  # an offset explains nothing beside either effect
+        (1500.0, 1900.0, 1010.0, True),  # it explains nearly all that a better pair leaves
+        (1500.0, 1900.0, 1400.0, False),  # what the pair leaves has another cause
     ],
 )
 def test_an_offset_takes_the_place_of_a_second_effect_unless_that_explains_more(
-    monkeypatch, pair, member, shown
+    monkeypatch, pair, member, both, shown
 ):
-    """Sums of squares of the best pair and of an offset beside a member of it; 2000 by one effect alone."""
+    """Sums of squares of the best pair, and of an offset beside its member and beside it; 2000 by one."""
 
     def fitted(squares, *kinds):
         left = np.full(1000, np.sqrt(squares / 1000))
@@ -153,7 +160,8 @@ def test_an_offset_takes_the_place_of_a_second_effect_unless_that_explains_more(
 
     def finished(promises, others):
         assert [u.name for u in others] == [CLOCK]
-        return [fitted(beside[p.candidates[0].kind], p.candidates[0].kind) for p in promises]
+        kinds = [[c.kind for c in p.candidates] for p in promises]
+        return [fitted(both if len(some) > 1 else beside[some[0]], *some) for some in kinds]
 
     fitter = SimpleNamespace(baseline=judging, alone=SimpleNamespace(finished=finished))
     two = fitted(pair, "viscous_damping", "constant_force") if pair else None

@@ -41,22 +41,33 @@ def clock_of(shown: Screened) -> float:
 
 
 def clock_beside(fitter: Fitter, best: Hypothesis, pair: Hypothesis | None) -> float:
-    """The same if a fit of one effect shows an offset; best, pair: the best single hypothesis and pair.
+    """The same if a fit with an offset shows one; best, pair: the best single hypothesis and pair.
 
-    The offset is looked for if the best single one leaves more than noise, or the pair is better.
+    The offset is looked for if the best single one leaves more than noise, or the pair is better. It is
+    looked for beside one effect; beside the pair if that explains clearly more and leaves more than noise.
     """
     baseline = fitter.baseline
     outdone = pair is not None and baseline.beats(pair, best)
     if not _open(baseline) or (arrived(fitter, best) and not outdone):
         return 0.0
-    step = baseline.problem.record.sample
+    step, samples = baseline.problem.record.sample, len(best.fit.residual)
     ones = from_there([best])
     ones += [Promise((c,), 0.0, pair.fit.theta) for c in pair.candidates] if pair else []
     found = fitter.alone.finished(ones, [*best.others, clock_within(step)])
-    samples, left = len(best.fit.residual), min(map(cost, [best, *found]))
+    left = min(map(cost, [best, *found]))
+    if pair is None or not _clear(baseline, left, cost(pair), samples):
+        return step if _shown(baseline, best, left) else 0.0
+    if arrived(fitter, pair):
+        return 0.0
+    both = fitter.alone.finished(from_there([pair]), [*pair.others, clock_within(step)])
+    return step if _shown(baseline, pair, min(map(cost, [pair, *both]))) else 0.0
+
+
+def _shown(baseline: Baseline, h: Hypothesis, left: float) -> bool:
+    """Whether an offset beside h, with a sum of squares left, explains more than chance and than that."""
+    samples = len(h.fit.residual)
     beyond = left - samples - baseline.policy.detection.chance * float(np.sqrt(2 * samples))
-    shown = _clear(baseline, cost(best), left, samples) and cost(best) - left > beyond
-    return step if shown and not (pair and _clear(baseline, left, cost(pair), samples)) else 0.0
+    return _clear(baseline, cost(h), left, samples) and cost(h) - left > beyond
 
 
 def _open(baseline: Baseline) -> bool:
