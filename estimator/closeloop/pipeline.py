@@ -103,7 +103,7 @@ class Chain:
     def _late(
         self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]
     ) -> "Chain | None":
-        """The same with an offset of the outputs' clock, if one beside the best single effect shows.
+        """The same with an offset of the outputs' clock, if one shows beside the best effects.
 
         A second effect may explain as much, but an offset needs no effect.
         """

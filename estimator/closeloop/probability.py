@@ -38,7 +38,7 @@ from estimator.closeloop.hypotheses.fitted import BLOCKS
 from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise, distinct
 from estimator.closeloop.hypotheses.relations import becomes, includes
-from estimator.closeloop.size_odds import calls_for_more, odds_by_size, over_form
+from estimator.closeloop.size_odds import beyond_form, calls_for_more, odds_by_size
 from estimator.record import Array
 
 NO_DISCREPANCY = "no_discrepancy"
@@ -73,7 +73,7 @@ def probabilities(
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
     calls = judgement.verdict == "unexplained"  # the residual itself is more than the form leaves
-    minor = [h for h in fitted if not calls and over_form(baseline, h) < 1.0]
+    minor = [h for h in fitted if not calls and beyond_form(baseline, h) < 1.0]
     same |= {h.label: NO_DISCREPANCY for h in minor}
     refused = fitted if refuted(judgement.checks) else refused
     for label, p in _of_fits(baseline, promises, fitted, refused, minor).items():

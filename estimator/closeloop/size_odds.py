@@ -1,4 +1,6 @@
-"""What a size says: whether a residual would matter alone, and what an effect or the form makes probable."""
+"""What sizes say: whether a residual would matter alone, whether an effect is more than an error of form,
+and how probable an effect makes the size of a residual.
+"""
 
 from __future__ import annotations
 
@@ -25,11 +27,12 @@ def calls_for_more(baseline: Baseline, h: Hypothesis) -> bool:
     return material(baseline, beyond_noise(baseline, h, "fit", "choose"), baseline.noise.std) >= 1.0
 
 
-def over_form(baseline: Baseline, h: Hypothesis) -> float:
-    """What h changes over what another form of the model would leave; infinite if the form is right.
+def beyond_form(baseline: Baseline, h: Hypothesis) -> float:
+    """How many times what another form of the model would leave h changes; infinite if the form is right.
 
-    An error of form may be of any shape, but one effect does not explain most of it. Where h does, of what is
-    beyond noise, it counts too: of all outputs, or of its own if h is one faulty sensor.
+    The change of an output is compared with the open share of it. A smaller change counts too if it explains
+    most of what is beyond noise, because one effect does not explain most of an error of form. All outputs
+    together count for that, but for one faulty sensor only its own output.
     """
     b, share, most = baseline, baseline.problem.form_error, baseline.policy.decision.most
     if not share:

@@ -18,7 +18,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.hypotheses.relations import becomes, limits
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.closeloop.size_odds import over_form
+from estimator.closeloop.size_odds import beyond_form
 from estimator.record import Record, Run
 from fmus.effects import EFFECTS
 from scenarios.closing.result import effects_of
@@ -177,15 +177,15 @@ def test_what_an_effect_changes_is_more_than_form_or_most_of_the_residual(before
     one = law("constant_force", 0, 0.0) if at is None else fault_of(at)
     one = replace(left(*after), candidates=one.candidates)
     found = baseline(asked(FORM), left(*before), NOISE)
-    assert (over_form(found, one) >= 1.0) is more
-    assert over_form(baseline(asked(), left(*before), NOISE), one) == np.inf
+    assert (beyond_form(found, one) >= 1.0) is more
+    assert beyond_form(baseline(asked(), left(*before), NOISE), one) == np.inf
 
 
 @given(st.floats(0.0, 1.0), st.floats(1.0, 50.0))
 def test_a_larger_change_is_never_less_than_form(share, size):
     found = baseline(asked(FORM), left(size, 1.0), NOISE)
     smaller, larger = (
-        over_form(found, replace(left(size * (1 - part), 1.0), candidates=fault_of("a").candidates))
+        beyond_form(found, replace(left(size * (1 - part), 1.0), candidates=fault_of("a").candidates))
         for part in (share / 2, share)
     )
     assert larger >= smaller - 1e-9

@@ -16,7 +16,7 @@ from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
 from estimator.closeloop.probability import more_probable
-from estimator.closeloop.size_odds import over_form
+from estimator.closeloop.size_odds import beyond_form
 from fmus.effects import EFFECTS
 
 NO_EFFECT: Mapping[Name, str] = {  # what a residual that fails a check may be
@@ -47,7 +47,7 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     if baseline.noise.declared.any():
         found.append(above_noise("outputs left above their noise", baseline, h, "choose"))
     if baseline.problem.form_error:
-        size = over_form(baseline, h)
+        size = beyond_form(baseline, h)
         found.append(Check.least("what it changes is more than another form leaves", size, 1.0))
     return found
 

@@ -4,8 +4,8 @@ Before the search, an offset of the outputs' clock is shown if it explains more 
 as the best effect does: what an offset explains needs no effect. After it, an offset is shown if a fit of one
 effect with an offset explains more than chance would, and more than it leaves, of what the best single effect
 leaves beyond noise. If it explained the smaller part, the larger one would have another cause, which may
-explain the rest as well. The effects are the best single one and those of the best pair. No offset is shown
-if that pair explains clearly more.
+explain the rest as well. The effects are the best single one and those of the best pair. If that pair
+explains clearly more, the same is asked of what the pair leaves.
 """
 
 import numpy as np
@@ -43,8 +43,9 @@ def clock_of(shown: Screened) -> float:
 def clock_beside(fitter: Fitter, best: Hypothesis, pair: Hypothesis | None) -> float:
     """The same if a fit with an offset shows one; best, pair: the best single hypothesis and pair.
 
-    The offset is looked for if the best single one leaves more than noise, or the pair is better. It is
-    looked for beside one effect; beside the pair if that explains clearly more and leaves more than noise.
+    The offset is looked for if the best single one leaves more than noise, or the pair is better. It is first
+    fitted beside one effect. If the pair explains clearly more than such a fit, and still leaves more than
+    noise, the offset is fitted beside the pair.
     """
     baseline = fitter.baseline
     outdone = pair is not None and baseline.beats(pair, best)
@@ -64,7 +65,10 @@ def clock_beside(fitter: Fitter, best: Hypothesis, pair: Hypothesis | None) -> f
 
 
 def _shown(baseline: Baseline, h: Hypothesis, left: float) -> bool:
-    """Whether an offset beside h, with a sum of squares left, explains more than chance and than that."""
+    """Whether a fit of h with an offset explains more of what h leaves than chance would, and most of it.
+
+    left: the sum of squares that the fit with the offset leaves.
+    """
     samples = len(h.fit.residual)
     beyond = left - samples - baseline.policy.detection.chance * float(np.sqrt(2 * samples))
     return _clear(baseline, cost(h), left, samples) and cost(h) - left > beyond

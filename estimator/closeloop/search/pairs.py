@@ -56,7 +56,11 @@ def try_pairs(
 
 
 def beyond_doubt(fitter: Fitter, found: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Pairs, best first, those fitted to the end whose members only an unfinished fit leaves in doubt."""
+    """Pairs, best first, none of which is in doubt for want of a finished fit.
+
+    An unfinished fit has errors so wide that an effect may not be clear of zero by them. Pairs of which that
+    is true, and which are rivals of the best one, are fitted to the end.
+    """
     baseline, rival = fitter.baseline, fitter.baseline.policy.search.rival
     near = [h for h in found if not h.fit.converged and cost(h) < rival * cost(found[0])]
     short = [h for h in near if baseline.idle(h)]

@@ -22,7 +22,7 @@ MEANINGS: Mapping[Name, tuple[str, str]] = {  # how the value stands to the limi
     "better than without it on the part to choose": (ABOVE, GAIN),
     "outputs left above their noise": (MOST, "number of outputs with declared noise that stay above it"),
     "what it changes is more than another form leaves": (
-        LEAST, "what it changes, or how much it explains, over what an error of the model's form would",
+        LEAST, "its change over that of an error of form, or the share it explains over the one asked for",
     ),
     "not improbable": (LEAST, "probability of the effects that are named, together"),
     "nothing richer gains on the part to identify": (
