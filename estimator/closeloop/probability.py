@@ -230,9 +230,9 @@ def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
     """How much more probable a mechanism outside the library makes what the best hypothesis leaves.
 
     A right answer leaves a share of the sum of squares beyond noise that is exponentially distributed with
-    the mean of the policy; a mechanism outside leaves any share of it with equal probability. So does a right
-    answer if noise is not declared and is not white, since only its white part is told from a residual. Its
-    noise is independent between outputs, however, and what a mechanism leaves is not.
+    the mean of the policy; a mechanism outside leaves any share of it with equal probability. So does noise
+    that is neither declared nor white, since only its white part is told from a residual. Such noise seldom
+    depends between outputs, and what a mechanism leaves seldom does not.
     """
     prior, exact = baseline.policy.prior, not baseline.problem.form_error
     total, _ = _beyond(baseline, baseline.hypothesis)
@@ -246,8 +246,9 @@ def _odds_of_outside(baseline: Baseline, best: Hypothesis) -> float:
     coloured = 0.0 if baseline.noise.known else prior.coloured
     tiny, level = np.finfo(float).tiny, baseline.policy.detection.level
     several = baseline.seen_by_several(best)
-    odds = 1.0 if several is None else (1 - level) / level if several else level / (1 - level)
-    return odds * max(any_share, tiny) / max((1 - coloured) * right + coloured * any_share, tiny)
+    noise, mechanism = (1.0, 1.0) if several is None else (level, 1.0) if several else (1.0, level)
+    of_answer = (1 - coloured) * right + coloured * noise * any_share
+    return mechanism * max(any_share, tiny) / max(of_answer, tiny)
 
 
 def _beyond(baseline: Baseline, h: Hypothesis) -> tuple[float, float]:
