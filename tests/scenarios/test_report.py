@@ -17,6 +17,8 @@ from scenarios import close_loop
 from scenarios.closing.closing import builder_for, experiment_of, pose
 from scenarios.closing.notes import left_by_the_answer
 from scenarios.closing.page import sections
+from scenarios.closing.page.case import Case
+from scenarios.closing.page.wording import explained_words
 from scenarios.closing.result import Result, start_values
 from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 from tests.truth.rig import write_null_record
@@ -169,3 +171,27 @@ def test_what_an_answer_leaves_is_said_beside_it(after: float, told: bool) -> No
         assert "75% of the residual's variance" in notes[0]
         assert "5.0 times the noise" in notes[0]
     assert left_by_the_answer(problem, SimpleNamespace(chosen=None, noise=found.noise), rms) == []
+
+
+@pytest.mark.parametrize(("after", "told"), [(1.0, False), (1.2, False), (5.0, True), (12.0, False)])
+def test_the_lead_says_how_much_an_answer_explains(after: float, told: bool) -> None:
+    """A residual of 100 samples is 1.2 times the noise by chance."""
+    run = SimpleNamespace(test=np.arange(500) >= 400)
+    record = SimpleNamespace(outputs=("angle", "speed"), runs=(run,))
+    noise = SimpleNamespace(redundancy=np.ones(2))
+    error = {
+        "angle": {"before": 10.0, "after": 1.0, "noise": 1.0},
+        "speed": {"before": 20.0, "after": 2.0 * after, "noise": 2.0},
+    }
+    case = Case(
+        SimpleNamespace(policy=DEFAULT, record=record),
+        SimpleNamespace(baseline=SimpleNamespace(noise=noise)),
+        SimpleNamespace(error=error),
+        SimpleNamespace(),
+    )
+    explained, rest = explained_words(case)
+    if told:
+        assert words(explained) == "at least 75.0 % of the residual's variance"
+        assert "speed is 5.0 times the noise" in rest
+    else:
+        assert (explained, rest) == ("the residual", "")

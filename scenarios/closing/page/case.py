@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
@@ -39,4 +41,22 @@ class Case:
             output: share
             for output, share in self.result.gap_closed.items()
             if error[output]["before"] > GAP_OVER_NOISE * error[output]["noise"]
+        }
+
+    @property
+    def left(self) -> dict[str, tuple[float, float]]:
+        """What an answer leaves on the test part, for the outputs for which that is more than noise.
+
+        For each, the share of the residual's variance that the answer explains, and the rest over the noise.
+        """
+        limits, samples = (
+            self.problem.policy.decision,
+            sum(int(r.test.sum()) for r in self.problem.record.runs),
+        )
+        chance = limits.scatter * np.sqrt(self.found.baseline.noise.redundancy / (2 * samples))
+        limit = dict(zip(self.problem.record.outputs, limits.clean + chance, strict=True))
+        return {
+            output: (1 - (e["after"] / e["before"]) ** 2, e["after"] / e["noise"])
+            for output, e in self.result.error.items()
+            if limit[output] * e["noise"] < e["after"] < e["before"]
         }

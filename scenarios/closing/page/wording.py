@@ -16,6 +16,7 @@ from scenarios.closing.page.glossary import (
 from scenarios.closing.result import Figure, effects_of
 from scenarios.drawing.typography import (
     HELD,
+    number,
     percent,
     quantity,
     with_error,
@@ -69,6 +70,18 @@ def gap_words(case: Case, closes: str = "It closes") -> str:
     return f"{closes} {least}{percent(min(shares))} of the gap between model and measurement."
 
 
+def explained_words(case: Case) -> tuple[str, str]:
+    """What the answer explains, and a sentence about what it leaves, empty if that is only noise."""
+    left = case.left
+    if not left:
+        return "the residual", ""
+    output = min(left, key=lambda o: left[o][0])
+    share, noises = left[output]
+    least = f"at least {percent(share)}" if len(case.result.error) > 1 else percent(share)
+    beyond = f" What is left of {output} is {number(noises, 2)} times the noise"
+    return f"{least} of the residual's variance", f"{beyond}, and the library does not explain it."
+
+
 def missed_words(case: Case) -> str:
     """An explanation of the missing forces."""
     if not case.found.forces:
@@ -91,19 +104,22 @@ def missed_words(case: Case) -> str:
 
 
 def _traced(case: Case) -> Story:
+    explained, rest = explained_words(case)
     return Story(
         _lacks(case),
-        "One effect of the library explains the residual, and every other effect that was tried is rejected "
-        "(section 6).",
+        f"One effect of the library explains {explained}, and every other effect that was tried is rejected "
+        f"(section 6).{rest}",
         "The effect was built into the FMU. Its parameters were fitted to the identify part by simulation, "
         "together with the calibrated parameters.",
     )
 
 
 def _several(case: Case) -> Story:
+    explained, rest = explained_words(case)
     return Story(
         _lacks(case, "Together they close"),
-        "No single effect explains the residual. These effects together explain it, and each is needed.",
+        f"No single effect explains the residual. These effects together explain {explained}, and each is "
+        f"needed.{rest}",
         "The effects were built into the FMU. Their parameters were fitted to the identify part by "
         "simulation, together with the calibrated parameters.",
     )
