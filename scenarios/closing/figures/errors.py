@@ -14,7 +14,7 @@ from scenarios.drawing.sheet import (
     name_axes,
     sheet,
 )
-from scenarios.drawing.typography import number, quantity
+from scenarios.drawing.typography import HELD, number, quantity
 
 COLOURS = {"declared": CLOUD, "before": BEFORE, "after": AFTER, "placebo": NOISE, "black_box": NOISE}
 NAMES = {
@@ -67,9 +67,9 @@ def _bars(ax: Axes, values: dict[str, float], names: dict[str, str], unit: str) 
     low = min(*over.values(), 10 ** (-0.05 * decades))
     ax.set_xlim(low, 10 ** (1.55 * decades))
     steps = next(s for limit, s in STEPS.items() if decades <= limit)
-    powers = range(0, int(decades) + 1, max(1, round(decades / LABELS)))  # keeps labels from overlapping
+    powers = range(0, int(decades) + 1, max(1, int(np.ceil(decades / LABELS))))  # so that none overlap
     ticks = [s * 10**d for d in powers for s in steps if s * 10**d <= 10 ** (1.1 * decades)]
-    ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    ax.set_xticks(ticks, [number(t, 1).removeprefix(f"1{HELD}×{HELD}") for t in ticks])
     ax.minorticks_off()
     ax.set_yticks(range(len(shown)), [names[k] for k in shown])
     ax.grid(False, axis="y")
