@@ -131,9 +131,8 @@ def _rejection(case: Case) -> Values:
 
 def _use(case: Case, folder: Path) -> Values:
     """Values for the section on running the augmented FMU and repeating the run."""
-    chosen, fmu = case.found.built_in, folder / case.result.augmented_fmu
-    effects = [c for c in (chosen.candidates if chosen else ()) if not c.is_fault]
-    theta = chosen.fit.theta if chosen else {}
+    best, fmu = case.found.built_in or case.found.base, folder / case.result.augmented_fmu
+    effects, theta = [c for c in best.candidates if not c.is_fault], best.fit.theta
     known = describe(fmu).variables if fmu.is_file() else {}
     others = {
         n: v

@@ -1,6 +1,8 @@
 """The report: one file that holds all it shows, with the numbers of the result."""
 
+import ast
 import base64
+import html
 import json
 import re
 from collections.abc import Callable
@@ -96,6 +98,14 @@ def test_a_record_without_a_discrepancy_has_its_page_and_names_are_escaped(tmp_p
     assert "<b>bold</b>" not in page
     assert "&lt;b&gt;bold&lt;/b&gt; &amp; sons" in page
     assert "nan" not in words(page).lower().split()
+    assert result.calibrated
+    assert started(page).keys().isdisjoint(result.calibrated)
+
+
+def started(page: str) -> dict[str, float]:
+    """The start values with which the page runs the augmented FMU."""
+    found = re.search(r"^start = (.*)$", page, flags=re.M)
+    return ast.literal_eval(html.unescape(found[1])) if found else {}
 
 
 MORE_OUTPUTS = """
@@ -171,6 +181,11 @@ def test_what_an_answer_leaves_is_said_beside_it(after: float, told: bool) -> No
         assert "75% of the residual's variance" in notes[0]
         assert "5.0 times the noise" in notes[0]
     assert left_by_the_answer(problem, SimpleNamespace(chosen=None, noise=found.noise), rms) == []
+
+
+def test_the_page_runs_the_augmented_fmu_with_the_values_found(page: str, demo: tuple[Result, Path]) -> None:
+    assert re.search(r"^start = ", page, flags=re.M)
+    assert started(page).keys().isdisjoint(demo[0].calibrated)
 
 
 @pytest.mark.parametrize(("after", "told"), [(1.0, False), (1.2, False), (5.0, True), (12.0, False)])
