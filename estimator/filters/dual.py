@@ -31,6 +31,7 @@ class Dual(Estimator):
     """
 
     name = "dual"
+    noises = False
 
     def __init__(
         self,
@@ -57,7 +58,7 @@ class Dual(Estimator):
             raise BadInput(
                 f"[estimate.options] filter = '{cls.name}' does not support gate and adapt; leave them out"
             )
-        if joint.sensor_noise:
+        if joint.noises:
             raise BadInput(
                 f"[estimate.options] filter = '{cls.name}' takes all but the states for constant, which "
                 "noise that is correlated in time is not; choose 'ukf', or leave out [estimate.noise]"

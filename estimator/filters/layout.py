@@ -13,7 +13,7 @@ from estimator.filters.bounds import (
     coded,
     grown,
 )
-from estimator.filters.unknown_input import UnknownInput
+from estimator.filters.unknown_input import InputError, UnknownInput
 from estimator.record import Array
 
 
@@ -21,8 +21,8 @@ from estimator.record import Array
 class Layout:
     """The order of values in x and in a row.
 
-    x: n states, coordinates of the parameters, states of the unknown inputs and of the sensors' noise. Row: n
-    states, other states, parameters, known inputs, inputs that are driven by unknown inputs.
+    x: n states, coordinates of the parameters, states of the unknown inputs, errors of known inputs, noise of
+    the sensors. Row: n states, other states, parameters, known inputs, inputs that unknown inputs drive.
     """
 
     n: int
@@ -30,6 +30,7 @@ class Layout:
     transforms: tuple[Whole, Array, Array]  # (p,) each, see transform.coded
     inputs: int
     fed: Whole  # (n_fed,) index of the unknown inputs' state that drives each input
+    errors: Whole  # (n_errors, 2) a known input, and the index of the state that is its error
 
     @cached_property
     def width(self) -> int:
@@ -40,22 +41,27 @@ class Layout:
         """Rows (k, width) for a step from X (k, n_x), and X after the step without the FMU's states.
 
         u: (inputs,); carried: (others,); F: (n_w, n_w) transition of the states after the parameters; unknown
-        inputs act with the mean of their values at both ends.
+        inputs and errors of known ones act with the mean of their values at both ends.
         """
         values, after = np.empty((len(X), self.width)), np.empty(X.shape)
-        fill(X, u, carried, F, self.n, *self.transforms, self.fed, values, after)
+        fill(X, u, carried, F, self.n, *self.transforms, self.fed, self.errors, values, after)
         return values, after
 
 
 def layout(
-    n: int, others: int, transforms: Sequence[Transform], inputs: int, unknown: Sequence[UnknownInput]
-) -> Layout:
-    """The layout for n states and the given numbers of other states and known inputs."""
+    n: int, others: int, transforms: Sequence[Transform], inputs: Sequence[str],
+    unknown: Sequence[UnknownInput], errors: Sequence[InputError] = (),
+) -> Layout:  # fmt: skip
+    """The layout for n states, so many others and the known inputs."""
     fed, at = [], 0
     for w in unknown:
         fed += [at + state for state in w.feeds.values()]
         at += len(w.states)
-    return Layout(n, others, coded(transforms), inputs, np.array(fed, dtype=np.int64))
+    noisy = [(inputs.index(e.name), at + 2 * i) for i, e in enumerate(errors)]
+    return Layout(
+        n, others, coded(transforms), len(inputs), np.array(fed, dtype=np.int64),
+        np.array(noisy, dtype=np.int64).reshape(-1, 2),
+    )  # fmt: skip
 
 
 @compiled
@@ -71,7 +77,7 @@ def collect(found: Array, n: int, after: Array, carried: Array) -> None:
 @compiled
 def fill(
     X: Array, u: Array, carried: Array, F: Array, n: int, codes: Whole, low: Array, high: Array, fed: Whole,
-    values: Array, after: Array,
+    errors: Whole, values: Array, after: Array,
 ) -> None:  # fmt: skip
     """See Layout.rows; codes, low, high: transforms of the parameters."""
     first = n + len(codes)  # of the states of the unknown inputs in x
@@ -94,3 +100,6 @@ def fill(
             after[k, first + i] = total
         for i in range(len(fed)):
             values[k, at_fed + i] = (X[k, first + fed[i]] + after[k, first + fed[i]]) / 2
+        for i in range(len(errors)):
+            state = first + errors[i, 1]
+            values[k, at_inputs + errors[i, 0]] += (X[k, state] + after[k, state]) / 2

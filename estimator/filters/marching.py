@@ -25,7 +25,7 @@ rows_of = external(WHOLE)  # the call; its answer, -1 or the number of a row, fi
 class Given(NamedTuple):
     """Places of the unknowns; see Layout.
 
-    still: transition of the states of unknown inputs over no time; direct: (m,) places of the outputs in x,
+    still: transition of the random processes over no time; direct: (m,) places of the outputs in x,
     or empty; seen: their places in what is read from the FMU.
     """
 
@@ -34,13 +34,14 @@ class Given(NamedTuple):
     low: Array
     high: Array
     fed: Whole
+    errors: Whole
     still: Array
     direct: Whole
     seen: Whole
 
 
 class Rule(NamedTuple):
-    """What a filter takes for all samples; see Ukf. F: transition of unknown inputs over a part of a step."""
+    """What a filter takes for all samples; see Ukf. F: see Joint.transitions."""
 
     F: Array
     Wm: Array
@@ -105,8 +106,8 @@ def stepped(
     points, carried, side = e.X[now], e.carried[now], 0
     for part in range(len(held)):
         fill(
-            points, held[part], carried, F, given.n, given.codes, given.low, given.high, given.fed,
-            values, after[side],
+            points, held[part], carried, F[part], given.n, given.codes, given.low, given.high, given.fed,
+            given.errors, values, after[side],
         )  # fmt: skip
         if rows_of(function, (argument,)) >= 0:
             return -1
@@ -128,8 +129,8 @@ def looked(
                 room.outputs[i, j] = X[i, given.direct[j]]
         return True
     fill(
-        X, u, e.carried[to], given.still, given.n, given.codes, given.low, given.high, given.fed, values,
-        room.after[0],
+        X, u, e.carried[to], given.still, given.n, given.codes, given.low, given.high, given.fed,
+        given.errors, values, room.after[0],
     )  # fmt: skip
     if rows_of(function, (argument,)) >= 0:
         return False
@@ -204,7 +205,9 @@ class March:
         places = () if joint.direct is None else np.arange(n)[joint.direct]
         direct, seen = (np.array(some, dtype=np.int64) for some in (places, joint.seen))
         layout = joint.layout
-        self._given = Given(layout.n, *layout.transforms, layout.fed, joint.still, direct, seen)
+        self._given = Given(
+            layout.n, *layout.transforms, layout.fed, layout.errors, joint.still, direct, seen
+        )
         self._t, self._last = 0.0, 0
 
     def begin(self, now: Estimate, X: Array, L: Array, rejected: Array) -> None:

@@ -35,11 +35,12 @@ class Estimator(ABC):
     """A filter that an experiment can choose; `name` is the value of the key `filter`.
 
     moments: whether mean and covariance are all that it knows. If not, its estimates cannot be smoothed, and
-    `watch` cannot carry it over a gap.
+    `watch` cannot carry it over a gap. noises: whether x may hold noise of inputs and outputs.
     """
 
     name: ClassVar[str]
     moments: ClassVar[bool] = True
+    noises: ClassVar[bool] = True
 
     @classmethod
     @abstractmethod

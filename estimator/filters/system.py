@@ -18,7 +18,7 @@ from estimator.filters.bounds import Transform
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.filters.layout import collect, layout
 from estimator.filters.sensor_noise import SensorNoise
-from estimator.filters.unknown_input import UnknownInput
+from estimator.filters.unknown_input import InputError, UnknownInput
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
@@ -63,11 +63,11 @@ class UnknownState:
 class Joint:
     """A System (see estimator.filters.estimator) that simulates an FMU.
 
-    x = states, coordinates of the parameters (`transform`), states of the unknown inputs, noise of sensors
-    that is correlated in time; y = outputs with this noise. The other states of the FMU are not estimated;
-    they follow the mean. Close the object after use.
+    x = states, coordinates of the parameters (`transform`), states of the unknown inputs, errors of known
+    inputs, noise of sensors that is correlated in time; y = outputs with this noise. The other states of the
+    FMU are not estimated; they follow the mean. Close the object after use.
     way: an access to use instead of the one that the probe chooses; compiled: False avoids numba;
-    sensor_noise: of outputs, correlated in time.
+    sensor_noise: of outputs, correlated in time; input_noise: of known inputs, white.
     """
 
     def __init__(
@@ -84,13 +84,15 @@ class Joint:
         way: Way | None = None,
         compiled: bool = True,
         sensor_noise: Sequence[SensorNoise] = (),
+        input_noise: Sequence[InputError] = (),
     ) -> None:
         self._stack = ExitStack()
-        self._steps: dict[float, tuple[Array, Array]] = {}
+        self._steps: dict[float, Array] = {}
+        self._parts: dict[tuple[float, int], Array] = {}
         self.archive = fmu if isinstance(fmu, Archive) else self._stack.enter_context(Archive(fmu))
         self.outputs, self.inputs = tuple(outputs), tuple(inputs)
         self.states, self.parameters, self.unknown = tuple(states), tuple(parameters), tuple(unknown)
-        self.sensor_noise = tuple(sensor_noise)
+        self.sensor_noise, self.input_noise = tuple(sensor_noise), tuple(input_noise)
         fed = [n for w in unknown for n in w.feeds]
         mine = [s.name for s in states]
         self.names = (*mine, *(p.name for p in parameters), *(n for w in self._shaped for n in w.states))
@@ -124,6 +126,7 @@ class Joint:
         self.states = tuple(replace(s, noise=x) for s, x in zip(self.states, noise, strict=True))
         self.sensor_noise = self.sensor_noise if sensor_noise is None else tuple(sensor_noise)
         self._steps.clear()
+        self._parts.clear()
 
     def set_walks(self, parameters: Sequence[UnknownParameter]) -> None:
         """Let the parameters wander as these do, which are the same in all else."""
@@ -132,25 +135,37 @@ class Joint:
         self._steps.clear()
 
     @property
-    def _shaped(self) -> tuple[UnknownInput | SensorNoise, ...]:
+    def _shaped(self) -> tuple[UnknownInput | InputError | SensorNoise, ...]:
         """The random processes whose states follow those of the FMU and the parameters in x."""
-        return (*self.unknown, *self.sensor_noise)
+        return (*self.unknown, *self.input_noise, *self.sensor_noise)
+
+    @property
+    def noises(self) -> dict[str, str]:
+        """The last states of x, which are noise, each with the input or output of which it is."""
+        return {n: w.name for w in self.input_noise for n in w.states} | {
+            n: w.output for w in self.sensor_noise for n in w.states
+        }
 
     def noise(self, dt: float) -> Array:
         """Process noise covariance (n, n) of a step of dt [s]."""
-        return self._over(dt)[1]
+        if dt not in self._steps:
+            if len(self._steps) >= KEPT:
+                self._steps.clear()
+            walks = np.array([*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)])
+            Q = block_diag(np.diag(walks**2 * dt), *(w.discrete(dt)[1] for w in self._shaped))
+            self._steps[dt] = np.ascontiguousarray(Q, dtype=float)
+        return self._steps[dt]
 
     def f(self, X: Array, u: Array, t: float, dt: float, carried: Array) -> tuple[Array, Array]:
         """See System. Unknown inputs act with the mean of both ends of a step, like known ones."""
-        if u.ndim == 2:
-            for part, held in enumerate(u):
-                X, carried = self.f(X, held, t + part * dt / len(u), dt / len(u), carried)
-            return X, carried
-        values, after = self.layout.rows(X, u, carried, self.transition(dt))
-        found = self._asked(self.copies.advance, values, t, dt)
-        carried = np.empty(len(carried))
-        collect(found, len(self.states), after, carried)
-        return after, carried
+        parts = np.atleast_2d(u)
+        part = dt / len(parts)
+        for i, (held, F) in enumerate(zip(parts, self.transitions(part, len(parts)), strict=True)):
+            values, after = self.layout.rows(X, held, carried, F)
+            found = self._asked(self.copies.advance, values, t + i * part, part)
+            X, carried = after, np.empty(len(carried))
+            collect(found, len(self.states), X, carried)
+        return X, carried
 
     def h(self, X: Array, u: Array, t: float, carried: Array) -> Array:
         """See System; the FMU is evaluated only if an output is not a state."""
@@ -164,9 +179,19 @@ class Joint:
         """Values to set in the FMU for each row (k, n) of X, with the present unknown inputs, (k, n_put)."""
         return self.layout.rows(X, u, carried, self.still)[0]
 
-    def transition(self, dt: float) -> Array:
-        """Transition matrix of the states of unknown inputs and sensor noise over dt [s], (n_w, n_w)."""
-        return self._over(dt)[0]
+    def transitions(self, part: float, parts: int) -> Array:
+        """Transition matrices (parts, n_w, n_w) of the random processes over the parts of a step; part: s."""
+        if (part, parts) not in self._parts:
+            if len(self._parts) >= KEPT:
+                self._parts.clear()
+            F = np.zeros((parts, *self.still.shape))
+            at = 0
+            for w in self._shaped:
+                own = slice(at, at + len(w.states))
+                F[:, own, own] = w.within(parts) if isinstance(w, InputError) else w.discrete(part)[0]
+                at = own.stop
+            self._parts[part, parts] = F
+        return self._parts[part, parts]
 
     def settled(self, x: Array) -> Array:
         """See System; clips parameters whose bounds are kept by clipping."""
@@ -222,25 +247,10 @@ class Joint:
     ) -> None:
         self.close()
 
-    def _over(self, dt: float) -> tuple[Array, Array]:
-        """Transition matrix of the random processes and process noise covariance over dt, cached."""
-        if dt not in self._steps:
-            if len(self._steps) >= KEPT:
-                self._steps.clear()
-            self._steps[dt] = self._worked_out(dt)
-        return self._steps[dt]
-
-    def _worked_out(self, dt: float) -> tuple[Array, Array]:
-        walks = np.array([*(s.noise for s in self.states), *(p.in_z(p.walk) for p in self.parameters)])
-        shaped = [w.discrete(dt) for w in self._shaped]
-        F = block_diag(*(F for F, _ in shaped)) if shaped else np.empty((0, 0))
-        Q = block_diag(np.diag(walks**2 * dt), *(Q for _, Q in shaped))
-        return np.ascontiguousarray(F, dtype=float), np.ascontiguousarray(Q, dtype=float)
-
     def _places(self, get: list[str]) -> None:
         """Set up the positions of unknowns in x, in the rows set in the FMU and in the rows read from it."""
         n, transforms = len(self.states), [p.transform for p in self.parameters]
-        self.layout = layout(n, len(self.others), transforms, len(self.inputs), self.unknown)
+        self.layout = layout(n, len(self.others), transforms, self.inputs, self.unknown, self.input_noise)
         self.clipped = [(i, t) for i, t in enumerate(transforms, n) if t.kind == "clip"]
         self.still = np.eye(len(self.names) - n - len(transforms))
         self.seen = [get.index(name) for name in self.outputs]

@@ -57,6 +57,13 @@ class Spread:
         """Distance of the sigma points of n states from the mean, in standard deviations."""
         return self.alpha * float(np.sqrt(n + self.kappa))
 
+    def beside(self, noises: int, n: int) -> "Spread":
+        """For n states, of which so many are noise: the distance is that of the others alone.
+
+        Noise acts linearly, while the farther the points of a nonlinear system lie, the more they see of it.
+        """
+        return replace(self, alpha=self.alpha * self.scale(n - noises) / self.scale(n)) if noises else self
+
 
 USUAL = Spread()
 
@@ -90,7 +97,8 @@ class Ukf(Filter, Estimator):
     @classmethod
     def of(cls, joint: Joint, start: Estimate, asked: Request) -> Self:
         """See Estimator.of."""
-        return cls(joint, start, joint.noise, asked.R, asked.dt, asked.gate, asked.adapt, asked.spread)
+        spread = asked.spread.beside(len(joint.noises), len(joint.names))
+        return cls(joint, start, joint.noise, asked.R, asked.dt, asked.gate, asked.adapt, spread)
 
     def _predict(self, u: Array, t: float, dt: float, Q: Array) -> tuple[Array, Array, Array, Array]:
         now, n = self.now, len(self.names)
@@ -131,8 +139,8 @@ class Ukf(Filter, Estimator):
             return 0
         self._marches[part] = march
         rule = Rule(
-            self.system.transition(part), self._Wm, self._Wc, self._scale, self._process_noise(dt), self.R,
-            self._deviations, self._patience,
+            self.system.transitions(part, s.held.shape[1]), self._Wm, self._Wc, self._scale,
+            self._process_noise(dt), self.R, self._deviations, self._patience,
         )  # fmt: skip
         march.begin(now, X, self.factored(now.x, now.P, now.t), self._memory.rejected)
         done, found = march.run(rule, s, slice(first, first + count), dt, rows)

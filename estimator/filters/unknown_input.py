@@ -75,6 +75,39 @@ class Wandering:
         return np.eye(1), np.array([[self.std**2 * dt]])
 
 
+@dataclass(frozen=True)
+class InputError:
+    """White noise of a recorded input, which is linear between its samples: what it was minus its record.
+
+    std: standard deviation at a sample, in the input's unit. The states are the errors at the present and at
+    the next sample. It adds to an input of the FMU that is known, and drives none itself.
+    """
+
+    name: str
+    std: float
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the filter's states."""
+        return f"{self.name}_error", f"{self.name}_next_error"
+
+    @property
+    def variance(self) -> Array:
+        """Variances of the states, (2,)."""
+        return np.full(2, self.std**2)
+
+    def discrete(self, dt: float) -> tuple[Array, Array]:
+        """Transition matrix (2, 2) and covariance of the added noise (2, 2) over a step of any length."""
+        return self.within(1)[0], np.diag([0.0, self.std**2])
+
+    def within(self, parts: int) -> Array:
+        """Transition matrices (parts, 2, 2) over the parts of a step, at whose end the next error is new."""
+        found = np.zeros((parts, 2, 2))
+        left = np.arange(parts, 0, -1)  # parts of the step, with this one
+        found[:, 0, 0], found[:, 0, 1], found[:-1, 1, 1] = 1 - 1 / left, 1 / left, 1.0
+        return found
+
+
 UnknownInput = Shaped | Wandering
 
 

@@ -19,6 +19,7 @@ from fmus.host.apart.room import closing_rooms
 from fmus.host.archive import Archive
 from fmus.host.grading.honest import check_honest
 from fmus.models import model_class
+from scenarios.drawing.typography import quantity
 from scenarios.estimating.alarms import alarms
 from scenarios.estimating.findings import (
     Findings,
@@ -153,6 +154,7 @@ def _notes(found: Findings) -> list[str]:
         ]
     notes += _notes_on_form(found)
     notes += _notes_on_noise(found)
+    notes += _notes_on_inputs(found)
     if found.joint.others:
         notes.append(f"states that are simulated, not estimated: {', '.join(found.joint.others)}")
     return notes
@@ -174,6 +176,14 @@ def _notes_on_noise(found: Findings) -> Iterator[str]:
             yield f"{lead}; the likelihood of the record is largest with {', '.join(said)}"
         elif not declared or wanted:
             yield f"{lead}; it was estimated from the roughness of the measurements"
+
+
+def _notes_on_inputs(found: Findings) -> Iterator[str]:
+    """Which inputs have noise that the filter counts with."""
+    variables = found.joint.archive.description.variables
+    for w in found.setup.input_noise:
+        std = quantity(f"{w.std:.2g}", variables[w.name].unit)
+        yield f"'{w.name}' has white noise of {std} by its spectrum, and the record is likelier with it"
 
 
 def _notes_on_form(found: Findings) -> Iterator[str]:
@@ -214,6 +224,7 @@ def result_of(
         identifiability=identified(found.before, found.after),
         alarms=alarms(joint, h, s.options),
         sensor_noise=sensor_noise(s.sensors, s.bands),
+        input_noise={w.name: w.std for w in s.input_noise},
         process_noise={state.name: state.noise for state in joint.states},
         process_noise_share=found.share,
         access=access.sentence,

@@ -29,7 +29,7 @@ from scenarios.estimating.form import (
     wandering,
     widened,
 )
-from scenarios.estimating.likelihood import filter_of, likelihood_of, noise_share, with_noise
+from scenarios.estimating.likelihood import filter_of, likelier, likelihood_of, noise_share, with_noise
 from scenarios.estimating.policy import POLICY
 from scenarios.estimating.setup import Setup, finely
 
@@ -103,8 +103,10 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
         history = filtered(filter, s.samples, lambda done: tell(f"filtering, {done:.0%} done"), keep)
         if keep:
             history = _smoothed(history)
+        for i, error in s.accepted.items():  # which no sample shows
+            np.hypot(history.std[:, i], error, out=history.std[:, i])
         value, std = all_set_aside(joint.values(history.x, history.std))
-        n = len(joint.names) - len(joint.sensor_noise)
+        n = len(joint.names) - len(joint.noises)
         unknown, P0, P = n - len(s.states), start.P[:n, :n], history.last.P[:n, :n]
         learnt = afterwards(joint.names[:n], P0, P, unknown) if unknown else None
     except BaseException:
@@ -115,19 +117,27 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
 
 def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
     """The setup with what its record says before the filter begins, and the share of motion that is noise."""
-    share = None
-    if s.sought:
-        tell("finding the noise of the sensors and of the states' motion")
-        s, share = with_noise(s, archive)
-    elif s.moving:
-        tell("finding how much of the states' motion is noise")
-        share = noise_share(s, archive)
+    s, share = _with_noise(s, archive, tell)
+    if s.input_noise:
+        tell("finding whether the noise of the inputs shows in the outputs")
+        s, share = likelier((s, share), _with_noise(replace(s, input_noise=()), archive, tell), archive)
     if s.form:
         tell("learning where the parameters of the model's form begin")
         s = _begun_again(s, archive, share or 0.0)
         tell("finding how far the model's form lets the parameters wander")
         s = _wandering(s, archive, share or 0.0)
     return s, share
+
+
+def _with_noise(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
+    """The setup with the noise of its sensors, and the share of the states' motion that is noise."""
+    if s.sought:
+        tell("finding the noise of the sensors and of the states' motion")
+        return with_noise(s, archive)
+    if s.moving:
+        tell("finding how much of the states' motion is noise")
+        return s, noise_share(s, archive)
+    return s, None
 
 
 def _begun_again(s: Setup, archive: Archive, share: float) -> Setup:
@@ -229,7 +239,7 @@ def standings(found: Findings) -> dict[str, Standing]:
     first = joint.values(begun.x[None], std[None])[0][0].tolist()
     last, error = (of[0].tolist() for of in joint.values(h.x[-1:], h.std[-1:]))
     ended: dict[str, Standing] = {}
-    for i, name in enumerate(h.names[n : len(h.names) - len(joint.sensor_noise)], n):
+    for i, name in enumerate(h.names[n : len(h.names) - len(joint.noises)], n):
         moved = bool(abs(h.x[-1, i] - begun.x[i]) > POLICY.moved * std[i])
         p = joint.parameters[i - n] if i - n < len(joint.parameters) else None
         side, bound = _at_bound(p, last[i], error[i]) if p and moved else ("", np.nan)

@@ -86,6 +86,19 @@ def with_noise(s: Setup, archive: Archive) -> tuple[Setup, float | None]:
     return replace(new, bands=_bands(s, found)) if found else new, share
 
 
+def likelier(
+    one: tuple[Setup, float | None], other: tuple[Setup, float | None], archive: Archive
+) -> tuple[Setup, float | None]:
+    """Of two setups, each with its share of noise in the motion, the one with the likelier first samples."""
+
+    def likelihood(found: tuple[Setup, float | None]) -> float:
+        s, share = found
+        with s.joint(archive, share or 0.0) as joint:
+            return likelihood_of(s, joint, s.samples.first(OF_FILTER.noise_samples))
+
+    return max((other, one), key=likelihood)
+
+
 def _innovations(s: Setup, joint: Joint, samples: Samples, at: Array) -> Innovations | None:
     """Of samples, with the noise at coordinates (p,)."""
     new, share = _at(s, at)

@@ -18,7 +18,8 @@ class EstimatePolicy(Limits):
     told_apart: float = limit(
         0.1,
         "standard deviations of the noise",
-        "change of the outputs below which a step is not divided further",
+        "change of the outputs below which a step is not divided further; states that are measured have this "
+        "error too",
         "derivation: an error of a tenth of the noise adds half a percent to the innovations' deviation",
     )
     undeclared_std: float = limit(

@@ -44,6 +44,7 @@ class EstimateResult(Shown):
     checks: the consistency tests of the filter; consistent: whether it passes all of them.
     sensor_noise: by output, the standard deviation of its noise, the share of its variance that is correlated
     and over what time, s, with the 95 % bands of what was estimated of it.
+    input_noise: standard deviation of the white noise of each input that has any, at a step of the filter.
     rms_error: errors of the estimates, only if true values were given.
     """
 
@@ -58,6 +59,7 @@ class EstimateResult(Shown):
     identifiability: dict[str, Any]
     alarms: list[Raised]
     sensor_noise: dict[str, dict[str, Any]]
+    input_noise: dict[str, float]
     process_noise: dict[str, float]
     process_noise_share: float | None
     access: str
@@ -82,6 +84,8 @@ class EstimateResult(Shown):
 
     def _lines(self) -> Iterator[str]:
         for name, found in self.estimated.items():
+            if found["kind"] == "noise":
+                continue
             spread, unit = found["std_error"], found["unit"] or ""
             bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
             yield f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound
@@ -156,13 +160,13 @@ def estimated(
         return {}
     kinds = ["state"] * len(joint.states)
     kinds += ["form" if p.name in form else "parameter" for p in joint.parameters]
-    kinds += ["input"] * (len(h.names) - len(kinds) - len(joint.sensor_noise))
-    kinds += ["noise"] * len(joint.sensor_noise)
+    kinds += ["input"] * (len(h.names) - len(kinds) - len(joint.noises))
+    kinds += ["noise"] * len(joint.noises)
     value, std = joint.values(h.x[-1:], h.std[-1:])
     low, high = (joint.values(h.x[-1:] + s * BAND * h.std[-1:], h.std[-1:])[0][0] for s in (-1, 1))
     variables = joint.archive.description.variables
     unit = {n: v.unit for n, v in variables.items()}
-    unit |= {name: unit[n.output] for n in joint.sensor_noise for name in n.states}
+    unit |= {name: unit[of] for name, of in joint.noises.items()}
     believed = {p.name: [p.start, p.std] for p in joint.parameters if not p.walk and p.name not in form}
     return {
         name: {

@@ -13,7 +13,7 @@ from estimator.filters.observability import needed
 from estimator.filters.process_noise import motion
 from estimator.filters.sensor_noise import SensorNoise, correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
-from estimator.filters.unknown_input import UnknownInput
+from estimator.filters.unknown_input import InputError, UnknownInput
 from estimator.record import Array, Record
 from fmus.aside import mean_square, set_aside
 from fmus.errors import BadInput, did_you_mean
@@ -23,6 +23,7 @@ from fmus.model import declared
 from fmus.models import model_class
 from scenarios.estimating.delays import undelayed
 from scenarios.estimating.form import choices, parameters_of_form
+from scenarios.estimating.input_noise import errors_of_inputs
 from scenarios.estimating.policy import POLICY
 from scenarios.estimating.sensors import Sought, check_noise, noise_of, sought
 from scenarios.estimating.unknowns import (
@@ -63,6 +64,7 @@ class Setup:
     form: tuple[str, ...] = ()  # parameters that stand for what the model's form leaves open
     choices: tuple[dict[str, float], ...] = ({},)  # of the form, each a set of constants
     bands: Bands = field(default_factory=dict)  # 95 % bands of what was sought, by output
+    input_noise: tuple[InputError, ...] = ()  # of the known inputs
 
     @property
     def asked(self) -> list[str]:
@@ -73,6 +75,12 @@ class Setup:
     def noise(self) -> Array:
         """Standard deviation of each output's noise (m,), of its white and its correlated part together."""
         return np.array([n.std for n in self.sensors])
+
+    @property
+    def accepted(self) -> dict[int, float]:
+        """Error of the simulation that is accepted, by number of each state that is measured, in its unit."""
+        noise = dict(zip(self.outputs, self.noise.tolist(), strict=True))
+        return {i: POLICY.told_apart * noise[s.name] for i, s in enumerate(self.states) if s.name in noise}
 
     @property
     def moving(self) -> bool:
@@ -107,6 +115,7 @@ class Setup:
         return Joint(
             archive, self.outputs, states, self.parameters, self.unknown, self.inputs, self.constants,
             dt=s.step, t0=float(s.t[0]), sensor_noise=correlated(self.sensors),
+            input_noise=self.input_noise,
         )  # fmt: skip
 
 
@@ -144,7 +153,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
         tuple(states_of(e, options, d, record, noise, states)), (*parameters, *form), unknown,
         motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
         record.inputs, record.outputs, run_of[:, : len(record.outputs)], tuple(p.name for p in form),
-        tuple(choices(e, options)),
+        tuple(choices(e, options)), input_noise=errors_of_inputs(options, record, every),
     )  # fmt: skip
 
 

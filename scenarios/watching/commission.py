@@ -11,7 +11,7 @@ from estimator.filters.estimator import Estimate
 from estimator.filters.history import Steps
 from estimator.filters.sensor_noise import SensorNoise, correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
-from estimator.filters.unknown_input import Shaped, UnknownInput, Wandering
+from estimator.filters.unknown_input import InputError, Shaped, UnknownInput, Wandering
 from estimator.monitoring.directions import FORCE, GAIN, PARAMETER, Effect, Tried
 from estimator.record import Array, Record, Run
 from fmus.errors import BadInput
@@ -44,6 +44,7 @@ class Commissioned:
     usual: float
     every: int
     parts: int
+    input_noise: tuple[InputError, ...]
 
     @property
     def noise(self) -> Array:
@@ -51,7 +52,7 @@ class Commissioned:
         return np.array([n.std for n in self.sensors])
 
 
-KEPT = (Commissioned, UnknownState, UnknownParameter, Transform, Shaped, Wandering, SensorNoise)
+KEPT = (Commissioned, UnknownState, UnknownParameter, Transform, Shaped, Wandering, SensorNoise, InputError)
 
 
 def commissioned(e: Experiment, archive: Archive, record: Record, tell: Tell) -> Commissioned:
@@ -84,6 +85,7 @@ def _numbers(s: Setup, share: float, record: Record) -> Commissioned:
     return Commissioned(
         states, s.parameters, s.unknown, s.constants, s.inputs, s.outputs, s.sensors, s.samples.u[0],
         float(s.samples.t[0]), s.samples.step, every, s.samples.held.shape[1],
+        s.input_noise,
     )  # fmt: skip
 
 
@@ -100,6 +102,7 @@ class Making:
         return Joint(
             self._archive, c.outputs, c.states, c.parameters, c.unknown, inputs, c.constants,
             dt=c.usual, t0=c.t0, sensor_noise=correlated(c.sensors),
+            input_noise=c.input_noise,
         )  # fmt: skip
 
     def carried(self) -> Carried:

@@ -13,7 +13,7 @@ from estimator.filters.estimator import Gate
 from estimator.filters.history import filtered, samples
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Ukf
-from estimator.filters.unknown_input import Shaped
+from estimator.filters.unknown_input import InputError, Shaped
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
 from tests.helpers.native import native
@@ -45,7 +45,7 @@ class Counted(Ukf):
 
 
 def rig():
-    """The test rig: its outputs are states that are estimated."""
+    """The test rig: its outputs are states that are estimated, and a known input has an error."""
     states = [UnknownState(name, start, 0.1, 1e-2) for name, start in (("omega_w", 12.0), ("omega_r", 9.2))]
     parameters = [
         UnknownParameter("mu0", 0.3, 0.1, bounded((0.0, 1.0)), 1e-2),
@@ -53,7 +53,9 @@ def rig():
     ]
     with Fmu(native("testrig")) as fmu:
         inputs = list(fmu.description.inputs)
-    return Joint(native("testrig"), ["omega_r", "omega_w"], states, parameters, inputs=inputs, dt=DT)
+    errors = [InputError(inputs[0], 20.0)]
+    told = native("testrig"), ["omega_r", "omega_w"], states, parameters
+    return Joint(*told, inputs=inputs, dt=DT, input_noise=errors)
 
 
 def vehicle():
