@@ -13,7 +13,7 @@ from estimator.filters.bounds import (
     coded,
     grown,
 )
-from estimator.filters.unknown_input import InputError, UnknownInput
+from estimator.filters.unknown_input import NoisyInput, UnknownInput
 from estimator.record import Array
 
 
@@ -50,7 +50,7 @@ class Layout:
 
 def layout(
     n: int, others: int, transforms: Sequence[Transform], inputs: Sequence[str],
-    unknown: Sequence[UnknownInput], errors: Sequence[InputError] = (),
+    unknown: Sequence[UnknownInput], errors: Sequence[NoisyInput] = (),
 ) -> Layout:  # fmt: skip
     """The layout for n states, so many others and the known inputs."""
     fed, at = [], 0

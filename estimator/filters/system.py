@@ -18,7 +18,7 @@ from estimator.filters.bounds import Transform
 from estimator.filters.estimator import Diverged, Estimate
 from estimator.filters.layout import collect, layout
 from estimator.filters.sensor_noise import SensorNoise
-from estimator.filters.unknown_input import InputError, UnknownInput
+from estimator.filters.unknown_input import NoisyInput, UnknownInput
 from estimator.record import Array
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.archive import Archive
@@ -84,7 +84,7 @@ class Joint:
         way: Way | None = None,
         compiled: bool = True,
         sensor_noise: Sequence[SensorNoise] = (),
-        input_noise: Sequence[InputError] = (),
+        input_noise: Sequence[NoisyInput] = (),
     ) -> None:
         self._stack = ExitStack()
         self._steps: dict[float, Array] = {}
@@ -135,7 +135,7 @@ class Joint:
         self._steps.clear()
 
     @property
-    def _shaped(self) -> tuple[UnknownInput | InputError | SensorNoise, ...]:
+    def _shaped(self) -> tuple[UnknownInput | NoisyInput | SensorNoise, ...]:
         """The random processes whose states follow those of the FMU and the parameters in x."""
         return (*self.unknown, *self.input_noise, *self.sensor_noise)
 
@@ -188,7 +188,7 @@ class Joint:
             at = 0
             for w in self._shaped:
                 own = slice(at, at + len(w.states))
-                F[:, own, own] = w.within(parts) if isinstance(w, InputError) else w.discrete(part)[0]
+                F[:, own, own] = w.within(parts) if isinstance(w, NoisyInput) else w.discrete(part)[0]
                 at = own.stop
             self._parts[part, parts] = F
         return self._parts[part, parts]

@@ -76,7 +76,7 @@ class Wandering:
 
 
 @dataclass(frozen=True)
-class InputError:
+class NoisyInput:
     """White noise of a recorded input, which is linear between its samples: what it was minus its record.
 
     std: standard deviation at a sample, in the input's unit. The states are the errors at the present and at

@@ -117,10 +117,10 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
 
 def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
     """The setup with what its record says before the filter begins, and the share of motion that is noise."""
-    s, share = _with_noise(s, archive, tell)
+    s, share = _noise_found(s, archive, tell)
     if s.input_noise:
         tell("finding whether the noise of the inputs shows in the outputs")
-        s, share = likelier((s, share), _with_noise(replace(s, input_noise=()), archive, tell), archive)
+        s, share = likelier((s, share), _noise_found(replace(s, input_noise=()), archive, tell), archive)
     if s.form:
         tell("learning where the parameters of the model's form begin")
         s = _begun_again(s, archive, share or 0.0)
@@ -129,7 +129,7 @@ def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | Non
     return s, share
 
 
-def _with_noise(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
+def _noise_found(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
     """The setup with the noise of its sensors, and the share of the states' motion that is noise."""
     if s.sought:
         tell("finding the noise of the sensors and of the states' motion")

@@ -13,7 +13,7 @@ from estimator.filters.observability import needed
 from estimator.filters.process_noise import motion
 from estimator.filters.sensor_noise import SensorNoise, correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
-from estimator.filters.unknown_input import InputError, UnknownInput
+from estimator.filters.unknown_input import NoisyInput, UnknownInput
 from estimator.record import Array, Record
 from fmus.aside import mean_square, set_aside
 from fmus.errors import BadInput, did_you_mean
@@ -64,7 +64,7 @@ class Setup:
     form: tuple[str, ...] = ()  # parameters that stand for what the model's form leaves open
     choices: tuple[dict[str, float], ...] = ({},)  # of the form, each a set of constants
     bands: Bands = field(default_factory=dict)  # 95 % bands of what was sought, by output
-    input_noise: tuple[InputError, ...] = ()  # of the known inputs
+    input_noise: tuple[NoisyInput, ...] = ()  # of the known inputs
 
     @property
     def asked(self) -> list[str]:

@@ -11,7 +11,7 @@ from estimator.filters.estimator import Estimate
 from estimator.filters.history import Steps
 from estimator.filters.sensor_noise import SensorNoise, correlated
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
-from estimator.filters.unknown_input import InputError, Shaped, UnknownInput, Wandering
+from estimator.filters.unknown_input import NoisyInput, Shaped, UnknownInput, Wandering
 from estimator.monitoring.directions import FORCE, GAIN, PARAMETER, Effect, Tried
 from estimator.record import Array, Record, Run
 from fmus.errors import BadInput
@@ -44,7 +44,7 @@ class Commissioned:
     usual: float
     every: int
     parts: int
-    input_noise: tuple[InputError, ...]
+    input_noise: tuple[NoisyInput, ...]
 
     @property
     def noise(self) -> Array:
@@ -52,7 +52,7 @@ class Commissioned:
         return np.array([n.std for n in self.sensors])
 
 
-KEPT = (Commissioned, UnknownState, UnknownParameter, Transform, Shaped, Wandering, SensorNoise, InputError)
+KEPT = (Commissioned, UnknownState, UnknownParameter, Transform, Shaped, Wandering, SensorNoise, NoisyInput)
 
 
 def commissioned(e: Experiment, archive: Archive, record: Record, tell: Tell) -> Commissioned:

@@ -13,7 +13,7 @@ from estimator.filters.estimator import Gate
 from estimator.filters.history import filtered, samples
 from estimator.filters.system import Joint, UnknownParameter, UnknownState
 from estimator.filters.ukf import Ukf
-from estimator.filters.unknown_input import InputError, Shaped
+from estimator.filters.unknown_input import NoisyInput, Shaped
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
 from tests.helpers.native import native
@@ -53,7 +53,7 @@ def rig():
     ]
     with Fmu(native("testrig")) as fmu:
         inputs = list(fmu.description.inputs)
-    errors = [InputError(inputs[0], 20.0)]
+    errors = [NoisyInput(inputs[0], 20.0)]
     told = native("testrig"), ["omega_r", "omega_w"], states, parameters
     return Joint(*told, inputs=inputs, dt=DT, input_noise=errors)
 

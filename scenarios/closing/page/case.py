@@ -49,10 +49,8 @@ class Case:
 
         For each, the share of the residual's variance that the answer explains, and the rest over the noise.
         """
-        limits, samples = (
-            self.problem.policy.decision,
-            sum(int(r.test.sum()) for r in self.problem.record.runs),
-        )
+        limits = self.problem.policy.decision
+        samples = sum(int(run.test.sum()) for run in self.problem.record.runs)
         chance = limits.scatter * np.sqrt(self.found.baseline.noise.redundancy / (2 * samples))
         limit = dict(zip(self.problem.record.outputs, limits.clean + chance, strict=True))
         return {

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from estimator.filters.ukf import Spread
-from estimator.filters.unknown_input import InputError
+from estimator.filters.unknown_input import NoisyInput
 
 NUMBER = st.floats(-1e3, 1e3)
 
@@ -15,7 +15,7 @@ NUMBER = st.floats(-1e3, 1e3)
 def test_it_is_linear_within_a_step_whose_end_is_the_begin_of_the_next(now, following, parts):
     """An input acts with the mean of both ends of a part."""
     state, ends = np.array([now, following]), [now]
-    for F in InputError("u", 1.0).within(parts):
+    for F in NoisyInput("u", 1.0).within(parts):
         state = F @ state
         ends.append(state[0])
     assert_allclose(ends, np.linspace(now, following, parts + 1), atol=1e-9)
@@ -24,7 +24,7 @@ def test_it_is_linear_within_a_step_whose_end_is_the_begin_of_the_next(now, foll
 
 @given(st.floats(0.1, 10.0), st.floats(1e-4, 10.0))
 def test_it_is_as_large_at_all_times_and_new_at_each_sample(std, dt):
-    error = InputError("u", std)
+    error = NoisyInput("u", std)
     F, Q = error.discrete(dt)
     P = np.diag(error.variance)
     assert_allclose(F @ P @ F.T + Q, P)
