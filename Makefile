@@ -37,8 +37,9 @@ bench: .venv/ready  ## one table of speed beside named peers; for ecos, after ma
 
 SEED ?=
 COUNT ?= 240
-challenge: .venv/ready  ## a fresh blind set of records closed and scored; SEED=, COUNT=; goes on where it stopped
-	$(BIN)/python -m benchmarks.challenge --out $(OUT)/challenge --count $(COUNT) $(if $(SEED),--seed $(SEED))
+challenge: .venv/ready  ## a fresh blind set of records closed and scored; SEED=, COUNT=, MEASURED=; goes on where it stopped
+	$(BIN)/python -m benchmarks.challenge --out $(OUT)/challenge --count $(COUNT) $(if $(SEED),--seed $(SEED)) \
+		$(if $(MEASURED),--measured $(MEASURED))
 
 LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes
 .venv/ready: pyproject.toml requirements.lock
