@@ -141,7 +141,7 @@ class Joint:
 
     @property
     def noises(self) -> dict[str, str]:
-        """The last states of x, which are noise, each with the input or output of which it is."""
+        """Names of the last states of x, which are noise, and the input or output that each belongs to."""
         return {n: w.name for w in self.input_noise for n in w.states} | {
             n: w.output for w in self.sensor_noise for n in w.states
         }

@@ -77,10 +77,11 @@ class Wandering:
 
 @dataclass(frozen=True)
 class NoisyInput:
-    """White noise of a recorded input, which is linear between its samples: what it was minus its record.
+    """Error of a recorded input: the true value minus the recorded one.
 
-    std: standard deviation at a sample, in the input's unit. The states are the errors at the present and at
-    the next sample. It adds to an input of the FMU that is known, and drives none itself.
+    The errors at the samples are independent, and between samples the error is linear, as the input is. It
+    is added to the recorded input. std: standard deviation at a sample, in the input's unit. The states are
+    the errors at the present and at the next sample.
     """
 
     name: str

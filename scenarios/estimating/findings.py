@@ -17,7 +17,7 @@ from estimator.filters.sensor_noise import whitened
 from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
 from estimator.record import Array
-from fmus.aside import all_set_aside
+from fmus.aside import all_set_aside, by_rows
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.form import (
@@ -103,8 +103,7 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
         history = filtered(filter, s.samples, lambda done: tell(f"filtering, {done:.0%} done"), keep)
         if keep:
             history = _smoothed(history)
-        for i, error in s.accepted.items():  # which no sample shows
-            np.hypot(history.std[:, i], error, out=history.std[:, i])
+        history = _with_accepted(s, history)
         value, std = all_set_aside(joint.values(history.x, history.std))
         n = len(joint.names) - len(joint.noises)
         unknown, P0, P = n - len(s.states), start.P[:n, :n], history.last.P[:n, :n]
@@ -206,6 +205,13 @@ def _smoothed(h: History) -> History:
     whole = smoothed(h.estimates)
     std = np.sqrt(np.maximum(np.diagonal(whole.P, axis1=1, axis2=2), 0.0))
     return replace(h, x=whole.x, std=std, estimates=())
+
+
+def _with_accepted(s: Setup, h: History) -> History:
+    """With the error that the simulation itself may have, which no sample shows."""
+    error = np.zeros(len(h.names))
+    error[: len(s.states)] = s.accepted
+    return replace(h, std=by_rows(h.std.shape, lambda rows: np.hypot(h.std[rows], error)))
 
 
 def informed(found: Findings) -> dict[str, bool]:

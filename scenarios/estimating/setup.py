@@ -77,10 +77,10 @@ class Setup:
         return np.array([n.std for n in self.sensors])
 
     @property
-    def accepted(self) -> dict[int, float]:
-        """Error of the simulation that is accepted, by number of each state that is measured, in its unit."""
+    def accepted(self) -> Array:
+        """Error of the simulation that is accepted in each state (n_states,); 0 if it is not measured."""
         noise = dict(zip(self.outputs, self.noise.tolist(), strict=True))
-        return {i: POLICY.told_apart * noise[s.name] for i, s in enumerate(self.states) if s.name in noise}
+        return POLICY.told_apart * np.array([noise.get(s.name, 0.0) for s in self.states])
 
     @property
     def moving(self) -> bool:

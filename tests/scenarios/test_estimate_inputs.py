@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.filters.sensor_noise import SensorNoise
+from fmus import aside
 from scenarios.estimating import setup
 from scenarios.estimating.estimating import estimate
 from scenarios.estimating.policy import POLICY
@@ -74,3 +75,10 @@ def test_inputs_without_noise_are_taken_as_they_are(record, tmp_path):
     assert min(held(tmp_path / "out", true)) > 0.95
     least = POLICY.told_apart * rig.NOISE
     assert min(result.estimated[n]["std_error"] for n in ("omega_w", "omega_r")) >= least
+
+
+def test_a_long_record_whose_history_lies_in_files_gives_the_same_errors(record, monkeypatch):
+    file, *_ = record(3, ())
+    short = estimate(file)
+    monkeypatch.setattr(aside, "BLOCK", 1 << 15)
+    assert estimate(file).estimated == short.estimated
