@@ -1,7 +1,7 @@
 """A measured record as arrays in the units of the FMU, with notes on peculiarities of the data."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -86,6 +86,7 @@ class Record:
     noise_std: Array  # (n_y,) in the FMU's units, nan if not declared
     notes: tuple[Note, ...] = ()
     conversions: tuple[Conversion, ...] = ()
+    input_std: Mapping[str, float] = field(default_factory=dict)  # declared noise of inputs, as noise_std
 
     @property
     def sample(self) -> float:

@@ -61,7 +61,8 @@ class Dual(Estimator):
         if joint.noises:
             raise BadInput(
                 f"[estimate.options] filter = '{cls.name}' takes all but the states for constant, which "
-                "noise that is correlated in time is not; choose 'ukf', or leave out [estimate.noise]"
+                "noise of an input or noise that is correlated in time is not; choose 'ukf', or leave out "
+                "[estimate.noise] and noise_std of [inputs]"
             )
         return cls(joint, len(joint.states), start, joint.noise, asked.R, asked.dt, asked.spread)
 

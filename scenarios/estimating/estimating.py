@@ -183,7 +183,8 @@ def _notes_on_inputs(found: Findings) -> Iterator[str]:
     variables = found.joint.archive.description.variables
     for w in found.setup.input_noise:
         std = quantity(f"{w.std:.2g}", variables[w.name].unit)
-        yield f"'{w.name}' has white noise of {std} by its spectrum, and the record is likelier with it"
+        if w in found.setup.possible:
+            yield f"'{w.name}' has white noise of {std} by its spectrum, and the record is likelier with it"
 
 
 def _notes_on_form(found: Findings) -> Iterator[str]:

@@ -116,10 +116,11 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
 
 def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:
     """The setup with what its record says before the filter begins, and the share of motion that is noise."""
+    noisier = replace(s, input_noise=(*s.input_noise, *s.possible))
     s, share = _noise_found(s, archive, tell)
-    if s.input_noise:
+    if s.possible:
         tell("finding whether the noise of the inputs shows in the outputs")
-        s, share = likelier((s, share), _noise_found(replace(s, input_noise=()), archive, tell), archive)
+        s, share = likelier(_noise_found(noisier, archive, tell), (s, share), archive)
     if s.form:
         tell("learning where the parameters of the model's form begin")
         s = _begun_again(s, archive, share or 0.0)

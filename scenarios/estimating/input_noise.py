@@ -1,4 +1,4 @@
-"""White noise of the recorded inputs, as their spectra show it."""
+"""White noise of the recorded inputs, as it is declared or as their spectra show it."""
 
 from math import sqrt
 
@@ -11,14 +11,22 @@ from scenarios.estimating.sensors import likelihood_says
 from scenarios.experiment.estimated import Options
 
 
-def errors_of_inputs(o: Options, record: Record, every: int) -> tuple[NoisyInput, ...]:
-    """The errors that the inputs of a record may have; every: number of samples in a step of the filter.
+def declared_errors(record: Record, every: int) -> tuple[NoisyInput, ...]:
+    """The errors of the inputs whose noise is declared; every: number of samples in a step of the filter.
 
-    None where the likelihood cannot tell whether they have them, and where the filter takes no such errors.
     The mean of an input over a step has the error of `every` samples.
+    """
+    return tuple(NoisyInput(name, std / sqrt(every)) for name, std in record.input_std.items())
+
+
+def possible_errors(o: Options, record: Record, every: int) -> tuple[NoisyInput, ...]:
+    """The errors that the spectra of the other inputs show, which may be their excitation as well.
+
+    None where the likelihood cannot tell, and where the filter takes no such errors.
     """
     if not likelihood_says(o) or not filters()[o.filter].noises:
         return ()
     u = record.runs[0].u
-    found = ((name, white_part(u[:, j], DEFAULT.inputs)) for j, name in enumerate(record.inputs))
+    others = ((j, name) for j, name in enumerate(record.inputs) if name not in record.input_std)
+    found = ((name, white_part(u[:, j], DEFAULT.inputs)) for j, name in others)
     return tuple(NoisyInput(name, std / sqrt(every)) for name, std in found if std)

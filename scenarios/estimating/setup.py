@@ -23,7 +23,7 @@ from fmus.model import declared
 from fmus.models import model_class
 from scenarios.estimating.delays import undelayed
 from scenarios.estimating.form import choices, parameters_of_form
-from scenarios.estimating.input_noise import errors_of_inputs
+from scenarios.estimating.input_noise import declared_errors, possible_errors
 from scenarios.estimating.policy import POLICY
 from scenarios.estimating.sensors import Sought, check_noise, noise_of, sought
 from scenarios.estimating.unknowns import (
@@ -65,6 +65,7 @@ class Setup:
     choices: tuple[dict[str, float], ...] = ({},)  # of the form, each a set of constants
     bands: Bands = field(default_factory=dict)  # 95 % bands of what was sought, by output
     input_noise: tuple[NoisyInput, ...] = ()  # of the known inputs
+    possible: tuple[NoisyInput, ...] = ()  # which the record has to confirm
 
     @property
     def asked(self) -> list[str]:
@@ -153,7 +154,8 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
         tuple(states_of(e, options, d, record, noise, states)), (*parameters, *form), unknown,
         motion(s.t, run_of[:, len(record.outputs) :], nominal) if states else np.empty(0),
         record.inputs, record.outputs, run_of[:, : len(record.outputs)], tuple(p.name for p in form),
-        tuple(choices(e, options)), input_noise=errors_of_inputs(options, record, every),
+        tuple(choices(e, options)), input_noise=declared_errors(record, every),
+        possible=possible_errors(options, record, every),
     )  # fmt: skip
 
 

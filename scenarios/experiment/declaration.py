@@ -48,11 +48,12 @@ class InputColumn(Measured):
     """A measured input: its column, its unit, and the FMU's where the FMU states none.
 
     Without `unit` the column has the unit that the file states, else that of the FMU; a scaled one always has
-    that of the FMU then.
+    that of the FMU then. noise_std: standard deviation of its white noise, in its unit.
     """
 
     unit: str | None = None
     model_unit: str | None = None
+    noise_std: Positive | None = None
 
 
 def _column_or_number(value: object) -> str | float | InputColumn:
@@ -64,7 +65,7 @@ def _column_or_number(value: object) -> str | float | InputColumn:
         return InputColumn.model_validate(value)
     raise ValueError(
         "must be a column name in quotes or a number, or a table {column, unit, model_unit, file, scale, "
-        "offset}, "
+        "offset, noise_std}, "
         f"not {value!r}"
     )
 

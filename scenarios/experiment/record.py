@@ -43,12 +43,14 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
     check_names(experiment, description)
     conversions, notes = _conversions(experiment, description)
     scale = np.array([(c.factor, c.offset) for c in conversions]).reshape(-1, 2)
-    runs = []
+    runs, noisy = [], dict[str, float]()
     for part, file in enumerate(experiment.data_files):
         run, found, inputs = _run(experiment, description, part, file, scale, missing)
         runs.append(run)
         notes += found
-        conversions += inputs if not part else []
+        if not part:
+            conversions += inputs
+            noisy = _noise_of_inputs(experiment, inputs)
     return Record(
         runs=tuple(runs),
         inputs=tuple(experiment.inputs),
@@ -56,6 +58,7 @@ def load_record(experiment: Experiment, description: FmuDescription, missing: bo
         noise_std=_noise(experiment, conversions),
         notes=tuple(notes),
         conversions=tuple(conversions),
+        input_std=noisy,
     )
 
 
@@ -88,6 +91,12 @@ def _noise(e: Experiment, conversions: Sequence[Conversion]) -> Array:
     """
     declared = zip(e.outputs.values(), conversions, strict=False)
     return np.array([(o.noise_std or np.nan) * abs(c.factor / o.scale) for o, c in declared])
+
+
+def _noise_of_inputs(e: Experiment, conversions: Sequence[Conversion]) -> dict[str, float]:
+    """Declared noise of the inputs in the FMU's units, of those for which it is declared."""
+    declared = ((c, e.input_columns[c.variable]) for c in conversions)
+    return {c.variable: i.noise_std * abs(c.factor / i.scale) for c, i in declared if i.noise_std}
 
 
 def _conversions(e: Experiment, fmu: FmuDescription) -> tuple[list[Conversion], list[Note]]:

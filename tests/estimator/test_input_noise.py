@@ -210,6 +210,19 @@ def test_draws_of_one_input_are_alike_in_size(seed):
     assert np.std(sizes) < 0.6 * np.mean(sizes)
 
 
+def test_declared_noise_counts_where_the_record_does_not_say_so():
+    """For instance if it is too short for a spectrum, or if the noise did drive the machine."""
+    short = record_of(np.zeros((500, 2)))
+    assert InputNoise.of(short, LIMITS) is None
+    assert InputNoise.of(replace(short, input_std={"u1": 0.3}), LIMITS).std.tolist() == [0.0, 0.3]
+    raw = measured(np.random.default_rng(0), 0.002, True)
+    assert without_input_noise(raw, calibrated(raw)) is None
+    said = replace(raw, record=replace(raw.record, input_std={raw.record.inputs[0]: 0.05}))
+    found = without_input_noise(said, calibrated(said))
+    assert found.input_noise.std[0] == 0.05
+    assert "was declared and smoothed away" in found.record.notes[-1].sentence
+
+
 def test_noise_that_the_sensors_do_not_show_is_left_alone():
     raw = measured(np.random.default_rng(0), 1000.0)
     assert without_input_noise(raw, calibrated(raw)) is None

@@ -23,12 +23,12 @@ SETTLED = 5.0  # s
 def record(tmp_path, monkeypatch):
     """Makes an experiment; returns its file and the true speeds (N, 2)."""
 
-    def made(seed, columns):
+    def made(seed, columns, duration=25.0):
         true = []
         simulate = rig.simulate
         monkeypatch.setattr(rig, "simulate", lambda *of: true.append(simulate(*of)) or true[-1])
         rng, truth = np.random.default_rng(seed), {"mu0": TRUE}
-        file = rig.write_record(tmp_path, "rig", rng, duration=25.0, dt=0.01, parameters_true=truth)
+        file = rig.write_record(tmp_path, "rig", rng, duration=duration, dt=0.01, parameters_true=truth)
         file.write_text(file.read_text() + ASKED)
         names = file.with_name("data.csv").read_text().split("\n", 1)[0].split(",")
         rows = np.loadtxt(file.with_name("data.csv"), delimiter=",", skiprows=1)
@@ -63,8 +63,22 @@ def test_noise_of_the_inputs_is_found_and_counted_with(record, tmp_path, monkeyp
     assert {e["unit"] for n, e in result.estimated.items() if n.startswith("T_P")} == {"N.m"}
     assert json.loads((tmp_path / "out" / "result.json").read_text())["input_noise"] == result.input_noise
     assert not any("_error" in line for line in result.lines())
-    monkeypatch.setattr(setup, "errors_of_inputs", lambda *_: ())
+    monkeypatch.setattr(setup, "possible_errors", lambda *_: ())
     assert not estimate(file).consistent
+
+
+def test_declared_noise_counts_in_a_record_that_is_too_short_for_a_spectrum(record):
+    file, _, size = record(4, ("T_P", "f_sync"), duration=10.0)
+    taken_for_exact = estimate(file)
+    assert taken_for_exact.input_noise == {}
+    text = file.read_text()
+    for name, std in size.items():
+        text = text.replace(f'{name} = "{name}"', f'{name} = {{column = "{name}", noise_std = {std:.6g}}}')
+    file.write_text(text)
+    result = estimate(file)
+    assert result.consistent > taken_for_exact.consistent
+    assert result.input_noise == pytest.approx(size, rel=1e-4)
+    assert not any("by its spectrum" in note for note in result.notes)
 
 
 def test_inputs_without_noise_are_taken_as_they_are(record, tmp_path):

@@ -66,6 +66,11 @@ BAD_EXPERIMENTS = [
     ("f_sync = 7.5", "f_sync = true", "key 'inputs.f_sync' must be a column name in quotes or a number"),
     ("noise_std = 0.3", "noise_std = 0", "key 'outputs.omega_w.noise_std' must be greater than 0, not '0'"),
     (
+        'T_P = "torque"',
+        'T_P = {column = "torque", noise_std = -1.0}',
+        "key 'inputs.T_P.noise_std' must be greater than 0, not '-1.0'",
+    ),
+    (
         'derivative = "omega"',
         'derivative = "accel"',
         "[derived.accel] derivative 'accel' must be declared above",

@@ -334,8 +334,17 @@ def test_a_column_is_converted_to_the_model_unit(tmp_path):
 
 
 def test_an_input_in_a_declared_unit_is_converted_to_that_of_the_fmu(tmp_path):
-    toml = GOOD.replace('T_P = "torque"', 'T_P = {column = "torque", unit = "kN.m"}')
-    assert_allclose(read(write(tmp_path, toml)).runs[0].u[:, 0], 1e3 * table()["torque"], atol=1e-3)
+    torque = 'T_P = {column = "torque", unit = "kN.m", noise_std = 0.02}'
+    record = read(write(tmp_path, GOOD.replace('T_P = "torque"', torque)))
+    assert_allclose(record.runs[0].u[:, 0], 1e3 * table()["torque"], atol=1e-3)
+    assert record.input_std == {"T_P": pytest.approx(20.0)}
+
+
+@pytest.mark.parametrize("scale", [-25.0, 0.1])
+def test_the_noise_of_an_input_is_that_of_the_scaled_value(tmp_path, scale):
+    torque = f'T_P = {{column = "torque", scale = {scale}, unit = "kN.m", noise_std = 0.02}}'
+    record = read(write(tmp_path, GOOD.replace('T_P = "torque"', torque)))
+    assert record.input_std == {"T_P": pytest.approx(20.0)}
 
 
 @pytest.mark.parametrize(("scale", "offset"), [(-1.0, 0.0), (-25.0, 0.3), (1.0, -4.0)])

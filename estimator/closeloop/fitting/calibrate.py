@@ -22,7 +22,8 @@ def without_input_noise(problem: Problem, h: Hypothesis) -> Problem | None:
 
     h: the calibrated FMU, with which the outputs are compared. The rounding of a file, for instance, does not
     show. What looks like noise may be the excitation itself: the outputs then follow the recorded inputs more
-    closely. This is asked of the whitened residual, because what the FMU lacks is mostly slower.
+    closely. This is asked of the whitened residual, because what the FMU lacks is mostly slower, unless noise
+    of an input is declared.
     """
     noise = InputNoise.of(problem.record, problem.policy.inputs)
     if noise is None:
@@ -33,6 +34,8 @@ def without_input_noise(problem: Problem, h: Hypothesis) -> Problem | None:
     moved = record.of([a - b for a, b in zip(other, h.residuals, strict=True)], "fit") / noise_floor(record)
     if np.sum(moved**2) <= problem.policy.inputs.seen:
         return None
+    if record.input_std:
+        return found
     weighting, stretches = whitening(record, h.residuals), record.stretches("fit")
     as_recorded, smoothed = (weighting.of(record.of(r, "fit"), stretches) for r in (h.residuals, other))
     return found if np.sum(smoothed**2) < np.sum(as_recorded**2) else None

@@ -1,4 +1,4 @@
-"""White noise of the recorded inputs: found in their spectra and smoothed away.
+"""White noise of the recorded inputs: declared, or found in their spectra, and smoothed away.
 
 A model that is driven by noisy inputs answers to their noise. A lag of such an input then fits better than
 the right effect, because it filters that noise. The inputs are therefore smoothed by their wavelets: those
@@ -32,9 +32,10 @@ class InputNoise:
 
     @classmethod
     def of(cls, record: Record, limits: InputPolicy) -> InputNoise | None:
-        """The noise of a record's inputs; None if none of them has any."""
+        """The noise of a record's inputs, declared or seen; None if none of them has any."""
         found = [
-            max(white_part(run.u[:, j], limits) for run in record.runs) for j in range(len(record.inputs))
+            record.input_std.get(name) or max(white_part(run.u[:, j], limits) for run in record.runs)
+            for j, name in enumerate(record.inputs)
         ]
         return cls(np.array(found), limits.levels) if any(found) else None
 
@@ -42,8 +43,9 @@ class InputNoise:
         """The record with smoothed inputs, and a note for each of them."""
         runs = tuple(replace(run, u=self._without(run.u)) for run in record.runs)
         noisy = [(o, std) for o, std in zip(record.inputs, self.std, strict=True) if std]
-        said = "white noise with a standard deviation of {:.2g} was found and smoothed away"
-        notes = [Note("input noise", name, f"{name}: {said.format(std)}") for name, std in noisy]
+        said = "white noise with a standard deviation of {:.2g} was {} and smoothed away"
+        how = {name: "declared" if name in record.input_std else "found" for name, _ in noisy}
+        notes = [Note("input noise", n, f"{n}: {said.format(std, how[n])}") for n, std in noisy]
         return replace(record, runs=runs, notes=(*record.notes, *notes))
 
     def left(self, u: Array, rng: np.random.Generator, draws: int) -> list[Array]:
