@@ -21,12 +21,14 @@ class Noise:
     """Noise of the outputs of a record.
 
     std: (n_y,) standard deviation, declared or estimated; weighting: the weights of residuals in fits and
-    scores, whose sizes are the standard deviations if these are declared; declared: (n_y,) whether they are.
+    scores, whose sizes are the standard deviations if these are declared; declared: (n_y,) whether they are;
+    uneven: (n_y,) how much more its mean square scatters because the sensors round; see `rounding`.
     """
 
     std: Array
     weighting: Weighting
     declared: BoolArray
+    uneven: Array | float = 1.0
 
     @classmethod
     def of(
@@ -77,7 +79,7 @@ class Noise:
     @property
     def redundancy(self) -> Array:
         """Samples per independent one in a mean square, (n_y,)."""
-        return self.weighting.redundancy
+        return self.weighting.redundancy * self.uneven
 
     @property
     def floor(self) -> Weighting:

@@ -111,7 +111,7 @@ class _Predictor:
     def errors(self, z: Array) -> Array:
         """Prediction errors over their standard deviations, (N,)."""
         n = min(self._order, len(z))
-        found: Array = lfilter(self._filter, ONE, z) / np.sqrt(self._variance)
+        found: Array = np.convolve(z, self._filter)[: len(z)] / np.sqrt(self._variance)
         if n:
             found[:n] = solve_triangular(self._root[:n, :n], z[:n], lower=True)
         return found

@@ -10,6 +10,7 @@ from estimator.closeloop.question.clock import jitter, rates
 from estimator.closeloop.question.problem import Problem
 from estimator.noise import Left, Noise, larger
 from estimator.record import Array
+from estimator.rounding import unevenness
 
 
 def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array], left: Left) -> Noise:
@@ -19,7 +20,8 @@ def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence
     """
     record, chance = problem.record, problem.policy.detection.chance
     more = caused(problem, theta, residuals) if larger(record, residuals, chance) else []
-    return Noise.of(record, residuals, chance, more, left)
+    found = Noise.of(record, residuals, chance, more, left)
+    return replace(found, uneven=unevenness(record, residuals))
 
 
 def caused(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> list[Array]:
