@@ -11,7 +11,7 @@ from benchmarks.challenge.match import Answer, judged
 from benchmarks.challenge.truth import Truth
 from estimator.closeloop.decision import law_form
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import confirmed_on_test, judge, without_fits
+from estimator.closeloop.decision.verdict import confirmed_on_test, judge, needed, without_fits
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import Judgement
@@ -83,9 +83,12 @@ class _Again:
             return SEARCHED, []
         singles = form_of(baseline).ranked(found.singles)
         kinds = len(distinct(found.promises))
-        leading = judge(baseline, singles, found.pairs, kinds, found.detection.sets_in)
-        told = confirmed_on_test(baseline, law_form.confirmed(baseline, leading, found.forces))
-        return told.after(before).verdict, _named(told)
+        leading = judge(baseline, singles, found.pairs, kinds)
+        told = confirmed_on_test(baseline, law_form.confirmed(baseline, leading, found.forces)).after(before)
+        if not told.members:
+            again = replace(found, baseline=baseline, judgement=told)
+            told = needed(baseline, told, again.probability)
+        return told.verdict, _named(told)
 
     def _detection(self, baseline: Baseline) -> Detection:
         limits, seen = baseline.policy.detection, self.found.detection

@@ -14,6 +14,7 @@ from estimator.closeloop.decision.verdict import (
     clear_as_reported,
     confirmed_on_test,
     judge,
+    needed,
     probable,
     without_fits,
 )
@@ -24,6 +25,7 @@ from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
 from estimator.closeloop.fitting.resolution import over_steps
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
+from estimator.closeloop.fitting.whole import calibrated_to_whole
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import distinct
@@ -156,13 +158,18 @@ class Chain:
         noise, seen = shown.baseline.noise, shown.screening.fit
         in_noise = (seen.residual.reshape(-1, len(noise.std)) * noise.scale / noise.std).ravel()
         regressors = [g for _, g in shown.change]
-        return self.stages.done(
-            "detection",
-            lambda: detect(
-                shown.baseline, replace(seen, residual=in_noise), regressors, shown.alike(seen),
+
+        def of(baseline: Baseline) -> Detection:
+            return detect(
+                baseline, replace(seen, residual=in_noise), regressors, shown.alike(seen),
                 shown.likeness, shown.began, np.random.default_rng(self.seed),
-            ),
-        )  # fmt: skip
+            )  # fmt: skip
+
+        found = self.stages.done("detection", lambda: of(shown.baseline))
+        if not found.material:
+            return found
+        whole = self.stages.done("whole", lambda: calibrated_to_whole(shown.baseline))
+        return replace(of(replace(shown.baseline, hypothesis=whole)), whole=whole) if whole else found
 
     def _diagnosed(self, shown: Screened, detection: Detection) -> Diagnostics:
         self.tell("diagnostics", "fitting a black-box model and computing the smallest detectable effects")
@@ -186,8 +193,10 @@ class Chain:
         found = replace(found, baseline=baseline, singles=every, pairs=tuple(pairs), judgement=judgement)
         self.tell("test", "checking the answer on the test part")
         if judgement.members:
-            judgement = probable(baseline, judgement, found.probability, shown.began)
+            judgement = probable(baseline, judgement, found.probability)
         judgement = confirmed_on_test(baseline, judgement)
+        if not judgement.members:
+            judgement = needed(baseline, judgement, replace(found, judgement=judgement).probability)
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")
             members, twins = judgement.members, shown.twins
@@ -276,7 +285,7 @@ class Chain:
         if not judgement.members:
             return judgement
         reported = shown.over_form(over_steps(shown.baseline, judgement.members[0]))
-        return clear_as_reported(shown.baseline, judgement, reported, shown.began)
+        return clear_as_reported(shown.baseline, judgement, reported)
 
     def _judged(
         self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
@@ -284,5 +293,5 @@ class Chain:
     ) -> tuple[Judgement, Judgement]:  # fmt: skip
         """The judgement by comparison of the fits, and the same after the test of the law's curve."""
         ones, kinds = shown.twins.joined(singles), len(distinct(shown.promises))
-        leading = judge(shown.baseline, ones, pairs, kinds, shown.began)
+        leading = judge(shown.baseline, ones, pairs, kinds)
         return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))

@@ -31,7 +31,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from estimator.closeloop.detection.detect import Detection
-from estimator.closeloop.detection.importance import TINY
+from estimator.closeloop.detection.importance import TINY, importance
 from estimator.closeloop.evidence import Judgement, refuted
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import BLOCKS
@@ -59,21 +59,23 @@ def probabilities(
     promises: the screened candidates; fitted: all hypotheses that were fitted; refused: those among them that
     do not account for the residual, which are all if the checks of the answer refuse it. A hypothesis that
     changes no more than another form of the model would leave is no discrepancy, and is not refused, unless
-    the residual calls for an effect. Empty if a dead sensor ended the search, because nothing was compared
-    then. Answers below a thousandth are left out.
+    there is no answer to a residual that is more than a form and noise of a declared size leave. Empty if a
+    dead sensor ended the search, because nothing was compared then. Answers below a thousandth are left out.
     """
     if judgement.verdict == "sensor_fault" and not judgement.members:
         return {}
     if judgement.verdict == "insufficient_excitation":
         return {NO_DISCREPANCY: 1 - baseline.policy.prior.effect}
     if not fitted:
-        small = _of_size(baseline) if detection.detected else _of_screening(baseline, promises)
-        return {NO_DISCREPANCY: small}
+        small = detection.detected
+        nothing = _of_size(detection.tested(baseline)) if small else _of_screening(baseline, promises)
+        return {NO_DISCREPANCY: nothing}
     named = {m.label: m for m in judgement.members}
     same = {h.label: m.label for m in named.values() for h in fitted if h.label not in named and _is(h, m)}
     found: dict[str, float] = {}
-    calls = judgement.verdict == "unexplained"  # the residual itself is more than the form leaves
-    minor = [h for h in fitted if not calls and beyond_form(baseline, h) < 1.0]
+    told = baseline.noise.known and not named  # whether the residual can be compared with what a form leaves
+    more = told and importance(baseline, 0.0, detection.sets_in) >= 1.0
+    minor = [h for h in fitted if not more and beyond_form(baseline, h) < 1.0]
     same |= {h.label: NO_DISCREPANCY for h in minor}
     refused = fitted if refuted(judgement.checks) else refused
     for label, p in _of_fits(baseline, promises, fitted, refused, minor).items():

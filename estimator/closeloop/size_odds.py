@@ -4,15 +4,20 @@ and how probable an effect makes the size of a residual.
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from estimator.closeloop.detection.importance import TINY, beyond_noise, material, signal_size
+import numpy as np
+from scipy.special import logsumexp
+
+from estimator.closeloop.detection.importance import TINY, beyond_noise, material, signal_size, smallest
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import WHOLE, Hypothesis
 from estimator.closeloop.question.problem import Problem
-from estimator.record import BoolArray
+from estimator.record import Array, BoolArray
 
 SIZES = 2001  # points of the grid of sizes that a residual may have
+MEANS = 101  # points of the grid of their mean
+HUGE = 700.0  # logarithm of the largest odds
 LEAST = 1e-6  # of a signal, the smallest size of that grid: no logger resolves less
 
 
@@ -56,47 +61,65 @@ def at_fault(problem: Problem, h: Hypothesis) -> BoolArray:
 
 
 def odds_by_size(baseline: Baseline) -> float:
-    """How much more probable an effect makes the size of the residual of the calibrated FMU.
+    """How much more probable an effect makes the sizes of the residual of the calibrated FMU, by output.
 
-    The mean square of a residual has the scatter of noise. The output and the part of the record that leave
-    the largest share of their signal count.
+    The mean square of a residual has the scatter of noise, and the size of the noise is uncertain too. Noise
+    that is neither declared nor white may leave as much as an effect, but seldom depends between outputs.
     """
-    b = baseline
-    noise, signal = b.noise.std**2, np.maximum(signal_size(b.problem) ** 2, TINY)
-    shares, errors = [], []
-    for part in WHOLE:
-        residual = b.hypothesis.of(b.problem, part)
-        error = noise * np.sqrt(2 * b.noise.redundancy / max(len(residual), 1))
-        shares.append((np.mean(residual**2, axis=0) - noise) / signal)
-        errors.append(error / signal)
-    share, error = np.array(shares).ravel(), np.array(errors).ravel()
-    most = int(np.argmax(share))
-    form = max(b.policy.prior.material, b.problem.form_error)
-    return odds_of_effect(float(share[most]), float(error[most]), form)
+    b, prior, declared = baseline, baseline.policy.prior, baseline.noise.declared
+    noise, signal = b.noise.std**2, np.maximum(signal_size(b.problem), TINY)
+    residual = np.concatenate([b.hypothesis.of(b.problem, part) for part in WHOLE])
+    scatter = np.hypot(np.sqrt(2 * b.noise.redundancy / len(residual)), b.policy.decision.clean**2 - 1)
+    share, error = (np.mean(residual**2, axis=0) - noise) / signal**2, noise * scatter / signal**2
+    left = Left(max(prior.material, b.problem.form_error), float(np.min(smallest(b, b.noise.std) / signal)))
+    effect, nothing = left.by_effect(share, error), left.by_form(share, error)
+    if not b.noise.known:
+        several = b.seen_by_several(b.hypothesis)
+        coloured = prior.coloured * (b.policy.detection.level if several else 1.0)
+        noisy = left.by_effect(share[~declared], error[~declared])
+        noisy += left.by_form(share[declared], error[declared])
+        nothing = float(np.logaddexp(np.log(1 - coloured) + nothing, np.log(coloured) + noisy))
+    return float(np.exp(np.clip(effect - nothing, -HUGE, HUGE)))
 
 
-def odds_of_effect(share: float, error: float, form: float) -> float:
-    """How much more probable an effect makes what is left of a signal than the form of a right model does.
+@dataclass(frozen=True)
+class Left:
+    """What an effect, or the form of a right model, leaves of signals: log likelihoods, up to a constant.
 
-    share: of the mean square of a signal that is left beyond noise; error: its standard error. What an effect
-    leaves may have any order of magnitude up to the signal itself. What the form of a right model leaves is
-    exponentially distributed; its mean may have any order of magnitude up to `form`, in root mean squares
-    over that of the signal. Orders of magnitude begin at the smallest size that the record can show.
+    form: largest mean of what a form leaves; matters: the smallest size of an effect that matters. Sizes are
+    root mean squares over that of the signal; shares, below, are their squares beyond noise, (n,) of n
+    signals, and their standard errors (n,).
     """
-    least = _smallest(error, form)
-    size = np.geomspace(least, 1.0, SIZES)  # each order of magnitude weighs alike
-    share = min(share, 1.0)
-    step = 2 * np.log(1 / least) / SIZES  # of the square, relative; what lies between two sizes counts too
-    seen = np.exp(-0.5 * ((share - size**2) / max(error, step * share)) ** 2)
-    of_form = np.exp(-size / form) - np.exp(-size / least)
-    form_left = float(seen @ of_form / np.sum(of_form))
-    tiny = np.finfo(float).tiny
-    return max(float(np.mean(seen)), tiny) / max(form_left, tiny)
+
+    form: float
+    matters: float
+
+    def by_effect(self, share: Array, error: Array) -> float:
+        """An effect has any order of magnitude from what matters up to the signal itself.
+
+        Of this, it leaves any share in each signal, since the calibration compensates some of it.
+        """
+        size, width, likely = _likely(share, error)
+        up_to = np.cumsum(likely * width, axis=1) / size
+        return _log_mean(up_to.T[size >= min(self.matters, 1.0)])
+
+    def by_form(self, share: Array, error: Array) -> float:
+        """What a form leaves in each signal is exponentially distributed; the mean has any order."""
+        size, width, likely = _likely(share, error)
+        mean = np.geomspace(LEAST, self.form, MEANS)[:, None]
+        return _log_mean((np.exp(-size / mean) * width / mean) @ likely.T)
 
 
-def _smallest(error: float, form: float) -> float:
-    """Smallest size, over the signal, that a record can show, at most a hundredth of what a form leaves.
+def _likely(share: Array, error: Array) -> tuple[Array, Array, Array]:
+    """A grid of sizes (SIZES,), its widths, and the likelihood (n, SIZES) of each, over the largest."""
+    size = np.geomspace(LEAST, 1.0, SIZES)
+    step = 2 * np.log(1 / LEAST) / SIZES  # of the square, relative; what lies between two sizes counts too
+    seen = np.minimum(share, 1.0)[:, None]
+    near = -0.5 * ((seen - size**2) / np.maximum(error[:, None], step * np.abs(seen))) ** 2
+    return size, np.diff(size, prepend=0.0), np.exp(near - near.max(axis=1, initial=-np.inf, keepdims=True))
 
-    error: standard error of the share of the mean square.
-    """
-    return float(np.clip(np.sqrt(error), LEAST, form / 100))
+
+def _log_mean(likelihood: Array) -> float:
+    """Log of the mean over (m, n) of the likelihood of n signals together."""
+    together = np.sum(np.log(np.maximum(likelihood, np.finfo(float).tiny)), axis=1)
+    return float(logsumexp(together) - np.log(len(together)))

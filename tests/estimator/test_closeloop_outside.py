@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from estimator.closeloop.detection.detect import Detection
+from estimator.closeloop.evidence import Verdict
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
-from estimator.closeloop.probability import probabilities
+from estimator.closeloop.probability import NO_DISCREPANCY, probabilities
 from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.record import Array, Record, Run
 from tests.helpers.baselines import baseline, fit_with
@@ -39,8 +40,8 @@ def hypothesis(measured: Array, *laws: Array) -> Hypothesis:
     return Hypothesis(tuple(Candidate("constant_force", "p", (u,)) for u in unknowns), fit, (left,))
 
 
-def probability_of_law(measured: Array, declared: bool) -> float:
-    """Probability that the law of the library is right; 0 where it is less than a thousandth."""
+def probability_of(label: str, measured: Array, declared: bool, verdict: Verdict = "traced") -> float:
+    """Probability of the law of the library, or of none; 0 where it is less than a thousandth."""
     signal = 100 * np.sin(T)[:, None] * np.ones(2)
     choose = (T % 100 >= 60) & (T % 100 < 80)
     run = Run(T, signal[:, :0], signal, FIT, choose, T % 100 >= 80)
@@ -49,8 +50,8 @@ def probability_of_law(measured: Array, declared: bool) -> float:
     known = baseline(problem, base, np.ones(2))
     asked = replace(known, noise=replace(known.noise, declared=np.full(2, declared)))
     promised = [Promise(law.candidates, base.fit.cost - law.fit.cost, {})]
-    found = probabilities(asked, Detection(0.01, 0.001, {}, 10.0), judged("traced"), promised, [law])
-    return found.get(NAME, 0.0)
+    found = probabilities(asked, Detection(0.01, 0.001, {}, 10.0), judged(verdict), promised, [law])
+    return found.get(label, 0.0)
 
 
 @given(st.floats(10.0, 30.0), st.floats(0.2, 0.5), st.integers(0, 2**32 - 1))
@@ -59,7 +60,7 @@ def test_a_small_remainder_in_all_outputs_rules_out_noise_and_not_the_law(size, 
     """The model's form leaves it where an answer is right, and several outputs see that too."""
     noise = np.random.default_rng(seed).standard_normal((SAMPLES, 2))
     measured = noise + (size * LAW + left * OTHER)[:, None]
-    declared, undeclared = (probability_of_law(measured, said) for said in (True, False))
+    declared, undeclared = (probability_of(NAME, measured, said) for said in (True, False))
     odds = declared / (1 - declared) * (1 - DEFAULT.prior.coloured)  # white noise is as probable as coloured
     assert undeclared / (1 - undeclared) > 0.98 * odds
     assert undeclared > 0.7
@@ -72,8 +73,22 @@ def test_a_large_remainder_is_a_mechanism_if_outputs_share_it_and_noise_if_they_
         shared = white + (size * (LAW + OTHER))[:, None]
         apart = white + size * LAW[:, None] + lfilter([1.0], [1.0, -0.95], slow, axis=0)
         cases = ((shared, False), (apart, False), (apart, True))
-        said.append([probability_of_law(measured, declared) for measured, declared in cases])
+        said.append([probability_of(NAME, measured, declared) for measured, declared in cases])
     of_shared, of_apart, of_declared = np.transpose(said)
     assert np.max(of_shared) < 0.05
     assert np.mean(of_apart > 0.9) > 0.9  # one in a hundred noises looks as if outputs shared it
     assert np.max(of_declared) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("common", "declared", "none"), [(0.0, False, True), (1.0, False, False), (0.0, True, False)]
+)
+def test_what_no_effect_explains_is_noise_if_outputs_do_not_share_it_and_its_size_is_not_declared(
+    common, declared, none
+):
+    rng, said = np.random.default_rng(6), []
+    for white, slow in rng.standard_normal((20, 2, SAMPLES, 2)):
+        slow[:, 1] += common * slow[:, 0]
+        measured = white + 3 * lfilter([1.0], [1.0, -0.95], slow, axis=0)
+        said.append(probability_of(NO_DISCREPANCY, measured, declared, "unexplained"))
+    assert np.mean((np.array(said) > 0.5) == none) > 0.9

@@ -19,7 +19,7 @@ from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.policy import DEFAULT
 from estimator.closeloop.probability import NO_DISCREPANCY, probabilities
 from estimator.closeloop.question.problem import Problem, Unknown
-from estimator.closeloop.size_odds import odds_of_effect
+from estimator.closeloop.size_odds import Left
 from estimator.record import Array, Record, Run
 from tests.helpers.baselines import baseline, fit_with
 from tests.helpers.verdicts import judged
@@ -251,19 +251,15 @@ def test_an_effect_that_changes_nothing_is_not_what_others_are_compared_with(ver
     assert said.get(near.label, 0.0) < 0.01 < said[right.label]
 
 
-@pytest.mark.parametrize(
-    ("verdict", "none"), [("traced", True), ("no_discrepancy", True), ("unexplained", False)]
-)
-def test_what_changes_less_than_the_form_is_no_discrepancy_unless_the_residual_calls_for_an_effect(
-    verdict, none
-):
-    """Beside noise of unknown size, the residual does not call for one."""
-    measured = 5 * np.random.default_rng(4).standard_normal(SAMPLES) + 3 * LAWS[2]
+@pytest.mark.parametrize(("size", "declared", "none"), [(5.0, False, True), (30.0, True, False)])
+def test_what_changes_less_than_the_form_is_no_discrepancy_unless_more_is_left(size, declared, none):
+    """Noise of unknown size may leave anything; noise of a declared size and the form may not."""
+    measured = size * np.random.default_rng(4).standard_normal(SAMPLES) + 3 * LAWS[2]
     found = baseline(replace(asked(), form_error=0.2), fitted(measured), np.ones(1))
-    found = replace(found, noise=replace(found.noise, declared=np.zeros(1, bool)))
+    found = replace(found, noise=replace(found.noise, declared=np.full(1, declared)))
     small = fitted(measured, 2)
-    said = probabilities(found, SEEN, judged(verdict), promised(measured), [small])
-    assert (said.get(small.label, 0.0) == 0.0) is none
+    said = probabilities(found, SEEN, judged("unexplained"), promised(measured), [small])
+    assert said.get(small.label, 0.0) == 0.0
     assert (said.get(NO_DISCREPANCY, 0.0) > 0.5) is none
 
 
@@ -287,7 +283,7 @@ def test_without_fits_the_screening_says_whether_there_is_an_effect():
 
 def test_a_small_residual_may_be_of_an_effect_and_a_large_one_is():
     rng = np.random.default_rng(8)
-    for size, least, most in ((0.0, 0.55, 0.8), (0.2, 0.5, 0.75), (15.0, 0.0, 0.01)):
+    for size, least, most in ((0.0, 0.75, 0.95), (0.3, 0.7, 0.95), (15.0, 0.0, 0.01)):
         measured = rng.standard_normal(SAMPLES) + size * LAWS[0]
         found = probabilities(on(measured), SEEN, judged("no_discrepancy"), [], [])
         assert least <= found[NO_DISCREPANCY] <= most, size
@@ -297,27 +293,45 @@ def test_a_small_residual_may_be_of_an_effect_and_a_large_one_is():
 @pytest.mark.parametrize("signal_over_noise", [1.0, 30.0, 1000.0])
 def test_the_larger_what_is_left_the_more_probable_is_an_effect(samples, signal_over_noise):
     error = np.sqrt(2 / samples) / signal_over_noise**2
-    odds = [odds_of_effect(s, error, DEFAULT.prior.material) for s in np.geomspace(1e-9, 1.0, 60)]
+    left = Left(DEFAULT.prior.material, min(0.02, 0.5 / signal_over_noise))
+    odds = [odds_of(left, np.array([s]), np.array([error])) for s in np.geomspace(1e-9, 1.0, 60)]
     assert np.diff(odds).min() > -1e-3 * max(odds)
-    assert 0.2 < odds[0] <= 1.0
+    assert odds[0] < 1.0
     assert odds[-1] > 1e3 or error > 0.1
 
 
+def odds_of(left: Left, share: Array, error: Array) -> float:
+    return float(np.exp(left.by_effect(share, error) - left.by_form(share, error)))
+
+
+@pytest.mark.parametrize("signals", [1, 4])
 @pytest.mark.parametrize("spread", [0.5, 0.8])
-def test_the_probability_of_no_effect_is_true_on_sizes_of_another_form(spread):
-    """What a right model leaves is lognormal, not exponential; that of effects a Pareto tail."""
-    rng, form, n = np.random.default_rng(9), DEFAULT.prior.material, 4000
+def test_the_probability_of_no_effect_is_true_on_sizes_of_another_form(spread, signals):
+    """What a right model leaves is lognormal, not exponential; effects have a Pareto tail, and leave most."""
+    rng, form, matters, n = np.random.default_rng(9), DEFAULT.prior.material, 1e-3, 2000
     effect = rng.random(n) < 0.5
-    strong = np.minimum(1e-3 * (1 + rng.pareto(0.7, n)), 1.0)
-    mean = form * 10.0 ** rng.uniform(-2, 0, n)
-    weak = mean * np.exp(rng.normal(-(spread**2) / 2, spread, n))
-    error = 10.0 ** rng.uniform(-7, -4, n)
-    share = np.where(effect, strong, weak) ** 2 + error * rng.standard_normal(n)
-    said = np.array([1 / (1 + odds_of_effect(s, e, form)) for s, e in zip(share, error, strict=True)])
-    for low, high in ((0.0, 0.1), (0.1, 0.55), (0.55, 1.0)):
+    strong = np.minimum(matters * (1 + rng.pareto(0.5, n)), 1.0)[:, None] * rng.beta(2, 1.5, (n, signals))
+    mean = form * 10.0 ** rng.uniform(-4, 0, n)[:, None]
+    weak = mean * np.exp(rng.normal(-(spread**2) / 2, spread, (n, signals)))
+    error = 10.0 ** rng.uniform(-7, -5, (n, signals))
+    share = np.where(effect[:, None], strong, weak) ** 2 + error * rng.standard_normal((n, signals))
+    left = Left(form, matters)
+    said = np.array([1 / (1 + odds_of(left, s, e)) for s, e in zip(share, error, strict=True)])
+    for low, high in ((0.0, 0.2), (0.2, 0.7), (0.7, 1.0)):
         held = (said >= low) & (said < high)
         assert held.sum() > 100
         assert (~effect[held]).mean() == pytest.approx(said[held].mean(), abs=0.15), (low, high)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=20, deadline=None)
+def test_what_several_signals_leave_does_not_depend_on_their_order(seed):
+    rng = np.random.default_rng(seed)
+    share, error = 10.0 ** rng.uniform(-8, -2, 4), 10.0 ** rng.uniform(-7, -4, 4)
+    left, turned = Left(0.01, 1e-3), rng.permutation(4)
+    assert odds_of(left, share, error) == pytest.approx(odds_of(left, share[turned], error[turned]))
+    none = np.zeros(0)
+    assert odds_of(left, none, none) == pytest.approx(1.0)
 
 
 def test_a_record_that_shows_nothing_leaves_the_prior():

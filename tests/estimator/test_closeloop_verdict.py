@@ -58,7 +58,7 @@ def test_what_is_left_unexplained_stays_so_if_more_is_found_beyond_noise(passed)
         more = passed | {
             "the residual is more than noise": True,
             "the residual is large enough to matter": True,
-            "more than another form of the model leaves": True,
+            "an effect is more probable than none": True,
         }
         assert verdict_of(checks(more)) == "unexplained"
 

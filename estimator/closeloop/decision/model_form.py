@@ -14,8 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimator.closeloop.detection.importance import TINY, importance, importance_as_noise, signal_size
-from estimator.closeloop.evidence import Check
+from estimator.closeloop.detection.importance import TINY, signal_size
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
@@ -60,13 +59,6 @@ class ModelForm(ABC):
         """Log score that the unknowns must gain which a law has beyond those of its limit."""
         further = len(h.fit.unknowns) - len(simpler.fit.unknowns) if becomes(h, simpler) else 0
         return self.baseline.policy.decision.unknown * further
-
-    def calls_for_effect(self, began: bool) -> list[Check]:
-        """The checks that the residual exceeds what needs no effect: undeclared noise, and the open share."""
-        if self.baseline.noise.known:
-            return []
-        size = importance_as_noise(self.baseline)
-        return [Check.least("more than undeclared noise may leave", size, 1.0)]
 
     @abstractmethod
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
@@ -178,12 +170,6 @@ class Open(ModelForm):
     def outgrown(self, h: Hypothesis, richer: Hypothesis) -> bool:
         """See ModelForm; never, because the gain may come from the open form."""
         return False
-
-    def calls_for_effect(self, began: bool) -> list[Check]:
-        """See ModelForm."""
-        size = importance(self.baseline, 0.0, began)
-        form = Check.least("more than another form of the model leaves", size, 1.0)
-        return [form, *super().calls_for_effect(began)]
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
         """See ModelForm; the most that a curve elsewhere explains, or what a right law may leave.

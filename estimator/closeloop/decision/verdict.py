@@ -15,14 +15,9 @@ from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part, cost
 from estimator.closeloop.hypotheses.relations import becomes
-from estimator.closeloop.probability import more_probable
+from estimator.closeloop.probability import NO_DISCREPANCY, more_probable
 from estimator.closeloop.size_odds import beyond_form
 from fmus.effects import EFFECTS
-
-NO_EFFECT: Mapping[Name, str] = {  # what a residual that fails a check may be
-    "more than undeclared noise may leave": "the residual may be noise, whose size is not declared",
-    "more than another form of the model leaves": "the residual is within what the FMU's form leaves open",
-}
 
 
 def explains(baseline: Baseline, h: Hypothesis) -> bool:
@@ -52,22 +47,35 @@ def account(baseline: Baseline, h: Hypothesis) -> list[Check]:
     return found
 
 
-def probable(
-    baseline: Baseline, found: Judgement, probability: Mapping[str, float], began: bool
-) -> Judgement:
+def probable(baseline: Baseline, found: Judgement, probability: Mapping[str, float]) -> Judgement:
     """The judgement with its most probable members alone; without an answer if all of them are improbable.
 
-    found: with at least one member; probability: by label; began: see `judge`.
+    found: with at least one member; probability: by label.
     """
     together = sum(probability.get(m.label, 0.0) for m in found.members)
     check = Check.least("not improbable", together, baseline.policy.decision.probable)
     if check.passed:
         found = found.credible(probability, baseline.policy.decision.left_out)
         return replace(found, checks=(*found.checks, check))
-    return _nothing(baseline, began, found.members[0]).after([*found.checks, check])
+    return _nothing(baseline, found.members[0]).after([*found.checks, check])
 
 
-def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis, began: bool) -> Judgement:
+def needed(baseline: Baseline, found: Judgement, probability: Mapping[str, float]) -> Judgement:
+    """The judgement without an answer after the check that an effect is more probable than none.
+
+    probability: by label.
+    """
+    some, limit = 1 - probability.get(NO_DISCREPANCY, 0.0), baseline.policy.decision.most
+    check = Check.least("an effect is more probable than none", some, limit)
+    if check.passed:
+        return replace(found, checks=(*found.checks, check))
+    form, unsaid = baseline.problem.form_error > 0, not baseline.noise.known
+    likely = ["what the FMU's form leaves open"] * form + ["noise, whose size is not declared"] * unsaid
+    reason = f"no effect accounts for the residual; it is more probably {' or '.join(likely or ['noise'])}"
+    return Judgement((*found.checks, check), (), reason)
+
+
+def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis) -> Judgement:
     """The judgement after the check of sizes by reported errors, which allow for the steps and the form."""
     best, limits, base = found.members[0], baseline.policy.decision, baseline.hypothesis
     # what the fit loses without an effect may show more than its errors, and less as these are wider
@@ -76,7 +84,7 @@ def clear_as_reported(baseline: Baseline, found: Judgement, reported: Hypothesis
     check = Check.least("the reported size is clear of zero", min(sizes, default=0.0), limits.telling)
     if check.passed:
         return replace(found, checks=(*found.checks, check))
-    return _nothing(baseline, began, best).after([*found.checks, check])
+    return _nothing(baseline, best).after([*found.checks, check])
 
 
 def better(name: Name, baseline: Baseline, h: Hypothesis, part: Part, sign: float = 1.0) -> Check:
@@ -115,7 +123,8 @@ def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check],
         reason = f"the residual is no larger than noise alone would leave (p = {detection.p_value:.2g})"
         return checks, Judgement(tuple(checks), (), reason)
     if not detection.material:
-        size = ", ".join(f"{r:.2f}" for r in baseline.hypothesis.rms(problem, "unseen") / noise)
+        left = detection.tested(baseline).hypothesis.rms(problem, "unseen") / noise
+        size = ", ".join(f"{r:.2f}" for r in left)
         reason = f"the residual is more than noise, but too small to matter ({size} times the noise)"
         return checks, Judgement(tuple(checks), (), reason)
     return checks, Judgement(tuple(checks), (), "; ".join(dead)) if dead else None
@@ -159,11 +168,10 @@ def judge(
     singles: Sequence[Hypothesis],
     pairs: Sequence[Hypothesis],
     kinds: int,
-    began: bool = False,
 ) -> Judgement:
     """Judge ranked single hypotheses and pairs (best first) of a detected discrepancy.
 
-    kinds: number of effects that were screened; began: whether the discrepancy sets in during the record.
+    kinds: number of effects that were screened.
     """
     form = form_of(baseline)
     good = [h for h in singles if explains(baseline, h)]
@@ -182,22 +190,19 @@ def judge(
         checks.append(Check.most("nothing richer gains on the part to identify", gained, limit))
         return (no_law(best) if becomes(richer, best) else _not_all(best, richer)).after(checks)
     nearest = singles[0] if singles else baseline.hypothesis
-    return _nothing(baseline, began, nearest).after(account(baseline, nearest))
+    return _nothing(baseline, nearest).after(account(baseline, nearest))
 
 
-def _nothing(baseline: Baseline, began: bool, nearest: Hypothesis) -> Judgement:
+def _nothing(baseline: Baseline, nearest: Hypothesis) -> Judgement:
     """The judgement if no hypothesis accounts for the residual."""
-    checks = tuple(form_of(baseline).calls_for_effect(began))
-    if failed := next((c for c in checks if not c.passed), None):
-        return Judgement(checks, (), f"{NO_EFFECT[failed.name]}, and no effect explains most of it")
     if baseline.noise_alone("fit"):
         reason = "the part to identify shows only noise: the discrepancy begins after it"
-        return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to identify")
+        return Judgement((), (), reason, "a split with some of the discrepancy in the part to identify")
     if baseline.noise_alone("choose"):
         reason = "the part to choose shows only noise: the discrepancy is not in it and cannot be confirmed"
-        return Judgement(checks, (), reason, "a split with some of the discrepancy in the part to choose")
+        return Judgement((), (), reason, "a split with some of the discrepancy in the part to choose")
     why = "no effect of the library accounts for the residual; best fit: "
-    return Judgement(checks, (), why + nearest.label)
+    return Judgement((), (), why + nearest.label)
 
 
 def completes(baseline: Baseline, pair: Hypothesis, single: Hypothesis, kinds: int) -> bool:

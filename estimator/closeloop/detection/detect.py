@@ -4,11 +4,12 @@ The residual is taken from the parts to choose and to test, which no fit has use
 is a parametric bootstrap to first order: white noise is drawn for all parts of the record, the response of
 the calibration to the noise in the part to identify is computed from the sensitivities of the FMU, and the
 same statistics are evaluated. The FMU is not simulated again, so the reference assumes that the FMU is linear
-in its unknowns within their standard errors.
+in its unknowns within their standard errors. A residual that would matter is therefore tested once more,
+after calibration to the whole record.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, stacked
-from estimator.closeloop.hypotheses.hypothesis import Part
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
 from estimator.closeloop.screening.regressors import Calibration, batches
 from estimator.noise_figures import figures_of, figures_of_noise
 from estimator.record import Array
@@ -32,6 +33,7 @@ class Detection:
     p_value: the smallest of all statistics, Bonferroni corrected; the residual is more than noise if it is
     below `level`. figures: each observed statistic over the 95 % quantile of its reference distribution.
     importance: size of the residual over the smallest size that matters; likeness, sets_in: see `detect`.
+    whole: the FMU calibrated to the whole record, if its residual was tested.
     """
 
     level: float
@@ -40,6 +42,11 @@ class Detection:
     importance: float
     likeness: float = 1.0
     sets_in: bool = False
+    whole: Hypothesis | None = None
+
+    def tested(self, baseline: Baseline) -> Baseline:
+        """The baseline whose residual was tested; it is another calibration if that of a baseline was not."""
+        return replace(baseline, hypothesis=self.whole) if self.whole else baseline
 
     @property
     def detected(self) -> bool:

@@ -32,20 +32,6 @@ def importance(baseline: Baseline, likeness: float, sets_in: bool) -> float:
     return large if may_be_form else max(large, material(b, beyond, b.noise.std))
 
 
-def importance_as_noise(baseline: Baseline) -> float:
-    """The same where no effect explains the residual, so that it may be noise if noise is not declared.
-
-    What depends between outputs is no noise of sensors, and what does not, is. Where that says nothing, as
-    for a single output, noise may be larger than its white part, so that only a share of the signal matters.
-    """
-    b, unsaid = baseline, ~baseline.noise.declared
-    beyond = beyond_noise(b, b.hypothesis, *WHOLE)
-    several = b.seen_by_several(b.hypothesis)
-    if several is None:
-        return material(b, beyond, np.where(unsaid, np.inf, b.noise.std))
-    return material(b, beyond if several else np.where(unsaid, 0.0, beyond), b.noise.std)
-
-
 def could_be_form(baseline: Baseline, likeness: float) -> bool:
     """Whether the residual may come from the open form, because it is like no effect; likeness: its share."""
     return baseline.problem.form_error > 0 and likeness < baseline.policy.decision.most
@@ -68,6 +54,11 @@ def beyond_noise(b: Baseline, h: Hypothesis, *parts: Part) -> Array:
 
 def material(b: Baseline, beyond: Array, noise: Array) -> float:
     """Size beyond noise (n_y,) over the smallest size that matters; noise: (n_y,) standard deviations."""
+    return float(np.max(beyond / smallest(b, noise)))
+
+
+def smallest(b: Baseline, noise: Array) -> Array:
+    """The smallest size beyond noise that matters, (n_y,); noise: (n_y,) standard deviations."""
     limits = b.policy.detection
     lowest = np.minimum(limits.signal_share * signal_size(b.problem), limits.noise_share * noise)
-    return float(np.max(beyond / np.maximum(lowest, TINY)))
+    return np.asarray(np.maximum(lowest, TINY))

@@ -49,7 +49,8 @@ class DecisionPolicy:
         "share of the variance",
         "share that one effect must explain of the variance beyond noise if the model form is open; a "
         "residual of which no effect could explain as much is left to the form; what inputs that were held "
-        "over a sample must explain of the variance beyond noise",
+        "over a sample must explain of the variance beyond noise; least probability of an effect with which "
+        "a residual that no effect explains is unexplained",
         "derivation: what explains less than it leaves is not what the residual is mainly made of",
     )
     probable: float = limit(

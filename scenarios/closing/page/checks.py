@@ -28,12 +28,7 @@ MEANINGS: Mapping[Name, tuple[str, str]] = {  # how the value stands to the limi
     "nothing richer gains on the part to identify": (
         MOST, "what an effect that contains this one would take away more from the sum of squares",
     ),
-    "more than another form of the model leaves": (
-        LEAST, "size of the residual over what the open form of the model may leave",
-    ),
-    "more than undeclared noise may leave": (
-        LEAST, "its size over the smallest size that matters, without what may be noise of sensors",
-    ),
+    "an effect is more probable than none": (LEAST, "probability that there is an effect, known or not"),
     "the force follows the law": (MOST, "what a free curve takes away more from the sum of squares"),
     "better than without it on the test part": (ABOVE, GAIN),
     "no worse than without it on the test part": (ABOVE, GAIN),
