@@ -17,6 +17,7 @@ from textwrap import fill
 
 from scipy.stats import binomtest
 
+from benchmarks.challenge import ways
 from benchmarks.challenge.code import ROOT, changed, digests, read_for
 from benchmarks.challenge.draw import plans
 from benchmarks.challenge.match import Answer
@@ -36,7 +37,8 @@ class Board:
     """A scoreboard: the set, the commit that was frozen before its seed was drawn, and what was counted.
 
     rows: quantity, value, target; before: values of the whole set before it, by quantity; reliable: the table
-    of right answers by the probability that they state; code: digests of the files that answer.
+    of right answers by the probability that they state; ways: that of the ways of measuring, empty if there
+    is one only; code: digests of the files that answer.
     """
 
     seed: int
@@ -48,13 +50,15 @@ class Board:
     before_seed: int
     before_commit: str
     reliable: tuple[str, ...]
+    ways: tuple[str, ...]
     code: Mapping[str, str]
 
     @classmethod
     def kept(cls, path: Path = KEPT) -> Board:
         """The scoreboard from its file."""
         told = json.loads(path.read_text(encoding="utf-8"))
-        return cls(**{**told, "rows": tuple(map(tuple, told["rows"])), "reliable": tuple(told["reliable"])})
+        tables = {name: tuple(told[name]) for name in ("reliable", "ways")}
+        return cls(**{**told, **tables, "rows": tuple(map(tuple, told["rows"]))})
 
     def keep(self, path: Path = KEPT) -> None:
         """Write the scoreboard to its file."""
@@ -67,9 +71,9 @@ def board_of(
     """The scoreboard of a set; last: the one that it replaces; code: the files that answer."""
     found = tuple((r.what, r.value, r.target) for r in scoreboard(marked))
     before = {what: value for what, value, _ in last.rows}
-    reliable = tuple(rows(marked))
+    tables = tuple(rows(marked)), tuple(ways.rows(marked))
     return Board(
-        seed, commit, date, len(marked), found, before, last.seed, last.commit, reliable, digests(code)
+        seed, commit, date, len(marked), found, before, last.seed, last.commit, *tables, digests(code)
     )
 
 
@@ -112,6 +116,8 @@ def section(board: Board, different: Sequence[str]) -> str:
             "",
             f"![Share of right answers over the probability said, with 95 % intervals]({DIAGRAM.name})",
         ]
+    if board.ways:
+        lines += ["", "By the [way of measuring](#what-is-in-a-set):", "", *board.ways]
     return "\n".join(lines) + "\n"
 
 

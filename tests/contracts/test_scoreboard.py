@@ -69,6 +69,15 @@ def test_a_new_scoreboard_has_the_one_before_beside_it() -> None:
     [row] = re.findall(r"^\| two effects, both named \|.*$", section(new, []), re.M)
     assert row.startswith("| two effects, both named | ")
     assert row.endswith("| 3 of 7 |")
+    assert new.ways == ()  # all records are measured in one
+
+
+def test_a_set_of_several_ways_of_measuring_is_counted_by_way() -> None:
+    ways = ("clock", "inputs", "inputs")
+    marked = [(Truth("record", "double", "rig", way=w), Answer("several", (("a", "b"),))) for w in ways]
+    new = board_of(marked, 2, "after", "today", Board.kept(), ["pyproject.toml"])
+    counted = re.findall(r"^\| (\w+) \|.*\| 0 of (\d) \|", section(new, []), re.M)
+    assert counted == [("clock", "1"), ("inputs", "2"), ("all", "3")]
 
 
 @pytest.mark.slow
