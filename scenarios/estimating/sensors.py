@@ -13,8 +13,10 @@ from estimator.filters.policy import POLICY as OF_FILTER
 from estimator.filters.sensor_noise import SensorNoise
 from estimator.noise import white_noise
 from estimator.record import Array, Record
+from estimator.rounding import step_of
 from fmus.errors import BadInput, did_you_mean
 from scenarios.estimating.policy import POLICY
+from scenarios.estimating.rounding import least_std, rounded_noise, with_rounding
 from scenarios.experiment.estimated import ESTIMATED, Options, OutputNoise
 from scenarios.experiment.experiment import Experiment
 
@@ -68,19 +70,22 @@ def likelihood_says(o: Options) -> bool:
     return filters()[o.filter].moments and o.gate is None and not o.adapt
 
 
-def noise_of(e: Experiment, record: Record, dt: float) -> tuple[SensorNoise, ...]:
-    """The noise of each output, as declared, or else as estimated from third differences.
+def noise_of(e: Experiment, o: Options, record: Record, dt: float) -> tuple[SensorNoise, ...]:
+    """The noise of each output, as declared, or else as third differences and the sensor's steps show it.
 
     dt: s, between samples. Noise that the record is to say has values with which the search begins.
     """
     found = []
     for j, name in enumerate(record.outputs):
         std, declared = float(record.noise_std[j]), _declared(e).get(name, OutputNoise(std=ESTIMATED))
+        seen = _seen(record, j)
+        step = step_of([seen])
         if np.isnan(std):
-            seen = _seen(record, j)
-            rough = white_noise([seen]) or white_noise([seen], quantised=True)
-            std = max(rough, FLOOR * float(np.std(seen)), 1e-300)
+            rough = rounded_noise(seen) if step else white_noise([seen])
+            std = max(rough, FLOOR * float(np.std(seen)), least_std(step), 1e-300)
         noise = SensorNoise(name, std)
+        if declared.time is None and step > std and filters()[o.filter].noises:
+            noise = with_rounding(noise, seen, step, record.runs[0].sample)
         if declared.time is not None:
             time = declared.time if isinstance(declared.time, float) else POLICY.correlation_middle * dt
             share = declared.share if isinstance(declared.share, float) else POLICY.correlated_share
@@ -98,7 +103,7 @@ def sought(e: Experiment, o: Options, record: Record, noise: Sequence[SensorNois
     for j, n in enumerate(noise):
         declared, spread = _declared(e).get(n.output), float(np.std(_seen(record, j)))
         if np.isnan(record.noise_std[j]) or (declared and declared.std == ESTIMATED):
-            low = min(max(FLOOR * spread, 1e-300), n.std)
+            low = min(max(FLOOR * spread, least_std(step_of([_seen(record, j)])), 1e-300), n.std)
             found.append(Sought(n.output, STD, log(low), log(max(spread, n.std))))
         if declared and declared.share == ESTIMATED:
             found.append(Sought(n.output, SHARE, -far, far))

@@ -136,7 +136,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
             f"{e.file}: [estimate] rate leaves {len(s.t)} samples of the record; use a higher rate"
         )
     _check_measured(e, record, s)
-    sensors = noise_of(e, record, s.step)
+    sensors = noise_of(e, options, record, s.step)
     noise = np.array([n.std for n in sensors])
     constants = {**e.parameters, **e.initial}
     parameters = tuple(parameters_of(e, options, d))
