@@ -47,11 +47,11 @@ def left_by_the_answer(problem: Problem, found: Outcome, rms: Mapping[str, Array
     """A note on the outputs for which an answer leaves more than noise on the test part."""
     if not found.chosen:
         return []
-    before, after, limit = rms["before"], rms["after"], problem.policy.decision.clean * found.noise
+    before, after, down = rms["before"], rms["after"], found.baseline.at_noise(found.chosen, "test")
     return [
         f"{output}: the answer explains {1 - (after[j] / before[j]) ** 2:.0%} of the residual's variance on "
         f"the test part; what is left there is {after[j] / found.noise[j]:.1f} times the noise, and the "
         "library does not explain it"
         for j, output in enumerate(problem.record.outputs)
-        if limit[j] < after[j] < before[j]
+        if not down[j] and after[j] < before[j]
     ]

@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,8 +14,9 @@ import numpy as np
 import pytest
 
 from estimator.closeloop.fitting.calibrate import calibrate
-from estimator.closeloop.policy import DEFAULT
+from estimator.closeloop.question.problem import Problem
 from estimator.plant import PLANTS
+from estimator.record import Record, Run
 from scenarios import close_loop
 from scenarios.closing.closing import builder_for, experiment_of, pose
 from scenarios.closing.notes import left_by_the_answer
@@ -22,6 +24,7 @@ from scenarios.closing.page import sections
 from scenarios.closing.page.case import Case
 from scenarios.closing.page.wording import explained_words
 from scenarios.closing.result import Result, start_values
+from tests.helpers.baselines import NOTHING, baseline
 from tests.scenarios.test_close_loop import FOREIGN, write_foreign
 from tests.truth.rig import write_null_record
 
@@ -170,40 +173,50 @@ def test_the_result_tells_the_start_values(page: str, demo: tuple[Result, Path])
     assert "fitted together with the parameters:" not in words(page)
 
 
-@pytest.mark.parametrize(("after", "told"), [(1.0, False), (1.04, False), (5.0, True), (12.0, False)])
+def leaving(after: float) -> SimpleNamespace:
+    """An answer of which the first output leaves noise, the second so many times its noise of 2, after 10."""
+    t = np.arange(500.0)
+    run = Run(t, np.zeros((500, 0)), np.zeros((500, 2)), t < 300, (t >= 300) & (t < 400), t >= 400)
+    record = Record((run,), (), ("angle", "speed"), np.array([1.0, 2.0]))
+    problem = Problem(lambda _: Path(), record, {}, {})
+    before, chosen = (
+        replace(NOTHING, residuals=(np.array([first, 2 * second]) * np.ones((500, 2)),))
+        for first, second in ((10.0, 10.0), (1.0, after))
+    )
+    found = baseline(problem, before, record.noise_std)
+    return SimpleNamespace(problem=problem, baseline=found, chosen=chosen, noise=found.noise.std)
+
+
+AFTER = pytest.mark.parametrize(("after", "told"), [(1.0, False), (1.2, False), (5.0, True), (12.0, False)])
+
+
+@AFTER
 def test_what_an_answer_leaves_is_said_beside_it(after: float, told: bool) -> None:
-    """It is said where more than noise is left, and not for an output that the answer does not improve."""
-    problem = SimpleNamespace(policy=DEFAULT, record=SimpleNamespace(outputs=("speed",)))
-    found = SimpleNamespace(chosen=object(), noise=np.array([2.0]))
-    rms = {"before": np.array([20.0]), "after": np.array([2.0 * after])}
-    notes = left_by_the_answer(problem, found, rms)
+    """It is said where more is left than noise by chance, and not for an output that is not improved."""
+    found = leaving(after)
+    rms = {"before": np.array([10.0, 20.0]), "after": np.array([1.0, 2.0 * after])}
+    notes = left_by_the_answer(found.problem, found, rms)
     assert len(notes) == told
     if told:
         assert "75% of the residual's variance" in notes[0]
         assert "5.0 times the noise" in notes[0]
-    assert left_by_the_answer(problem, SimpleNamespace(chosen=None, noise=found.noise), rms) == []
+    found.chosen = None
+    assert left_by_the_answer(found.problem, found, rms) == []
 
 
 def test_the_page_runs_the_augmented_fmu_with_the_values_found(page: str, demo: tuple[Result, Path]) -> None:
     assert started(page).keys().isdisjoint(demo[0].calibrated)
 
 
-@pytest.mark.parametrize(("after", "told"), [(1.0, False), (1.2, False), (5.0, True), (12.0, False)])
+@AFTER
 def test_the_lead_says_how_much_an_answer_explains(after: float, told: bool) -> None:
     """A residual of 100 samples is 1.2 times the noise by chance."""
-    run = SimpleNamespace(test=np.arange(500) >= 400)
-    record = SimpleNamespace(outputs=("angle", "speed"), runs=(run,))
-    noise = SimpleNamespace(redundancy=np.ones(2))
     error = {
         "angle": {"before": 10.0, "after": 1.0, "noise": 1.0},
         "speed": {"before": 20.0, "after": 2.0 * after, "noise": 2.0},
     }
-    case = Case(
-        SimpleNamespace(policy=DEFAULT, record=record),
-        SimpleNamespace(baseline=SimpleNamespace(noise=noise)),
-        SimpleNamespace(error=error),
-        SimpleNamespace(),
-    )
+    found = leaving(after)
+    case = Case(found.problem, found, SimpleNamespace(error=error), SimpleNamespace())
     explained, rest = explained_words(case)
     if told:
         assert words(explained) == "at least 75.0 % of the residual's variance"

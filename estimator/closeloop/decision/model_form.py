@@ -72,12 +72,6 @@ class ModelForm(ABC):
         limits = self.baseline.policy.decision
         return max(limits.noticed, limits.missed * (cost(self.baseline.hypothesis) - cost(h)))
 
-    def _at_noise(self, h: Hypothesis, part: Part) -> BoolArray:
-        """Outputs (n_y,) whose residual on a part comes down to the noise, or nearly so."""
-        b, limits = self.baseline, self.baseline.policy.decision
-        scatter = limits.scatter * np.sqrt(b.noise.redundancy / (2 * len(h.of(b.problem, part))))
-        return np.asarray(h.rms(b.problem, part) < (limits.clean + scatter) * b.noise.std)
-
 
 class Closed(ModelForm):
     """The form is right: with the right effects only noise is left, in every part of the record."""
@@ -100,7 +94,7 @@ class Closed(ModelForm):
         before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)
         beyond = np.sqrt(np.maximum(after**2 - noise**2, 0.0))
         little = beyond <= b.policy.detection.signal_share * signal_size(b.problem)
-        return self._at_noise(h, part) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
+        return b.at_noise(h, part) | little & (gap_closed(before, after, noise) >= b.policy.decision.gap)
 
     def distinguishes(self, best: Hypothesis, h: Hypothesis) -> bool:
         """See ModelForm; h is worse by more than a small error of form, or a limit that best outgrows."""
@@ -145,7 +139,7 @@ class Open(ModelForm):
         alone on its own output need not explain the others.
         """
         b, limits = self.baseline, self.baseline.policy
-        noise, down = b.noise.std, self._at_noise(h, part)
+        noise, down = b.noise.std, b.at_noise(h, part)
         if len(h.candidates) > 1:
             return down
         before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)

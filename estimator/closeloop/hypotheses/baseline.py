@@ -14,7 +14,7 @@ from estimator.closeloop.policy import Policy
 from estimator.closeloop.question.problem import Problem
 from estimator.independence import chance_of_independence
 from estimator.noise import Noise
-from estimator.record import Array
+from estimator.record import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +80,15 @@ class Baseline:
         chance = self.policy.detection.chance
         return bool(h.fit.beyond_noise < chance * np.sqrt(2 * len(h.fit.residual)))
 
+    def at_noise(self, h: Hypothesis, part: Part) -> BoolArray:
+        """Outputs (n_y,) whose residual on a part comes down to the noise, or nearly so."""
+        limits, samples = self.policy.decision, sum(self.problem.record.stretches(part))
+        chance = limits.scatter * np.sqrt(self.noise.redundancy / (2 * samples))
+        return np.asarray(h.rms(self.problem, part) < (limits.clean + chance) * self.noise.std)
+
     def noise_alone(self, part: Part) -> bool:
         """Whether the residual of the calibrated FMU on a part of the record is only noise."""
-        residual = self.hypothesis.of(self.problem, part)
-        scatter = self.policy.decision.scatter * np.sqrt(self.noise.redundancy / (2 * len(residual)))
-        return bool(np.all(np.sqrt(np.mean(residual**2, axis=0)) < (1 + scatter) * self.noise.std))
+        return bool(np.all(self.at_noise(self.hypothesis, part)))
 
     def seen_by_several(self, h: Hypothesis) -> bool | None:
         """Whether what h leaves depends between outputs, as noise of sensors does not.

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from estimator.closeloop.diagnostics.diagnostics import Diagnostics
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.outcome import Outcome
@@ -49,12 +47,11 @@ class Case:
 
         For each, the share of the residual's variance that the answer explains, and the rest over the noise.
         """
-        limits = self.problem.policy.decision
-        samples = sum(int(run.test.sum()) for run in self.problem.record.runs)
-        chance = limits.scatter * np.sqrt(self.found.baseline.noise.redundancy / (2 * samples))
-        limit = dict(zip(self.problem.record.outputs, limits.clean + chance, strict=True))
+        if self.found.chosen is None:
+            return {}
+        down = self.found.baseline.at_noise(self.found.chosen, "test")
         return {
             output: (1 - (e["after"] / e["before"]) ** 2, e["after"] / e["noise"])
-            for output, e in self.result.error.items()
-            if limit[output] * e["noise"] < e["after"] < e["before"]
+            for (output, e), noise in zip(self.result.error.items(), down, strict=True)
+            if not noise and e["after"] < e["before"]
         }
