@@ -162,6 +162,10 @@ def test_an_open_form_leaves_as_much_of_a_curve_elsewhere(left, own, elsewhere, 
     asked = [SimpleNamespace(policy=DEFAULT, form_error=form) for form in (0.0, 0.02)]
     limits = [form_of(baseline(a, base)).curve_limit(h, elsewhere) for a in asked]
     assert [own > limit for limit in limits] == [closed, opened]
+    told = [baseline(a, base) for a in asked]  # what is left may be noise that is not declared
+    unsaid = [replace(b, noise=replace(b.noise, declared=np.zeros(1, bool))) for b in told]
+    limits = [form_of(b).curve_limit(h, elsewhere) for b in unsaid]
+    assert [own > limit for limit in limits] == [closed, closed and opened]
 
 
 def among(builder: ModelBuilder, resistance: Force, *kinds: str) -> Judgement:

@@ -336,6 +336,26 @@ def test_in_a_pair_each_law_is_replaced_by_those_over_its_motion_at_its_place():
     assert over_the_same(Columns(columns), nothing, Hypothesis((step,), alone, ()), change) == []
 
 
+def test_in_a_pair_a_change_of_a_parameter_is_replaced_by_its_other_courses_in_time():
+    rng = np.random.default_rng(2)
+    kinds = (
+        ("parameter_step", "k1"),
+        ("parameter_drift", "k1"),
+        ("parameter_drift", "k2"),
+        ("constant_force", "k1"),
+    )
+    every = [candidate(k, at) for k, at in (*kinds, ("coulomb_friction", "a"))]
+    columns = dict(zip((c.label for c in every), rng.standard_normal((5, 400)), strict=True))
+    change = [(c, columns[c.label][:, None]) for c in every]
+    step, drift, friction = every[0], every[1], every[4]
+    own = (*friction.unknowns, *step.unknowns)
+    fit = replace(nothing_calibrated(np.ones(400)), unknowns=own, values=np.array([7.0, 3.0]))
+    h, nothing = Hypothesis((friction, step), fit, ()), Calibration(np.zeros((400, 0)))
+    [promise] = over_the_same(Columns(columns), nothing, h, change)
+    assert promise.candidates == (friction, drift)
+    assert promise.start[friction.amplitudes[0].name] == 7.0
+
+
 def test_at_another_place_a_law_is_looked_at_in_the_shape_that_it_has():
     here, there = (
         candidate("harmonic_excitation", at, [("f", f)]) for at, f in (("secondary", 1.0), ("body", 5.0))

@@ -67,6 +67,10 @@ class ModelForm(ABC):
         elsewhere: the largest by a curve at another port.
         """
 
+    def _most_left(self, h: Hypothesis) -> float:
+        """Most of the sum of squares that a law leaves beyond noise."""
+        return self.baseline.policy.decision.second_share * h.fit.beyond_noise
+
     def noticed(self, h: Hypothesis) -> float:
         """Reduction of the sum of squares by a richer hypothesis, from which on h is incomplete."""
         limits = self.baseline.policy.decision
@@ -113,8 +117,7 @@ class Closed(ModelForm):
 
     def curve_limit(self, h: Hypothesis, elsewhere: float) -> float:
         """See ModelForm; more than chance, and most of what the law leaves beyond noise."""
-        limits = self.baseline.policy.decision
-        return max(limits.noticed, limits.second_share * h.fit.beyond_noise)
+        return max(self.baseline.policy.decision.noticed, self._most_left(h))
 
 
 @dataclass(frozen=True)
@@ -169,9 +172,10 @@ class Open(ModelForm):
         """See ModelForm; the most that a curve elsewhere explains, or what a right law may leave.
 
         An error of the form is as like a curve elsewhere as like one over this motion. What a wrong law
-        leaves is a force at its own port, and less like any other.
+        leaves is a force at its own port, and less like any other. What may be noise that is not declared is
+        like any curve too; there, the curve must explain most of it, as where the form is right.
         """
-        return max(self.noticed(h), elsewhere)
+        return max(self.noticed(h), elsewhere, 0.0 if self.baseline.noise.known else self._most_left(h))
 
 
 def form_of(baseline: Baseline) -> ModelForm:

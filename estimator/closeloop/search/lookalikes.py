@@ -3,7 +3,8 @@
 Two such laws describe nearly the same motion. If an effect is strong, the calibrated FMU is far from that
 motion, and a fit that starts there may find only one of the two. Starting at the fitted law's values finds
 both, and the verdict decides whether the record distinguishes them. If the force does not follow the curve of
-the law that was found, the other laws over the same motion are fitted from its values too.
+the law that was found, the other laws over the same motion are fitted from its values too. So are the other
+courses in time of a parameter, as it may drift where a step of it was found.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,6 +21,7 @@ from estimator.closeloop.hypotheses.promise import Promise, distinct, key
 from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.screening.regressors import Calibration, Changes
 from estimator.record import Array
+from fmus.effects import EFFECTS
 
 
 def lookalikes(
@@ -56,22 +58,31 @@ def lookalikes(
 def over_the_same(
     screening: Screening, calibration: Calibration, h: Hypothesis, change: Changes
 ) -> list[Promise]:
-    """Promises of h with one of its laws replaced by another law over the same motion, most similar first.
+    """Promises of h with one of its effects replaced by another one of the same quantity, most similar first.
 
-    Otherwise as `lookalikes`. Empty if no effect is a law over a velocity or displacement.
+    These are laws over the same motion, and changes of the same parameter. Otherwise as `lookalikes`.
     """
     promises: list[Promise] = []
     for i, c in enumerate(h.candidates):
-        if not (over := over_what(c)):
+        others = [(other, g) for other, g in change if of_one_quantity(c, other)]
+        if not others:
             continue
         response = _response(screening, calibration, _shaped(c, _shape(c, h.theta)), h.theta)
-        for other, g in change:
-            if other.location == c.location and other.kind != c.kind and over_what(other) == over:
-                missed, start = _nearest(other, calibration.without(g), response)
-                laws = (*h.candidates[:i], other, *h.candidates[i + 1 :])
-                promises.append(Promise(laws, -missed, {**h.theta, **start}))
+        for other, g in others:
+            missed, start = _nearest(other, calibration.without(g), response)
+            laws = (*h.candidates[:i], other, *h.candidates[i + 1 :])
+            promises.append(Promise(laws, -missed, {**h.theta, **start}))
     promises.sort(key=lambda p: -p.gain)
     return distinct(promises)[: screening.problem.policy.search.lookalikes]
+
+
+def of_one_quantity(c: Candidate, other: Candidate) -> bool:
+    """Whether two kinds of effects are laws of one force over one motion, or change one parameter."""
+    if c.location != other.location or c.kind == other.kind or not {c.kind, other.kind} <= set(EFFECTS):
+        return False
+    if EFFECTS[c.kind].acts_on == EFFECTS[other.kind].acts_on == "parameter":
+        return True
+    return over_what(c) == over_what(other) != ""
 
 
 def _response(
