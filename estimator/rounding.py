@@ -13,15 +13,15 @@ import numpy as np
 from estimator.record import Array, Record
 
 PARTS = ("fit", "choose", "test")
-DRAWS = 20  # draws of the noise, whose scatter of a mean square has an error of a third
 EQUAL = 0.02  # of a step: values differ by whole steps within this, because files have few digits
 
 
-def unevenness(record: Record, residuals: Sequence[Array]) -> Array:
+def unevenness(record: Record, residuals: Sequence[Array], draws: int) -> Array:
     """Variance of the mean square of each output's declared noise over that without rounding, (n_y,).
 
     residuals: measured minus simulated outputs of each run (N, n_y); the part of the record with the largest
-    scatter counts. 1 for noise that is not declared, or larger than the steps of its sensor.
+    scatter counts; draws: number of draws of the noise. 1 for noise that is not declared, or larger than the
+    steps of its sensor.
     """
     rng = np.random.default_rng(0)
     found = np.ones(len(record.outputs))
@@ -29,23 +29,23 @@ def unevenness(record: Record, residuals: Sequence[Array]) -> Array:
         step = step_of([run.y[:, j] for run in record.runs])
         if step > std:
             pairs = zip(record.runs, residuals, strict=True)
-            drawn = [_draws(run.y[:, j] - r[:, j], step, std, rng) for run, r in pairs]
+            drawn = [_squares(run.y[:, j] - r[:, j], step, std, draws, rng) for run, r in pairs]
             found[j] = max(1.0, *(_scatter(record.of(drawn, part)) for part in PARTS))
     return found
 
 
-def _draws(y: Array, step: float, std: float, rng: np.random.Generator) -> Array:
-    """Squares (N, DRAWS) of the error of a sensor of a value y (N,), over its variance `std` squared.
+def _squares(y: Array, step: float, std: float, draws: int, rng: np.random.Generator) -> Array:
+    """Squares (N, draws) of the error of a sensor of a value y (N,), over its variance `std` squared.
 
     Where the value is between two steps is not known as exactly as that, and drawn too.
     """
     own = np.sqrt(max(std**2 - step**2 / 12, 0.0))
-    at = y[:, None] + step * rng.uniform(size=DRAWS)
+    at = y[:, None] + step * rng.uniform(size=draws)
     return np.asarray(((step * np.round((at + own * rng.standard_normal(at.shape)) / step) - at) / std) ** 2)
 
 
 def _scatter(squares: Array) -> float:
-    """Variance of the mean of squares (n, DRAWS) between draws, over that for independent Gaussian values."""
+    """Variance of the mean of squares (n, draws) between draws, over that for independent Gaussian values."""
     return float(np.var(squares.mean(axis=0), ddof=1)) * len(squares) / 2 if len(squares) else 1.0
 
 

@@ -70,6 +70,18 @@ class EstimatePolicy(Limits):
         "correlated part of a sensor's noise with which the search for it begins",
         "convention: the middle of what is possible",
     )
+    lasting_share: float = limit(
+        0.01,
+        "share of the variance",
+        "rounding error that lasts while an output rests, below which it is left out",
+        "derivation: a hundredth of the variance is half a hundredth of the noise",
+    )
+    resting: int = limit(
+        16,
+        "samples",
+        "whose mean tells where between two steps of its sensor an output is, and the shortest rest",
+        "derivation: a quarter of the noise, which is at most a step where rounding lasts",
+    )
     learnt: float = limit(
         30.0,
         "s",

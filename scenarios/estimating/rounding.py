@@ -8,10 +8,9 @@ import numpy as np
 from estimator.filters.sensor_noise import SensorNoise
 from estimator.noise import DIFFERENCE
 from estimator.record import Array
+from scenarios.estimating.policy import POLICY
 
 HARMONICS = 20  # of the rounding error over a step, of which the first ones matter
-SMOOTHED = 16  # samples whose mean tells where between two steps an output is
-LEAST_SHARE = 0.01  # of the square of the noise, below which what lasts is left out
 
 
 def least_std(step: float) -> float:
@@ -38,14 +37,14 @@ def with_rounding(noise: SensorNoise, y: Array, step: float, dt: float) -> Senso
     own = max(noise.std**2 - least_std(step) ** 2, 0.0) / step**2
     lasting = (exp(-((2 * pi * k) ** 2) * own) / (2 * (pi * k) ** 2) for k in range(1, HARMONICS + 1))
     share, time = min(sum(lasting) * step**2 / noise.std**2, 1.0), _rests(y, step) * dt
-    return replace(noise, share=share, time=time) if share > LEAST_SHARE and time > 0 else noise
+    return replace(noise, share=share, time=time) if share > POLICY.lasting_share and time > 0 else noise
 
 
 def _rests(y: Array, step: float) -> int:
-    """Number of samples over which the error of rounding stays alike (to 1/e); 0 if fewer than SMOOTHED."""
-    mean = np.convolve(y, np.full(SMOOTHED, 1 / SMOOTHED), "valid")
+    """Number of samples over which the error of rounding stays alike (to 1/e); 0 if they are few."""
+    lag = POLICY.resting
+    mean = np.convolve(y, np.full(lag, 1 / lag), "valid")
     turned = np.exp(2j * pi * mean / step)
-    lag = SMOOTHED
     if len(mean) <= lag or _alike(turned, lag) < exp(-1):
         return 0
     while 2 * lag < len(mean) and _alike(turned, 2 * lag) > exp(-1):

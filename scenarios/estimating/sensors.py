@@ -81,12 +81,13 @@ def noise_of(e: Experiment, o: Options, record: Record, dt: float) -> tuple[Sens
         seen = _seen(record, j)
         step = step_of([seen])
         if np.isnan(std):
-            rough = rounded_noise(seen) if step else white_noise([seen])
+            rough = rounded_noise(seen) if step else _rough(seen)
             std = max(rough, FLOOR * float(np.std(seen)), least_std(step), 1e-300)
         noise = SensorNoise(name, std)
-        if declared.time is None and step > std and filters()[o.filter].noises:
-            noise = with_rounding(noise, seen, step, record.runs[0].sample)
-        if declared.time is not None:
+        if declared.time is None:
+            if step > std and filters()[o.filter].noises:
+                noise = with_rounding(noise, seen, step, record.runs[0].sample)
+        else:
             time = declared.time if isinstance(declared.time, float) else POLICY.correlation_middle * dt
             share = declared.share if isinstance(declared.share, float) else POLICY.correlated_share
             noise = replace(noise, time=time, share=share)
@@ -118,6 +119,11 @@ def changed(noise: Sequence[SensorNoise], wanted: Sequence[Sought], at: Array) -
     for s, coordinate in zip(wanted, at.tolist(), strict=True):
         new[s.output][s.what] = s.value(coordinate)
     return tuple(replace(n, **new[n.output]) for n in noise)
+
+
+def _rough(y: Array) -> float:
+    """Standard deviation of the noise of a channel y (N,), also of one that rests with few digits."""
+    return white_noise([y]) or white_noise([y], quantised=True)
 
 
 def _declared(e: Experiment) -> Mapping[str, OutputNoise]:

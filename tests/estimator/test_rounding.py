@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimator.closeloop.policy import DEFAULT
 from estimator.record import Array, Record, Run
 from estimator.rounding import step_of, unevenness
 
-N = 6000
+N, DRAWS = 6000, DEFAULT.detection.roundings
 FIT = np.arange(N) % 1500 < 900
 CHOOSE = (np.arange(N) % 1500 >= 900) & (np.arange(N) % 1500 < 1200)
 
@@ -49,7 +50,7 @@ def test_a_value_that_rests_has_one_error_of_rounding_over_a_whole_part(own):
         measured, std = rounded(np.full(N, at), own, 1.0, seed)
         squares.append(np.mean(((measured - at)[FIT] / std) ** 2))
     y, std = rounded(np.cumsum(rng.normal(0.0, 0.3, N)), own, 1.0)  # whose steps show in the record
-    at_rest = unevenness(record_of(y, std), [(y - np.full(N, 0.3))[:, None]])
+    at_rest = unevenness(record_of(y, std), [(y - np.full(N, 0.3))[:, None]], DRAWS)
     assert at_rest[0] == pytest.approx(np.var(squares) * FIT.sum() / 2, rel=0.8)
     assert at_rest[0] > 30
 
@@ -57,12 +58,12 @@ def test_a_value_that_rests_has_one_error_of_rounding_over_a_whole_part(own):
 def test_a_value_that_moves_over_many_steps_is_rounded_as_if_by_white_noise():
     course = 40 * np.sin(0.003 * np.arange(N))
     y, std = rounded(course, 0.4, 1.0)
-    found = unevenness(record_of(y, std), [(y - course)[:, None]])
+    found = unevenness(record_of(y, std), [(y - course)[:, None]], DRAWS)
     assert 1.0 <= found[0] < 3.0
 
 
 def test_noise_larger_than_the_steps_or_not_declared_is_even():
     y, std = rounded(np.zeros(N), 2.0, 1.0)
-    assert unevenness(record_of(y, std), [y[:, None]]).tolist() == [1.0]
+    assert unevenness(record_of(y, std), [y[:, None]], DRAWS).tolist() == [1.0]
     y, _ = rounded(np.zeros(N), 0.3, 1.0)
-    assert unevenness(record_of(y, np.nan), [y[:, None]]).tolist() == [1.0]
+    assert unevenness(record_of(y, np.nan), [y[:, None]], DRAWS).tolist() == [1.0]

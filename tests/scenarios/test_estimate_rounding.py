@@ -6,7 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.filters.sensor_noise import SensorNoise
+from estimator.rounding import step_of
 from scenarios.estimating.rounding import least_std, rounded_noise, with_rounding
+from scenarios.estimating.sensors import _rough
 
 DT, N = 0.01, 4000
 
@@ -58,3 +60,12 @@ def test_the_slower_an_output_moves_the_longer_its_error_lasts():
 def test_the_size_of_noise_is_seen_where_the_output_moves(own):
     y = measured(100 * np.sin(0.01 * np.arange(N)), own, np.random.default_rng(4))
     assert rounded_noise(y) == pytest.approx(noise(own).std, rel=0.1)
+
+
+def test_noise_of_a_channel_that_rests_between_uneven_steps_is_seen():
+    """Its third differences are mostly zero, so that their median says nothing."""
+    course = 2e-3 * np.random.default_rng(5).standard_normal(N)
+    step = np.where(np.arange(N) < N // 2, 0.01, 0.0137)
+    y = np.where(np.arange(N) < N // 2, 0.0, 5.0) + step * np.round(course / step)
+    assert step_of([y]) == 0.0
+    assert _rough(y) > 1e-3

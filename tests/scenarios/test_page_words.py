@@ -10,9 +10,11 @@ from matplotlib import pyplot
 from estimator.closeloop.evidence import Check, Name
 from estimator.record import Conversion
 from scenarios.closing.figures.channels import draw_residual
+from scenarios.closing.page.case import Case
 from scenarios.closing.page.checks import MEANINGS, decided
 from scenarios.closing.page.glossary import glossary
 from scenarios.closing.page.sections import remark_words
+from scenarios.closing.page.wording import story
 from tests.helpers.experiment_files import variable
 
 
@@ -72,3 +74,15 @@ def test_a_single_sample_does_not_squeeze_a_residual(spike):
     said = [text.get_text() for text in ax.texts]
     assert said == ([f"single samples reach {spike:.2g}"] if spike else [])
     pyplot.close(figure)
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_no_discrepancy_is_told_apart_from_effects_that_were_fitted_in_vain(fitted: bool) -> None:
+    found = SimpleNamespace(singles=[object()] * fitted, pairs=[], detection=SimpleNamespace(detected=True))
+    result = SimpleNamespace(verdict="no_discrepancy", reason="no effect accounts for the residual")
+    told = story(Case(SimpleNamespace(), found, result, SimpleNamespace()))
+    said = f"{told.headline} {told.lead} {told.law}"
+    assert ("Effects were fitted" in said) is fitted
+    assert ("No effect accounts for the residual." in said) is fitted
+    assert ("No effect was fitted" in said) is not fitted
+    assert ("too small to matter" in said) is not fitted

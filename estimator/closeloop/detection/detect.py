@@ -45,7 +45,7 @@ class Detection:
     whole: Hypothesis | None = None
 
     def tested(self, baseline: Baseline) -> Baseline:
-        """The baseline whose residual was tested; it is another calibration if that of a baseline was not."""
+        """The baseline with the calibration whose residual was tested: its own or the whole record's."""
         return replace(baseline, hypothesis=self.whole) if self.whole else baseline
 
     @property

@@ -21,7 +21,7 @@ def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence
     record, chance = problem.record, problem.policy.detection.chance
     more = caused(problem, theta, residuals) if larger(record, residuals, chance) else []
     found = Noise.of(record, residuals, chance, more, left)
-    return replace(found, uneven=unevenness(record, residuals))
+    return replace(found, uneven=unevenness(record, residuals, problem.policy.detection.roundings))
 
 
 def caused(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> list[Array]:

@@ -46,6 +46,12 @@ class DetectionPolicy:
         "allowance for chance: how far the mean square of pure noise may exceed its expectation",
         "derivation: 1 in 700 by the normal distribution",
     )
+    roundings: int = limit(
+        20,
+        "draws",
+        "draws of the noise of a sensor that rounds, from which the scatter of its mean square is estimated",
+        "derivation: the scatter of twenty draws has an error of a sixth, its square one of a third",
+    )
     lags: int = limit(
         20,
         "samples",

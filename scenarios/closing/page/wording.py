@@ -182,6 +182,15 @@ def _unexplained(case: Case) -> Story:
 
 
 def _no_discrepancy(case: Case) -> Story:
+    if case.found.singles or case.found.pairs:
+        reason = case.result.reason
+        return Story(
+            f"{reason[0].upper()}{reason[1:]}.",
+            "With the parameters calibrated within their bounds, the simulation leaves a residual. Effects "
+            "were fitted to it, but it is more probable that there is none than that there is one. Nothing "
+            "was added to the model.",
+            "No law was found. Section 6 lists the effects that were tried and why each was rejected.",
+        )
     small = "the residual is larger than noise, but too small to matter"
     left = small if case.found.detection.detected else "the residual is no larger than noise explains"
     return Story(
