@@ -40,6 +40,12 @@ class Simulate(Protocol):
     def __call__(self, more: More, like: More) -> Outputs: ...
 
 
+class Replay(Protocol):
+    """As Simulate without effects, with the inputs as they are recorded; no range of the model is checked."""
+
+    def __call__(self, recorded: Outputs, like: More) -> Outputs: ...
+
+
 @dataclass(frozen=True)
 class Bench:
     """The conditions of a run: inputs, noise, true parameters, and functions to simulate and declare it.
@@ -52,6 +58,7 @@ class Bench:
     noise: Mapping[str, float]
     true: Mapping[str, float]
     simulate: Simulate
+    replay: Replay
     strength: Callable[[str], tuple[float, float]]
     toml: Callable[[str, More], str]
 
@@ -97,12 +104,18 @@ def rig_bench(rng: np.random.Generator, conditions: Collection[str], lowest_mu0:
             raise ValueError("more: the wheel locks or spins")
         return {"omega_w": omega_w, "omega_r": omega_r}
 
+    def replay(recorded: Outputs, like: More) -> Outputs:
+        return dict(
+            zip(rig.OUTPUTS, rig.simulate(Inputs(t, **recorded), p, rig.Effects(), start(like)), strict=True)
+        )
+
     return Bench(
         t,
         {"T_P": T_P, "f_sync": inputs.f_sync},
         dict.fromkeys(rig.OUTPUTS, round(noise, 5)),
         true,
         simulate,
+        replay,
         lambda place: (0.0, 0.0),
         lambda name, more: rig.experiment_toml(
             name, DURATION, rig.Rig(), bounds, start(more), round(noise, 5)
@@ -125,7 +138,17 @@ def vehicle_bench(rng: np.random.Generator, conditions: Collection[str]) -> Benc
         if more.kinks:
             kinked = run_over(vehicle.with_kinks(rails, more.kinks), fine, V, p.a1 + p.a2)
             under = Track(fine, kinked.u, kinked.u_dot)
-        motion = vehicle.simulate(vehicle.passed(under, effects), p, effects, fine[rows])
+        return seen(vehicle.passed(under, effects), effects)
+
+    def replay(recorded: Outputs, like: More) -> Outputs:
+        u, u_dot = (track.u.copy(), track.u_dot.copy())
+        for i, c in enumerate(vehicle.CORNERS):
+            u[:, i] += np.interp(fine, fine[rows], recorded[f"u_{c}"] - u[rows, i])
+            u_dot[:, i] += np.interp(fine, fine[rows], recorded[f"u_{c}_dot"] - u_dot[rows, i])
+        return seen(Track(fine, u, u_dot), vehicle.Effects())
+
+    def seen(under: Track, effects: vehicle.Effects) -> Outputs:
+        motion = vehicle.simulate(under, p, effects, fine[rows])
         return {name: motion.output(name) for name in noise}
 
     def strength(place: str) -> tuple[float, float]:
@@ -139,6 +162,7 @@ def vehicle_bench(rng: np.random.Generator, conditions: Collection[str]) -> Benc
         noise,
         true,
         simulate,
+        replay,
         strength,
         lambda name, more: vehicle.experiment_toml(
             name, DURATION, vehicle.Vehicle(), vehicle.UNCERTAIN, noise
@@ -160,6 +184,17 @@ def wheelset_bench(rng: np.random.Generator, conditions: Collection[str]) -> Ben
         states = wheelset.simulate(arrived, p, effects, form)
         if np.abs(states[:, 0] - arrived.y_irr[::2]).max() > FLANGE:
             raise ValueError("more: a flange touches")
+        return seen(states)
+
+    def replay(recorded: Outputs, like: More) -> Outputs:
+        times = np.linspace(t[0], t[-1], len(run.y_irr))
+        y, y_dot = (
+            exact + np.interp(times, t, recorded[name] - exact[::2])
+            for name, exact in (("y_irr", run.y_irr), ("y_irr_dot", run.y_irr_dot))
+        )
+        return seen(wheelset.simulate(replace(run, y_irr=y, y_irr_dot=y_dot), p, wheelset.Effects(), form))
+
+    def seen(states: Array) -> Outputs:
         return {name: states[:, wheelset.COORDINATES.index(name)] for name in noise}
 
     def strength(place: str) -> tuple[float, float]:
@@ -173,6 +208,7 @@ def wheelset_bench(rng: np.random.Generator, conditions: Collection[str]) -> Ben
         noise,
         true,
         simulate,
+        replay,
         strength,
         lambda name, more: wheelset.experiment_toml(
             name, DURATION, run.V, wheelset.Wheelset(), wheelset.UNCERTAIN, noise

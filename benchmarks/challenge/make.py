@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -79,13 +79,18 @@ def tried(plan: Plan, rng: np.random.Generator) -> tuple[Truth, str, Outputs]:
     raw = [(e, location, e.sizes(rng)) for e, location in plan.entries]
     here = bench(plan.system, rng, plan.conditions, _lowest_mu0([(p, s) for _, p, s in raw]))
     items = tuple(Item(e.kind, p, settled(e.kind, p, sizes, here)) for e, p, sizes in raw)
-    truth, with_it = measure(plan, items, here)
-    if plan.group == "sensor" and truth.largest_snr < FAINT:
-        raise ValueError(f"the fault is {truth.largest_snr:.2f} times the noise")
-    measuring, text = WAYS[plan.way](rng), here.toml(plan.name, effect_of(items, here))
-    seen = measuring.outputs(here.t, with_it, here.noise)
-    columns = {"time": here.t, **measuring.inputs(here.t, here.inputs), **seen}
-    return truth, measuring.said(text), columns
+    runs = Runs.of(items, here)
+    early, whole = (max(ratios(here, runs.with_it, runs.sound, part).values()) for part in (IDENTIFY, 1.0))
+    if early < LATE * whole:
+        raise ValueError(f"{early:.2f} times the noise in the part to identify, {whole:.2f} in all")
+    if plan.group == "sensor" and whole < FAINT:
+        raise ValueError(f"the fault is {whole:.2f} times the noise")
+    measuring, text = WAYS[plan.way](rng), here.toml(plan.name, runs.like)
+    seen = measuring.outputs(here.t, runs.with_it, here.noise)
+    inputs = measuring.inputs(here.t, here.inputs)
+    noise = noise_left(here, runs, inputs) if items else here.noise
+    truth = told(plan, items, here, runs, replace(here, noise=noise))
+    return truth, measuring.said(text), {"time": here.t, **inputs, **seen}
 
 
 def _lowest_mu0(sizes: list[tuple[str, dict[str, Any]]]) -> float:
@@ -160,49 +165,71 @@ def ratios(here: Bench, with_it: Outputs, without: Outputs, part: float = 1.0) -
     }
 
 
-def measure(plan: Plan, items: tuple[Item, ...], here: Bench) -> tuple[Truth, Outputs]:
-    """The truth with its signal-to-noise ratios, and the outputs without noise."""
-    more = effect_of(items, here)
-    clean = here.simulate(more, more)
-    with_it = shown(here, clean, items)
-    sound = clean if more == NO_MORE else here.simulate(NO_MORE, more)
-    early, whole = (max(ratios(here, with_it, sound, part).values()) for part in (IDENTIFY, 1.0))
-    if early < LATE * whole:
-        raise ValueError(f"{early:.2f} times the noise in the part to identify, {whole:.2f} in all")
-    alone, each = [with_it], []
-    if len(items) > 1:
-        alone = [shown(here, here.simulate(effect_of((i,), here), more), (i,)) for i in items]
-        each = [max(ratios(here, y, sound).values()) for y in alone]
-    truth = Truth(
+@dataclass(frozen=True)
+class Runs:
+    """Outputs without noise: as measured with all effects, without any, and with each one alone.
+
+    like: all effects, from whose start state each run begins.
+    """
+
+    like: More
+    with_it: Outputs
+    sound: Outputs
+    alone: Sequence[Outputs]
+
+    @classmethod
+    def of(cls, items: tuple[Item, ...], here: Bench) -> Runs:
+        """The runs of these effects."""
+        like = effect_of(items, here)
+        clean = here.simulate(like, like)
+        with_it = shown(here, clean, items)
+        sound = clean if like == NO_MORE else here.simulate(NO_MORE, like)
+        alone = [with_it]
+        if len(items) > 1:
+            alone = [shown(here, here.simulate(effect_of((i,), here), like), (i,)) for i in items]
+        return cls(like, with_it, sound, alone)
+
+
+def noise_left(here: Bench, runs: Runs, inputs: Outputs) -> Mapping[str, float]:
+    """Noise by output of what a right model leaves: the sensor's, and what noise of recorded inputs does."""
+    if all(inputs[n] is u for n, u in here.inputs.items()):
+        return here.noise
+    driven = ratios(here, here.replay(inputs, runs.like), runs.sound)
+    return {o: noise * float(np.hypot(1.0, driven[o])) for o, noise in here.noise.items()}
+
+
+def told(plan: Plan, items: tuple[Item, ...], here: Bench, runs: Runs, seen: Bench) -> Truth:
+    """The truth with its signal-to-noise ratios; seen: the bench with the noise that these count."""
+    return Truth(
         plan.name,
         plan.group,
         plan.system,
         items,
         here.true,
         here.noise,
-        ratios(here, with_it, sound) if items else {},
+        ratios(seen, runs.with_it, runs.sound) if items else {},
         tuple(pair for e, _ in plan.entries for pair in e.near),
         plan.quiet,
         plan.note,
-        tuple(each),
-        left_over(here, alone, sound, more) if plan.group in LEFT else (),
+        tuple(max(ratios(seen, y, runs.sound).values()) for y in runs.alone) if len(items) > 1 else (),
+        left_over(seen, runs) if plan.group in LEFT else (),
         plan.way,
     )
-    return truth, with_it
 
 
-def left_over(here: Bench, alone: Sequence[Outputs], sound: Outputs, like: More) -> tuple[float, ...]:
+def left_over(here: Bench, runs: Runs) -> tuple[float, ...]:
     """For each effect the largest ratio of an output of what is left after calibration, to first order.
 
-    alone: outputs with each effect; sound: without any. The calibration changes the calibrated parameters by
-    whatever makes the sum of squares least, and other effects too have the size that does.
+    The calibration changes the calibrated parameters by whatever makes the sum of squares least, and other
+    effects too have the size that does.
     """
 
     def change(y: Outputs) -> Array:
-        return np.concatenate([(y[o] - sound[o]) / noise for o, noise in here.noise.items()])
+        return np.concatenate([(y[o] - runs.sound[o]) / noise for o, noise in here.noise.items()])
 
     moved = [made("parameter_offset", n, delta=SMALL * value) for n, value in here.true.items()]
-    calibrated, changes = [change(here.simulate(m, like)) for m in moved], [change(y) for y in alone]
+    calibrated = [change(here.simulate(m, runs.like)) for m in moved]
+    changes = [change(y) for y in runs.alone]
     found = []
     for i, own in enumerate(changes):
         free = np.column_stack([*calibrated, *changes[:i], *changes[i + 1 :]])

@@ -40,9 +40,10 @@ class Item:
 class Truth:
     """The truth of one record.
 
-    items: its effects, possibly none; snr: rms change of each output by the effects over its noise; near:
-    kind and location of effects that are nearly equivalent, if the true one is not in the library; quiet:
-    whether no_discrepancy is a right answer because the data cannot show the effect.
+    items: its effects, possibly none; noise: of the sensors; snr: rms change of each output by the effects
+    over the noise there, of the sensor and of what noise of the recorded inputs does to it; near: kind and
+    location of effects that are nearly equivalent, if the true one is not in the library; quiet: whether
+    no_discrepancy is a right answer because the data cannot show the effect.
     """
 
     name: str

@@ -11,7 +11,8 @@ from benchmarks.challenge.draw import Plan, plans
 from benchmarks.challenge.make import make
 from benchmarks.challenge.match import Answer
 from benchmarks.challenge.measuring import EACH, WAYS, Measuring
-from benchmarks.challenge.truth import SHARES, Item, Truth
+from benchmarks.challenge.menu import MENU
+from benchmarks.challenge.truth import SHARES, SYSTEMS, Item, Truth
 from benchmarks.challenge.ways import rows
 
 T = np.arange(12001) * 0.005
@@ -95,6 +96,27 @@ def test_a_record_differs_between_ways_by_its_measurement_alone(tmp_path):
     for name in set(WAYS) - {"inputs"}:
         assert_array_equal(data[name]["T_P"], data[Measuring.name]["T_P"])
     assert np.any(data["inputs"]["T_P"] != data[Measuring.name]["T_P"])
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_noise_of_the_inputs_counts_where_an_effect_is_compared_with_noise(system, tmp_path):
+    entry, at = next((e, e.locations[0]) for e in MENU[system] if e.kind == "parameter_offset")
+    here, there = (
+        make(
+            Plan(5, "single", system, ((entry, at),), way=name),
+            3,
+            tmp_path / name,
+            tmp_path / f"{name}-truth",
+        )
+        for name in ("white", "inputs")
+    )
+    assert here.noise == there.noise
+    assert here.items == there.items
+    table = np.genfromtxt(tmp_path / "inputs" / here.name / "data.csv", delimiter=",", names=True)
+    exact = np.genfromtxt(tmp_path / "white" / here.name / "data.csv", delimiter=",", names=True)
+    assert any(np.any(table[n] != exact[n]) for n in table.dtype.names)
+    assert all(0 < there.snr[o] < here.snr[o] for o in here.snr)
+    assert 0 < there.left[0] < here.left[0]
 
 
 def test_a_set_in_each_way_has_the_same_records_and_every_way_as_often():
