@@ -99,7 +99,8 @@ def test_a_record_differs_between_ways_by_its_measurement_alone(tmp_path):
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
-def test_noise_of_the_inputs_counts_where_an_effect_is_compared_with_noise(system, tmp_path):
+def test_noise_of_the_inputs_counts_where_an_effect_is_compared_with_noise(system, tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.challenge.bench.DURATION", 4.0)
     entry, at = next((e, e.locations[0]) for e in MENU[system] if e.kind == "parameter_offset")
     here, there = (
         make(
