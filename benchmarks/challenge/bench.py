@@ -76,6 +76,16 @@ def noisy(usual: Mapping[str, float], rng: np.random.Generator) -> dict[str, flo
     return {name: float(f"{value * rng.uniform(0.8, 1.25):.3g}") for name, value in usual.items()}
 
 
+def as_recorded(exact: Array, samples: Array) -> Array:
+    """An input (k (n - 1) + 1,) at even times with the noise of its samples (n,), k intervals apart.
+
+    Between the samples the noise is linear.
+    """
+    finer = (len(exact) - 1) // (len(samples) - 1)
+    noise = samples - exact[::finer]
+    return exact + np.interp(np.arange(len(exact)) / finer, np.arange(len(samples)), noise)
+
+
 def rig_bench(rng: np.random.Generator, conditions: Collection[str], lowest_mu0: float = 0.0) -> Bench:
     """The test rig; conditions: "plain" (r_w may be off too, or one speed), "one speed", "low torque".
 
@@ -105,9 +115,8 @@ def rig_bench(rng: np.random.Generator, conditions: Collection[str], lowest_mu0:
         return {"omega_w": omega_w, "omega_r": omega_r}
 
     def replay(recorded: Outputs, like: More) -> Outputs:
-        return dict(
-            zip(rig.OUTPUTS, rig.simulate(Inputs(t, **recorded), p, rig.Effects(), start(like)), strict=True)
-        )
+        found = rig.simulate(Inputs(t, **recorded), p, rig.Effects(), start(like))
+        return dict(zip(rig.OUTPUTS, found, strict=True))
 
     return Bench(
         t,
@@ -141,10 +150,10 @@ def vehicle_bench(rng: np.random.Generator, conditions: Collection[str]) -> Benc
         return seen(vehicle.passed(under, effects), effects)
 
     def replay(recorded: Outputs, like: More) -> Outputs:
-        u, u_dot = (track.u.copy(), track.u_dot.copy())
+        u, u_dot = track.u.copy(), track.u_dot.copy()
         for i, c in enumerate(vehicle.CORNERS):
-            u[:, i] += np.interp(fine, fine[rows], recorded[f"u_{c}"] - u[rows, i])
-            u_dot[:, i] += np.interp(fine, fine[rows], recorded[f"u_{c}_dot"] - u_dot[rows, i])
+            u[:, i] = as_recorded(u[:, i], recorded[f"u_{c}"])
+            u_dot[:, i] = as_recorded(u_dot[:, i], recorded[f"u_{c}_dot"])
         return seen(Track(fine, u, u_dot), vehicle.Effects())
 
     def seen(under: Track, effects: vehicle.Effects) -> Outputs:
@@ -187,10 +196,9 @@ def wheelset_bench(rng: np.random.Generator, conditions: Collection[str]) -> Ben
         return seen(states)
 
     def replay(recorded: Outputs, like: More) -> Outputs:
-        times = np.linspace(t[0], t[-1], len(run.y_irr))
         y, y_dot = (
-            exact + np.interp(times, t, recorded[name] - exact[::2])
-            for name, exact in (("y_irr", run.y_irr), ("y_irr_dot", run.y_irr_dot))
+            as_recorded(run.y_irr, recorded["y_irr"]),
+            as_recorded(run.y_irr_dot, recorded["y_irr_dot"]),
         )
         return seen(wheelset.simulate(replace(run, y_irr=y, y_irr_dot=y_dot), p, wheelset.Effects(), form))
 
