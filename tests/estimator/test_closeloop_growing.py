@@ -51,7 +51,7 @@ def test_an_effect_that_acts_from_the_start_is_seen_before_another_sets_in(scree
 
 def test_the_second_effect_is_found_where_the_first_ceases_to_explain(screened):
     fitter = Fitter(screened.baseline)
-    alive = [h for h, _ in begun(fitter, [], screened.early)]
+    alive = begun(fitter, [], screened.early)
     assert alive[0].label == "coulomb_friction@carriage"
     [best, *_] = followed(fitter, alive, screened.candidates)
     assert best.label == "coulomb_friction@carriage + step_force@carriage"
@@ -63,5 +63,5 @@ def test_the_second_effect_is_found_where_the_first_ceases_to_explain(screened):
 
 def test_the_leading_ones_of_each_list_are_fitted_to_the_first_parts(screened):
     fitter = Fitter(screened.baseline)
-    found = [h.label for h, _ in begun(fitter, [], screened.whole[:1], screened.early)]
+    found = [h.label for h in begun(fitter, [], screened.whole[:1], screened.early)]
     assert {"step_force@carriage", "coulomb_friction@carriage"} <= set(found)

@@ -269,7 +269,7 @@ def test_a_partner_is_sought_in_the_shape_that_what_the_first_effect_leaves_sugg
 class Swinging(OneByOne):
     """A force that sets in on an oscillator; the sum of squares over its moment has a minimum a swing."""
 
-    policy = DEFAULT
+    policy, fmu = DEFAULT, Path("swinging.fmu")
 
     def __init__(self, moment: float) -> None:
         t = np.linspace(0.0, 20.0, 4000)
@@ -301,7 +301,6 @@ def test_a_moment_some_swings_off_is_found(moment, off):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(dating, "built", lambda problem, _: problem)
         patch.setattr(fitter, "built", lambda problem, _: problem)
-        patch.setattr(fitter, "together", lambda problem, promises: [problem] * len(promises))
         [best] = dating.dated(Fitter(baseline(asked, noise=size)), [h])
     assert best.theta["step_t0"] == pytest.approx(moment, abs=0.01)
     assert cost(best) <= cost(h)

@@ -12,13 +12,16 @@ from fmus.drive.model import Drive
 from fmus.effects import EFFECTS, offers, parse_effect
 from fmus.errors import BadInput
 from fmus.export.around.outside import Outside
+from fmus.export.builders import hypotheses
 from fmus.export.builders.hypotheses import ForeignBuilder, ModelBuilder
+from fmus.export.builders.native.working import build_working
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.container.coupled import build_coupled
 from fmus.host.archive import describe
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 from fmus.host.grading.check import grade
+from fmus.models import MODELS
 from tests.helpers.everything import EVERY_EFFECT, FALLBACK
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
@@ -217,6 +220,29 @@ def test_a_models_builder_offers_what_makes_sense_in_it(tmp_path):
     assert ("periodic_force", "wheel") in found
     assert ("bump_stop", "wheel") not in found
     assert not {at for _, at in found} & {"pole_pairs", "T_w_ext"}
+
+
+def test_effects_that_share_an_fmu_do_not_change_each_others_numbers(tmp_path):
+    builder = ModelBuilder("drive", tmp_path / "shared")
+    for kind, at in builder.offers:
+        shared, start = builder(((kind, at),)), started(f"{kind}@{at}")
+        alone = build_working(Drive([(EFFECTS[kind], at)], probes=True), tmp_path / "alone.fmu", in_rows=True)
+        assert_array_equal(run(shared, start), run(alone, start))
+
+
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_who_shares_an_fmu_does_not_depend_on_what_is_asked(model, tmp_path):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hypotheses, "_once", lambda folder, effects, *_: effects)
+        builder = ModelBuilder(model, tmp_path)
+        built = {e: builder((e,)) for e in builder.offers}
+        a, b = builder.offers[0], builder.offers[-1]
+        assert builder((a, b)) == builder((b, a)) == tuple(sorted({*built[a], *built[b]}))
+        assert builder(()) == ()
+    for e, sharing in built.items():
+        assert e in sharing
+        assert all(built[other] == sharing for other in sharing)
+        assert len(sharing) == 1 or not any(EFFECTS[kind].states("translation") for kind, _ in sharing)
 
 
 def test_what_a_foreign_fmu_lacks_is_named(drive):

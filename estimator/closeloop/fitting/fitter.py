@@ -19,13 +19,11 @@ from estimator.closeloop.hypotheses.promise import Promise, built
 from estimator.closeloop.question.problem import Problem, Unknown, simulate_ahead
 from estimator.record import Array
 from estimator.weighting import Weighting
-from fmus.effects import EFFECTS
 from fmus.host.fmu import FmuError
 
 BRIEF, LONG = 4, 20  # evaluations of a brief fit, which only ranks, and of a full fit
 GAINS = 0.98  # ratio of the sums of squares after and before a round, above which no other round follows
 FURTHER_ROUNDS, LAST = 4, 2  # rounds of further LONG fits, and leading hypotheses that they continue
-ABOARD = 6  # effects that are built into one FMU
 
 Columns = Mapping[str, Array]  # derivatives (m,) of the weighted residual, by the name of the unknown
 
@@ -124,10 +122,9 @@ class Fitter:
         """
         problem, weighting = self.baseline.problem, self.baseline.noise.weighting
         others = self.baseline.hypothesis.fit.unknowns if unknowns is None else unknowns
-        pairs = list(zip(together(problem, promises), promises, strict=True))
         tasks = (
-            delayed(_hypotheses)(some, others, weighting, evaluations, known, guess, step)
-            for some in ([pairs] if self.jobs == 1 else ([pair] for pair in pairs))
+            delayed(_hypotheses)(problem, some, others, weighting, evaluations, known, guess, step)
+            for some in ([promises] if self.jobs == 1 else ([p] for p in promises))
         )
         found = [h for some in Parallel(n_jobs=self.jobs)(tasks) for h in some if h is not None]
         # processes return copies of the derivatives that were known
@@ -149,12 +146,13 @@ def hypothesis(
     known, guess, step: see `fit`. Returns None if the FMU cannot be simulated with the fitted values or its
     simulation diverges.
     """
-    [found] = _hypotheses([(problem, promise)], unknowns, weighting, evaluations, known, guess, step)
+    [found] = _hypotheses(problem, [promise], unknowns, weighting, evaluations, known, guess, step)
     return found
 
 
 def _hypotheses(
-    asked: Sequence[tuple[Problem, Promise]],
+    problem: Problem,
+    promises: Sequence[Promise],
     unknowns: Sequence[Unknown],
     weighting: Weighting,
     evaluations: int,
@@ -162,28 +160,28 @@ def _hypotheses(
     guess: Columns | None,
     step: float,
 ) -> list[Hypothesis | None]:
-    """As `hypothesis` for each of several promises and its problem.
+    """As `hypothesis` for each of several promises.
 
     Those that share an FMU come one after the other, for each FMU is opened once then. Their fitted values
     are simulated at once, over the whole record.
     """
-    where = [built(problem, p.candidates) for problem, p in asked]
+    where = [built(problem, p.candidates) for p in promises]
     sharing = defaultdict(list)
     for i, here in enumerate(where):
-        sharing[here.effects].append(i)
+        sharing[here.fmu].append(i)
     made: dict[int, Hypothesis | None] = {}
     for same in sharing.values():
         at_once = where[same[0]].at_once
         for some in (same[i : i + at_once] for i in range(0, len(same), at_once)):
             fits = {}
             for i in some:
-                problem, p = asked[i]
+                p = promises[i]
                 own = [u for c in p.candidates for u in c.unknowns]
                 every = [*_doubting(problem, p.candidates, unknowns), *own]
                 fits[i] = fit(where[i], every, weighting, p.start, None, evaluations, known, guess, step=step)
             simulate_ahead([(where[i], fits[i].theta) for i in some])
-            made |= {i: _shown(where[i], asked[i][1], fits[i], weighting) for i in some}
-    return [made[i] for i in range(len(asked))]
+            made |= {i: _shown(where[i], promises[i], fits[i], weighting) for i in some}
+    return [made[i] for i in range(len(promises))]
 
 
 def _shown(here: Problem, promise: Promise, found: Fit, weighting: Weighting) -> Hypothesis | None:
@@ -206,24 +204,6 @@ def _doubting(
         replace(u, low=-np.inf, high=np.inf) if u.name in doubted and u.name in problem.free_states else u
         for u in unknowns
     ]
-
-
-def together(problem: Problem, promises: Sequence[Promise]) -> list[Problem]:
-    """For each promise a problem with an FMU that holds its effects and those of some other promises.
-
-    Effects share an FMU because building one may take longer than fitting with it. Effects with states of
-    their own get separate FMUs, because they would slow down the simulation.
-    """
-    labels = sorted({(c.kind, c.location) for p in promises for c in p.candidates if not c.is_fault})
-    light = [(kind, at) for kind, at in labels if not EFFECTS[kind].states("translation")]
-    size = ABOARD if problem.builder.quick else 1
-    groups = [light[i : i + size] for i in range(0, len(light), size)]
-    found = []
-    for p in promises:
-        own = {(c.kind, c.location) for c in p.candidates}
-        group = next((g for g in groups if own <= set(g)), [])
-        found.append(problem.with_effects(sorted({*problem.effects, *group})))
-    return found
 
 
 def _without_effect(h: Hypothesis, base: Fit) -> Promise:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from joblib import Parallel, delayed
 
 from estimator.closeloop.fitting.fit import NEAR_NOISE, fit
-from estimator.closeloop.fitting.fitter import Fitter, from_there, hypothesis, together
+from estimator.closeloop.fitting.fitter import Fitter, from_there, hypothesis
 from estimator.closeloop.fitting.slopes import FINE_STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -47,42 +47,35 @@ def at_the_beginning(
     return screen(screening.fit, [((c,), g) for c, g in zip(candidates, changes, strict=True)])
 
 
-def begun(
-    fitter: Fitter, found: Sequence[Hypothesis], *promises: Sequence[Promise]
-) -> list[tuple[Hypothesis, Problem]]:
+def begun(fitter: Fitter, found: Sequence[Hypothesis], *promises: Sequence[Promise]) -> list[Hypothesis]:
     """The leading hypotheses, and those of each list of promises, fitted to the first parts of the record.
 
-    Each is given with the problem whose FMU holds its effect, the best one there first.
+    The best one there comes first.
     """
-    limits, problem = fitter.baseline.policy.search, fitter.baseline.problem
-    weighting = fitter.baseline.noise.weighting
+    limits, weighting = fitter.baseline.policy.search, fitter.baseline.noise.weighting
     named = [[h.label for h in found if not h.candidates[0].is_fault]]
     named += [[p.label for p in some] for some in promises]
     leading = dict.fromkeys(x for labels in named for x in list(dict.fromkeys(labels))[: limits.grown])
-    others, declared = _others(fitter)
-    states = {n: v for n, v in declared.items() if n in problem.free_states}
-    started = replace(problem, declared={**problem.declared, **states})
+    problem, others, declared = _started(fitter)
     starts = [
         replace(p, start={**p.start, **declared})
         for label in leading
         for p in _shapes([p for some in promises for p in some if p.label == label])
     ]
-    tried = list(zip(together(started, starts), starts, strict=True))
-    first = Parallel(n_jobs=fitter.jobs)(delayed(_begun)(here, others, p, weighting) for here, p in tried)
-    alive = [(h, here) for h, (here, _) in zip(first, tried, strict=True) if h is not None]
-    return sorted(alive, key=lambda pair: mean_square(pair[0]))
+    tasks = (delayed(_begun)(problem, others, p, weighting) for p in starts)
+    return sorted((h for h in Parallel(n_jobs=fitter.jobs)(tasks) if h is not None), key=mean_square)
 
 
 def from_the_beginning(
-    fitter: Fitter, found: Sequence[Hypothesis], alive: Sequence[tuple[Hypothesis, Problem]]
+    fitter: Fitter, found: Sequence[Hypothesis], alive: Sequence[Hypothesis]
 ) -> list[Hypothesis]:
     """All hypotheses, best first on the part to identify, with those of `begun` that are better there."""
     limits, weighting = fitter.baseline.policy.search, fitter.baseline.noise.weighting
-    others, _ = _others(fitter)
+    problem, others, _ = _started(fitter)
     tasks = (
-        delayed(_grown)(here, others, Promise(h.candidates, 0.0, h.fit.theta), weighting, THEN)
-        for h, here in alive[: limits.grown_survivors]
-        if mean_square(h) < limits.grown_rival * mean_square(alive[0][0])
+        delayed(_grown)(problem, others, Promise(h.candidates, 0.0, h.fit.theta), weighting, THEN)
+        for h in alive[: limits.grown_survivors]
+        if mean_square(h) < limits.grown_rival * mean_square(alive[0])
     )
     grown = best_by_label(h for h in Parallel(n_jobs=fitter.jobs)(tasks) if h is not None)
     again = fitter.finished(from_there(grown[: limits.grown]))
@@ -95,10 +88,13 @@ def from_the_beginning(
     return best_by_label([*best, *fitter.finished(from_there(rugged), step=FINE_STEP)])
 
 
-def _others(fitter: Fitter) -> tuple[list[Unknown], dict[str, float]]:
-    """The unknowns of the calibrated FMU without its start states, and the declared values of all."""
-    unknowns, states = fitter.baseline.hypothesis.fit.unknowns, fitter.baseline.problem.free_states
-    return [u for u in unknowns if u.name not in states], {u.name: u.start for u in unknowns}
+def _started(fitter: Fitter) -> tuple[Problem, list[Unknown], dict[str, float]]:
+    """The problem with start states as they are measured, the other unknowns, and start values of all."""
+    problem, unknowns = fitter.baseline.problem, fitter.baseline.hypothesis.fit.unknowns
+    starts = {u.name: u.start for u in unknowns}
+    states = {n: v for n, v in starts.items() if n in problem.free_states}
+    others = [u for u in unknowns if u.name not in states]
+    return replace(problem, declared={**problem.declared, **states}), others, starts
 
 
 def _shapes(promises: Sequence[Promise]) -> Sequence[Promise]:

@@ -173,7 +173,7 @@ class Search:
         early = at_the_beginning(s.baseline, physical, s.screening.forces)
         alive = begun(fitter, found, sudden, early)
         second = [c for c, _ in self._in_pairs if not c.is_fault]
-        pairs = followed(fitter, [h for h, _ in alive], second)
+        pairs = followed(fitter, alive, second)
         return list(found) if s.explained(pairs) else from_the_beginning(fitter, found, alive), pairs
 
     def _from_declared(self, found: list[Hypothesis]) -> list[Hypothesis]:
