@@ -8,13 +8,15 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cholesky, solve_toeplitz, solve_triangular, toeplitz
-from scipy.signal import freqz, lfilter, lfiltic
+from scipy.linalg import solve_toeplitz, solve_triangular
+from scipy.signal import freqz
 
 from estimator.record import Array
 
 ORDERS = (1, 2, 3, 5, 8, 12, 18, 27, 40, 60)  # of the autoregressions that are tried
-ONE: Array = np.ones(1)
+AT_ONCE = (
+    64  # samples of all outputs that are predicted at once, at least: products of small matrices take longer
+)
 FREQUENCIES = 4096  # at which the spectrum of an autoregression is evaluated
 
 
@@ -70,11 +72,11 @@ class Weighting:
 
     @cached_property
     def _alone(self) -> list[_Predictor]:
-        return [_Predictor(c) for c in self.correlation]
+        return [_Predictor(c[:, None, None]) for c in self.correlation]
 
     @cached_property
-    def _predictor(self) -> _Predictors | _JointPredictor:
-        return _Predictors(self._alone) if self.joint is None else _JointPredictor(self.joint)
+    def _predictor(self) -> _Apart | _Predictor:
+        return _Apart(self._alone) if self.joint is None else _Predictor(self.joint)
 
 
 def _each(work: Callable[[Array], Array], x: Array, stretches: Sequence[int]) -> Array:
@@ -84,57 +86,22 @@ def _each(work: Callable[[Array], Array], x: Array, stretches: Sequence[int]) ->
 
 
 @dataclass(frozen=True)
-class _Predictors:
+class _Apart:
     """Predicts the samples of several outputs, each from its own alone."""
 
     alone: Sequence[_Predictor]
 
     def errors(self, z: Array) -> Array:
         """Prediction errors over their standard deviations, (N, n)."""
-        return np.column_stack([p.errors(column) for p, column in zip(self.alone, z.T, strict=True)])
+        return np.hstack([p.errors(z[:, i : i + 1]) for i, p in enumerate(self.alone)])
 
     def signal(self, errors: Array) -> Array:
         """The samples (N, n) of these prediction errors; the inverse of `errors`."""
-        return np.column_stack([p.signal(column) for p, column in zip(self.alone, errors.T, strict=True)])
+        return np.hstack([p.signal(errors[:, i : i + 1]) for i, p in enumerate(self.alone)])
 
 
 class _Predictor:
-    """Predicts a sample of unit variance from those before it; correlation: (p + 1,), see Weighting."""
-
-    def __init__(self, correlation: Array) -> None:
-        self._order = len(correlation) - 1
-        ahead = solve_toeplitz(correlation[:-1], correlation[1:]) if self._order else np.zeros(0)
-        self._filter: Array = np.append(1.0, -ahead)
-        self._variance = float(1.0 - ahead @ correlation[1:])
-        self._root = cholesky(toeplitz(correlation[:-1]), lower=True) if self._order else np.zeros((0, 0))
-
-    def errors(self, z: Array) -> Array:
-        """Prediction errors over their standard deviations, (N,)."""
-        n = min(self._order, len(z))
-        found: Array = np.convolve(z, self._filter)[: len(z)] / np.sqrt(self._variance)
-        if n:
-            found[:n] = solve_triangular(self._root[:n, :n], z[:n], lower=True)
-        return found
-
-    def signal(self, errors: Array) -> Array:
-        """The samples (N,) of these prediction errors; the inverse of `errors`."""
-        n = min(self._order, len(errors))
-        first = self._root[:n, :n] @ errors[:n]
-        if not n:
-            return errors
-        before: Array = lfiltic(ONE, self._filter, first[::-1]).astype(np.float64)
-        rest, _ = lfilter(ONE, self._filter, errors[n:] * np.sqrt(self._variance), zi=before)
-        return np.append(first, rest)
-
-    @property
-    def redundancy(self) -> float:
-        """Sum of the squared autocorrelations over all lags, by Parseval's theorem."""
-        spectrum = 1.0 / np.abs(freqz(self._filter, worN=FREQUENCIES)[1]) ** 2
-        return float(np.mean(spectrum**2) / np.mean(spectrum) ** 2)
-
-
-class _JointPredictor:
-    """Predicts the samples of several outputs from those before them; joint: (p + 1, n, n), see Weighting."""
+    """Predicts the samples of n outputs from those before them; joint: (p + 1, n, n), see Weighting."""
 
     def __init__(self, joint: Array) -> None:
         order, n = len(joint) - 1, joint.shape[1]
@@ -148,11 +115,34 @@ class _JointPredictor:
         )
         self._scale = np.asarray(np.linalg.cholesky((left + left.T) / 2), dtype=np.float64)
         self._joint = joint
+        self._at_once = max(order, AT_ONCE // n)
+
+    @cached_property
+    def _products(self) -> tuple[Array, Array]:
+        """What turns some samples, one after the other, into their errors, and what those before them add.
+
+        Both are (b n, b n) for b samples at once. Products of matrices are quicker than a sum over lags.
+        """
+        b, n = self._at_once, self._n
+        inverse = solve_triangular(self._scale, np.eye(n), lower=True)
+        by_lag = [inverse, *(-inverse @ self._ahead)]
+        found = np.zeros((b, n, 2 * b, n))  # from those before and these
+        for k, a in enumerate(by_lag):
+            for i in range(b):
+                found[i, :, b + i - k] = a
+        before, these = np.split(found.reshape(b * n, 2 * b * n), 2, axis=1)
+        return these, before
 
     @cached_property
     def _root(self) -> Array:
         """Root of the covariance of the first samples."""
         return np.asarray(np.linalg.cholesky(_blocks(self._joint, self._order)), dtype=np.float64)
+
+    @property
+    def redundancy(self) -> float:
+        """Sum of the squared autocorrelations of one output over all lags, by Parseval's theorem."""
+        spectrum = 1.0 / np.abs(freqz(np.append(1.0, -self._ahead[:, 0, 0]), worN=FREQUENCIES)[1]) ** 2
+        return float(np.mean(spectrum**2) / np.mean(spectrum) ** 2)
 
     @property
     def log_error(self) -> float:
@@ -161,27 +151,37 @@ class _JointPredictor:
 
     def errors(self, z: Array) -> Array:
         """Prediction errors (N, n) that are independent and of variance 1."""
-        m = min(self._order, len(z))
-        found = z.copy()
-        for k, a in enumerate(self._ahead[:m], 1):
-            found[k:] -= z[:-k] @ a.T
-        found = solve_triangular(self._scale, found.T, lower=True).T
+        m, (these, before) = min(self._order, len(z)), self._products
+        parts = _parts(z, self._at_once)
+        found = parts @ these.T
+        found[1:] += parts[:-1] @ before.T
+        found = found.reshape(-1, self._n)[: len(z)]
         if m:
             some = m * self._n
             first = solve_triangular(self._root[:some, :some], z[:m].ravel(), lower=True)
             found[:m] = first.reshape(m, self._n)
-        return np.asarray(found, order="C")
+        return found
 
     def signal(self, errors: Array) -> Array:
         """The samples (N, n) of these prediction errors; the inverse of `errors`."""
-        m = min(self._order, len(errors))
+        m, (these, before) = min(self._order, len(errors)), self._products
         some = m * self._n
-        found: Array = errors @ self._scale.T
-        found[:m] = (self._root[:some, :some] @ errors[:m].ravel()).reshape(m, self._n)
-        newest_first = np.concatenate(list(self._ahead), axis=1) if self._order else np.zeros((self._n, 0))
-        for t in range(m, len(found)):
-            found[t] += newest_first @ found[t - m : t][::-1].ravel()
-        return found
+        first = self._root[:some, :some] @ errors[:m].ravel() if m else np.zeros(0)
+        inverse = solve_triangular(these, np.eye(len(these)), lower=True)
+        last: Array = np.append(np.zeros(len(these) - some), first)
+        found = [first]
+        for part in _parts(errors[m:], self._at_once):
+            last = inverse @ (part - before @ last)
+            found.append(last)
+        return np.concatenate(found)[: errors.size].reshape(errors.shape)
+
+
+def _parts(x: Array, at_once: int) -> Array:
+    """The samples (N, n) with so many at once in a row (rows, at_once n), zero after the last one."""
+    rows = -(-len(x) // at_once)
+    found = np.zeros((rows, at_once * x.shape[1]))
+    found.ravel()[: x.size] = x.ravel()
+    return found
 
 
 def _blocks(joint: Array, order: int) -> Array:
@@ -205,7 +205,7 @@ def joint_of(draws: Sequence[Array], white: Array) -> Array:
     n = c.shape[1]
     price = n * n * np.log(samples) / samples
     orders = [0, *(p for p in ORDERS if p <= most)]
-    left = {p: _JointPredictor(c[: p + 1]).log_error + price * p for p in orders}
+    left = {p: _Predictor(c[: p + 1]).log_error + price * p for p in orders}
     return c[: min(left, key=lambda p: left[p]) + 1]
 
 
