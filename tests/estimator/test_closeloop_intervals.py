@@ -293,8 +293,12 @@ def test_finer_steps_are_not_taken_if_the_record_was_made_with_the_coarse_ones(t
 
 @dataclass(frozen=True)
 class Joining(Stiff):
-    """A line over time whose integration error is of fourth order in steps over several samples."""
+    """A line over time whose integration error is of fourth order in steps over several samples.
 
+    usual: the error in steps of one sample.
+    """
+
+    usual: float = 0.0
     fmu_joins: bool = True
     searched: Steps = USUAL
     coupling: float = 0.0
@@ -305,7 +309,7 @@ class Joining(Stiff):
 
     def identify_residual(self, theta: Mapping[str, float]) -> Array:
         [run] = self.record.runs
-        error = self.error / self.steps.parts**4 if self.steps.joined else 0.0
+        error = self.error / self.steps.parts**4 if self.steps.joined else self.usual
         return run.y - (theta["slope"] + error) * run.t[:, None]
 
 
@@ -343,6 +347,16 @@ def test_steps_go_over_several_samples_if_their_error_moves_no_unknown_by_half_i
     seen = 15 / 16 * size  # by halving them: the slope alone makes up the residual here
     if abs(seen - 0.5) > 0.01:
         assert hold(Joining(size * exact.std["slope"])) == (seen < 0.5)
+
+
+@settings(deadline=None, max_examples=30)
+@given(size=st.floats(0.6, 3.0), usual=st.floats(-6.0, 6.0))
+def test_steps_of_one_sample_are_taken_only_if_they_are_nearer_to_shorter_ones(size, usual):
+    exact = fit(Stiff(0.0), [Unknown("slope", 1.0, -10.0, 10.0, 1.0)], Weighting.white(SIZE))
+    problem = Joining(size * exact.std["slope"], usual=usual * exact.std["slope"])
+    halved = size / 16
+    if abs(abs(usual - halved) - abs(size - halved)) > 0.01:
+        assert hold(problem) == (abs(size - halved) < abs(usual - halved))
 
 
 @dataclass(frozen=True)

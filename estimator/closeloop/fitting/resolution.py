@@ -47,13 +47,16 @@ def long_steps_hold(long: Problem, base: Hypothesis, noise: Noise) -> bool:
     """Whether such steps are exact on a record, and what is left does not come from them.
 
     base: calibrated in these steps. An error of the residual moves an unknown by no more standard errors than
-    it is long, whatever the slopes of the unknown are. How long it is, shorter steps show.
+    it is long, whatever the slopes of the unknown are. How long it is, shorter steps show. Where it is longer
+    than that, the usual steps may be no better: inputs with noise are as rough as their samples are dense.
     """
-    shorter = in_halved_steps(long) if long.steps.joined else long.in_steps(USUAL)
+    usual = long.in_steps(USUAL)
+    shorter = in_halved_steps(long) if long.steps.joined else usual
     here, there = (weighted(p, base.theta, noise.weighting) for p in (long, shorter))
-    if not float(np.linalg.norm(here - there)) <= long.policy.search.moved_by_steps:
-        return False
-    return not inputs_held(long, base, noise)
+    error = float(np.linalg.norm(here - there))
+    holds = error <= long.policy.search.moved_by_steps
+    holds = holds or error <= float(np.linalg.norm(weighted(usual, base.theta, noise.weighting) - there))
+    return holds and not inputs_held(long, base, noise)
 
 
 def in_settled_steps(problem: Problem, theta: Mapping[str, float], weighting: Weighting) -> Problem | None:
