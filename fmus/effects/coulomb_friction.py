@@ -4,6 +4,7 @@ In data: a residual of one height that turns its sign with the velocity, flat to
 """
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import casadi as cs
 import numpy as np
@@ -23,6 +24,7 @@ class CoulombFriction(ForceLaw):
     amplitudes = ("F_c",)
     becomes = ("viscous_damping",)  # where it is all rounded
     one_way = ("constant_force",)
+    rounded: ClassVar[Mapping[str, str]] = {"v_s": "velocity"}
     F_c = Parameter("{F}", min=0.0, doc="friction force")
     v_s = Parameter("{q}/s", 1e-3, min=1e-6, doc="velocity at which friction is nearly full")
 

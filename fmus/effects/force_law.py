@@ -39,6 +39,9 @@ class ForceLaw(Effect):
     acts_on = "port"
     places: ClassVar[tuple[str, ...]] = ("rests", "turns", "slips")  # where the law makes sense
     of_way: ClassVar[tuple[str, ...]] = ()  # parameters that make sense only where the way is known
+    # shape parameters within which a turn of the force is rounded, by what they are part of: "velocity" or
+    # "displacement"; the force may be as stiff as they are small
+    rounded: ClassVar[Mapping[str, str]] = {}
 
     @abstractmethod
     def force(self, q: Expr, v: Expr) -> Expr:

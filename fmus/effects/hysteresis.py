@@ -3,6 +3,9 @@
 In data: loops of force over deflection, which has to be undone before the force turns.
 """
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import casadi as cs
 import numpy as np
 
@@ -26,6 +29,7 @@ class Hysteresis(ForceLaw):
     amplitudes = ("F_h",)
     becomes = ("coulomb_friction", "stiffness_change")
     places = ("rests",)
+    rounded: ClassVar[Mapping[str, str]] = {"q_y": "displacement"}
     F_h = Parameter("{F}", min=0.0, doc="force at which it slips")
     q_y = Parameter("{q}", 0.01, min=1e-6, doc="deflection in which the force would build up")
     beta = Parameter("1", 0.5, min=0.5, max=1.0, doc="shape: 0.5 unloads in a straight line")

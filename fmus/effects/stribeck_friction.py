@@ -4,6 +4,7 @@ In data: a residual that turns its sign with the velocity and is largest just af
 """
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import casadi as cs
 import numpy as np
@@ -24,6 +25,7 @@ class StribeckFriction(ForceLaw):
     amplitudes = ("F_c", "F_b")
     becomes = ("coulomb_friction", "viscous_damping")
     one_way = ("constant_force",)
+    rounded: ClassVar[Mapping[str, str]] = {"v_s": "velocity"}
     F_c = Parameter("{F}", min=0.0, doc="friction force when sliding fast")
     F_b = Parameter("{F}", min=0.0, doc="what friction has more when sliding slowly")
     v_b = Parameter("{q}/s", 0.1, min=1e-5, doc="Stribeck velocity: friction has fallen to a third of F_b")

@@ -451,8 +451,11 @@ class Sliding(Playing):
         run = Run(t, t[:, None], y[:, None], every, ~every, ~every)
         self.record = record_with(runs=(run,), noise_declared=np.array([True]), outputs=("y",))
 
+    sharpest = np.inf  # least rounding that was simulated
+
     def identify_residual(self, theta: Mapping[str, float]) -> np.ndarray:
         [run] = self.record.runs
+        self.sharpest = min(self.sharpest, theta["v_s"])
         return run.y - (theta["F_c"] * np.tanh(self.v / theta["v_s"]))[:, None]
 
 
@@ -472,6 +475,29 @@ def test_an_interval_reaches_the_bound_of_a_shape_on_which_the_record_does_not_d
         assert (likelihood.reaching_a_bound(whole) == ["v_s"]) == after[-1]
     assert np.mean(after) > 0.9
     assert np.mean(before) < 0.8
+
+
+def test_an_interval_that_reaches_what_the_record_cannot_show_is_as_wide_without_simulating_it(monkeypatch):
+    monkeypatch.setattr(likelihood, "built", lambda problem, _: problem)
+    monkeypatch.setattr(likelihood, "carefully", lambda _, h: h)  # a fit may go there,
+    monkeypatch.setattr(likelihood, "DEEPER_ROUNDS", 0)  # and so may one from a place of the profile
+    force = Unknown("F_c", 1.0, 0.0, np.inf, 1.0)
+    rounding = Unknown("v_s", 0.15, 1e-6, np.inf, 0.02)
+    reached = 0
+    for seed in range(20):
+        asked = Sliding(seed)
+        found = fit(asked, (force, rounding), Weighting.white(np.array([0.05])), {"F_c": 1.0, "v_s": 0.15})
+        widths, sharpest = [], []
+        for visible in ({}, {"v_s": 1e-5}):
+            c = Candidate("coulomb_friction", "rail", (force,), (rounding,), visible=visible)
+            asked.sharpest = np.inf
+            fitter = Fitter(baseline(asked, noise=0.05))
+            widths.append(likelihood.profiled(fitter, Hypothesis((c,), found, ())).fit.std["v_s"])
+            sharpest.append(asked.sharpest)
+        assert widths[1] == pytest.approx(widths[0], rel=0.01)
+        assert sharpest[1] >= min(1e-5, found.theta["v_s"]) * (1 - 1e-9)
+        reached += sharpest[0] < 1e-5
+    assert reached > 10  # without it, they are simulated
 
 
 class Swinging(Playing):

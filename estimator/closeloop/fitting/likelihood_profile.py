@@ -42,7 +42,8 @@ def profiled(fitter: Fitter, h: Hypothesis) -> Hypothesis:
     before: list[Hypothesis] = []
     h, rounds = carefully(fitter, h), DEEPER_ROUNDS
     while True:
-        h = within_error(built(problem, h.candidates), h, weighting)
+        seen = within_error(built(problem, h.candidates), visible(h), weighting)
+        h = replace(seen, fit=replace(seen.fit, unknowns=h.fit.unknowns))
         least, deeper = _widened(fitter, h, leave=rounds > 0)
         if not deeper:
             break
@@ -88,8 +89,8 @@ def _widened(fitter: Fitter, h: Hypothesis, leave: bool) -> tuple[Array, dict[st
     """
     problem, weighting = fitter.baseline.problem, fitter.baseline.noise.weighting
     names = [u.name for u in h.fit.unknowns]
-    here = built(problem, h.candidates)
-    found = _to_limits(here, h, weighting)
+    here, seen = built(problem, h.candidates), visible(h)
+    found = _to_limits(here, h, seen, weighting)
     for i, name in enumerate(names):
         if name in h.onset_names:
             half, deeper = _when(here, h, i, weighting)
@@ -97,28 +98,40 @@ def _widened(fitter: Fitter, h: Hypothesis, leave: bool) -> tuple[Array, dict[st
             if deeper and leave:
                 return found, deeper
     followed = {*names} - {*problem.free_states, *h.onset_names}
-    places, deeper = ends(here, h, followed, weighting, leave)
+    places, deeper = ends(here, seen, followed, weighting, leave)
     away = np.abs(places - h.fit.values).max(axis=0) / WIDTH
     return np.where([name in followed for name in names], np.maximum(away, found), found), deeper
 
 
-def _to_limits(here: Problem, h: Hypothesis, weighting: Weighting) -> Array:
+def visible(h: Hypothesis) -> Hypothesis:
+    """The hypothesis with its shapes bounded to where the record can show a difference."""
+    least = {name: value for c in h.candidates for name, value in c.visible.items()}
+    bounded = [
+        replace(u, low=max(u.low, min(least.get(u.name, u.low), float(value))))
+        for u, value in zip(h.fit.unknowns, h.fit.values, strict=True)
+    ]
+    return replace(h, fit=replace(h.fit, unknowns=tuple(bounded)))
+
+
+def _to_limits(here: Problem, h: Hypothesis, seen: Hypothesis, weighting: Weighting) -> Array:
     """Standard errors (n,) of shapes whose intervals reach as far as a bound; zero for all others.
 
     At its bounds a law may become another one, as friction without rounding is that of Coulomb. Slopes may
     not lead there, where the record does not depend on the shape. All other unknowns follow linearly; what
-    the amplitudes of the law change is simulated at the bound, as it is a matter of the shape.
+    the amplitudes of the law change is simulated at the bound, as it is a matter of the shape. seen: h within
+    the bounds of what the record can show. If these are in the interval, all values beyond them are as good.
     """
     found, names = np.zeros(len(h.fit.unknowns)), [u.name for u in h.fit.unknowns]
     for c in h.candidates:
         sizes = [names.index(u.name) for u in c.amplitudes if u.name in names]
         for i in (names.index(u.name) for u in c.shape if not u.is_onset):
             least = _followed(h.fit.jacobian, i, [h.fit.residual])[0]
-            for bound in (h.fit.unknowns[i].low, h.fit.unknowns[i].high):
+            u, shown = h.fit.unknowns[i], seen.fit.unknowns[i]
+            for bound, last in ((shown.low, u.low), (shown.high, u.high)):
                 if np.isfinite(bound):
                     rise = _at(here, h, i, bound, sizes, weighting) - least
                     if rise < WIDTH**2 * h.fit.inflation[i]:
-                        found[i] = max(found[i], abs(bound - h.fit.values[i]) / WIDTH)
+                        found[i] = max(found[i], abs(last - h.fit.values[i]) / WIDTH)
     return found
 
 

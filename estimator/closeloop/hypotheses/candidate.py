@@ -20,7 +20,8 @@ class Candidate:
 
     amplitudes: unknowns to which the effect is proportional, with a realistic size as scale; shape: further
     unknowns, with their start values; fixed: values that are not fitted. An amplitude with a fixed value is
-    used in the screening only; its value holds for every true effect of this kind.
+    used in the screening only; its value holds for every true effect of this kind. visible: values of shapes
+    below which the record shows no difference, by name.
     """
 
     kind: str
@@ -28,6 +29,7 @@ class Candidate:
     amplitudes: tuple[Unknown, ...]
     shape: tuple[Unknown, ...] = ()
     fixed: Mapping[str, float] = field(default_factory=dict, hash=False)
+    visible: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

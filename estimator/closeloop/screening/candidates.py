@@ -40,7 +40,7 @@ def physical_candidates(
         effect = EFFECTS[kind]
         if issubclass(effect, ForceLaw):
             if location in at:
-                found += _of_a_force(effect, location, at[location])
+                found += _of_a_force(effect, location, at[location], record.sample)
         elif issubclass(effect, InputEffect):
             if location in record.inputs:
                 found += _of_an_input(effect, location, record)
@@ -77,11 +77,24 @@ def fault_candidates(
     return found
 
 
-def _of_a_force(effect: type[ForceLaw], location: str, seen: MissingForce) -> Iterator[Candidate]:
+def _of_a_force(
+    effect: type[ForceLaw], location: str, seen: MissingForce, sample: float
+) -> Iterator[Candidate]:
+    """Candidates of a force law; a turn of it within a sample, in s, is as sudden to the record as any."""
     motion = seen.t - seen.t[0], seen.displacement, seen.velocity
+    over = {"displacement": seen.displacement, "velocity": seen.velocity}
+    visible = {
+        effect.name_at(location, n): sample * _rate(seen.t, over[of]) for n, of in effect.rounded.items()
+    }
     for shape in effect.guesses(*motion, seen.force):
         sizes = {a: _size(effect, a, shape, motion, seen.force) for a in effect.amplitudes}
-        yield _candidate(effect, location, sizes, shape, float(motion[0][-1]))
+        found = _candidate(effect, location, sizes, shape, float(motion[0][-1]))
+        yield replace(found, visible=visible)
+
+
+def _rate(t: Array, x: Array) -> float:
+    """Median of how fast a motion (N,) changes over times t (N,)."""
+    return float(np.median(np.abs(np.diff(x)) / np.diff(t))) if len(t) > 1 else 0.0
 
 
 def _of_an_input(effect: type[InputEffect], location: str, record: Record) -> Iterator[Candidate]:
