@@ -22,13 +22,15 @@ class Noise:
 
     std: (n_y,) standard deviation, declared or estimated; weighting: the weights of residuals in fits and
     scores, whose sizes are the standard deviations if these are declared; declared: (n_y,) whether they are;
-    uneven: (n_y,) how much more its mean square scatters because the sensors round; see `rounding`.
+    uneven: (n_y,) how much more its mean square scatters because the sensors round; see `rounding`; caused:
+    (n_y,) rms of that part of it which noise of the inputs and times causes.
     """
 
     std: Array
     weighting: Weighting
     declared: BoolArray
     uneven: Array | float = 1.0
+    caused: Array | float = 0.0
 
     @classmethod
     def of(
@@ -65,11 +67,12 @@ class Noise:
 
         unsaid: units (n_y,) of the outputs whose noise is not declared.
         """
-        std = np.sqrt(white**2 + np.mean(np.concatenate(caused) ** 2, axis=0))
+        part = np.sqrt(np.mean(np.concatenate(caused) ** 2, axis=0))
+        std = np.hypot(white, part)
         joint = joint_of([d / std for d in caused], white / std)
         correlation = tuple(joint[:, j, j] / joint[0, j, j] for j in range(len(std)))
         size = np.where(record.noise_declared, std, unsaid)
-        return cls(std, Weighting(size, correlation, joint), record.noise_declared)
+        return cls(std, Weighting(size, correlation, joint), record.noise_declared, caused=part)
 
     @property
     def scale(self) -> Array:

@@ -101,8 +101,10 @@ def verdict_of(checks: Sequence[Check]) -> Verdict:
         return "no_discrepancy"
     if not passed.get("every sensor moves", True):
         return "sensor_fault"
+    if not passed.get("an effect is more probable than none", True):
+        return "no_discrepancy"
     if not all(passed.get(name, True) for name in ANSWER):
-        return "unexplained" if passed.get("an effect is more probable than none", True) else "no_discrepancy"
+        return "unexplained"
     if not holds("alternatives that this record does not tell apart"):
         return "ambiguous"
     if not holds("effects that are needed"):

@@ -195,8 +195,7 @@ class Chain:
         if judgement.members:
             judgement = probable(baseline, judgement, found.probability)
         judgement = confirmed_on_test(baseline, judgement)
-        if not judgement.members:
-            judgement = needed(baseline, judgement, replace(found, judgement=judgement).probability)
+        judgement = needed(baseline, judgement, replace(found, judgement=judgement).probability)
         if judgement.verdict == "ambiguous":
             self.tell("next experiment", "simulating what would tell the effects apart")
             members, twins = judgement.members, shown.twins

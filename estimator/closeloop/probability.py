@@ -258,7 +258,8 @@ def _beyond(baseline: Baseline, h: Hypothesis) -> tuple[float, float]:
 
     The error is the scatter of noise, the scatter between blocks, and the uncertainty of the noise's size.
     """
-    squares: list[Array] = [baseline.in_noise(h.residuals, part) ** 2 - 1 for part in WHOLE]
+    in_own = np.square(baseline.noise.std / baseline.noise_of(h))
+    squares: list[Array] = [baseline.in_noise(h.residuals, part) ** 2 * in_own - 1 for part in WHOLE]
     n = sum(s.size for s in squares)
     blocks = np.array([np.sum(b) for s in squares for b in np.array_split(s, BLOCKS)])
     scatter = max(2.0 * n, len(blocks) * float(np.var(blocks)))

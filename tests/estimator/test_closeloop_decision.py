@@ -262,6 +262,16 @@ def test_a_verdict_without_an_answer_says_what_is_more_probable(p, form, known):
         assert ("not declared" in told.reason) == (not known)
 
 
+@given(st.floats(0.0, 1.0))
+def test_an_effect_that_passes_is_not_named_if_none_is_more_probable(p):
+    best = law("harmonic_excitation", 0, 1.0)
+    b = baseline(asked(), left(8.0, 1.1), NOISE)
+    told = needed(b, Judgement.naming([best]).after(DETECTED), {NO_DISCREPANCY: p, best.label: 1 - p})
+    assert told.verdict == ("no_discrepancy" if p > 0.5 else "traced")
+    assert bool(told.members) == (p <= 0.5)
+    assert best.label in told.reason
+
+
 # ---- simpler laws
 
 

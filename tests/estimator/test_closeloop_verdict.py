@@ -45,7 +45,7 @@ def test_any_checks_give_one_verdict(passed):
 @given(passing)
 def test_an_answer_that_fails_a_check_is_never_named(passed):
     verdict = verdict_of(checks(passed))
-    if not all(passed[name] for name in ANSWER):
+    if not (all(passed[name] for name in ANSWER) and passed["an effect is more probable than none"]):
         assert verdict not in ("traced", "several", "ambiguous")
     if verdict in ("traced", "several", "ambiguous"):
         assert passed["the residual is more than noise"]

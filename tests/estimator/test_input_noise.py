@@ -12,14 +12,16 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
 from estimator.closeloop.fitting.calibrate import without_input_noise
-from estimator.closeloop.fitting.noise_left import caused, noise_left
+from estimator.closeloop.fitting.noise_left import caused, caused_rms, noise_left
 from estimator.closeloop.fitting.reweighted import noise_of_best
 from estimator.closeloop.hypotheses.baseline import Baseline
+from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.policy import DEFAULT, Policy
 from estimator.closeloop.question.input_noise import InputNoise, smoothed, white_part
 from estimator.noise import Noise
 from estimator.record import Record, Run
 from estimator.weighting import Weighting
+from tests.helpers.baselines import NOTHING
 
 N = 12000
 T = np.arange(N) * 0.005
@@ -256,6 +258,24 @@ def test_an_effect_that_holds_an_input_back_does_not_hide_its_noise():
     said = [noise_of_best(Baseline(problem, base, noise), [[h]]).std for h in found]
     assert_allclose(said[1], said[0])
     assert_allclose(said[1], noise.std)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("gain", [0.5, 3.0])
+def test_what_an_effect_leaves_is_compared_with_the_noise_that_it_lets_through(gain, seed):
+    raw = measured(np.random.default_rng(seed), 0.002)
+    [run] = raw.record.runs
+    changed = replace(run, y=run.y + (gain - 1) * slow(ramps(np.random.default_rng(seed))[:, None]))
+    problem = smooth(replace(raw, record=replace(raw.record, runs=(changed,))))
+    left = tuple(problem.residuals({}))
+    noise = noise_left(problem, {}, left, "effect")
+    theta = {"gain": gain}
+    right = Hypothesis((), NOTHING.fit, tuple(problem.residuals(theta)))
+    right = replace(right, caused=caused_rms(problem, theta, right.residuals))
+    asked = Baseline(problem, Hypothesis((), NOTHING.fit, left), noise)
+    assert_allclose(right.caused, gain * noise.caused, rtol=0.01)  # the base may see some jitter too
+    assert 0.6 < np.std(right.residuals[0]) / asked.noise_of(right)[0] < 1.5
+    assert_allclose(asked.noise_of(asked.hypothesis), noise.std)
 
 
 def test_noise_of_inputs_and_of_times_adds_up():

@@ -94,7 +94,7 @@ class Closed(ModelForm):
         return self._little(h, part) & self._little(h, "fit")
 
     def _little(self, h: Hypothesis, part: Part) -> BoolArray:
-        b, noise = self.baseline, self.baseline.noise.std
+        b, noise = self.baseline, self.baseline.noise_of(h)
         before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)
         beyond = np.sqrt(np.maximum(after**2 - noise**2, 0.0))
         little = beyond <= b.policy.detection.signal_share * signal_size(b.problem)
@@ -142,7 +142,7 @@ class Open(ModelForm):
         alone on its own output need not explain the others.
         """
         b, limits = self.baseline, self.baseline.policy
-        noise, down = b.noise.std, b.at_noise(h, part)
+        noise, down = b.noise_of(h), b.at_noise(h, part)
         if len(h.candidates) > 1:
             return down
         before, after = b.hypothesis.rms(b.problem, part), h.rms(b.problem, part)

@@ -61,7 +61,7 @@ def probable(baseline: Baseline, found: Judgement, probability: Mapping[str, flo
 
 
 def needed(baseline: Baseline, found: Judgement, probability: Mapping[str, float]) -> Judgement:
-    """The judgement without an answer after the check that an effect is more probable than none.
+    """The judgement after the check that an effect is more probable than none; without an answer if not.
 
     probability: by label.
     """
@@ -71,7 +71,9 @@ def needed(baseline: Baseline, found: Judgement, probability: Mapping[str, float
         return replace(found, checks=(*found.checks, check))
     form, unsaid = baseline.problem.form_error > 0, not baseline.noise.known
     likely = ["what the FMU's form leaves open"] * form + ["noise, whose size is not declared"] * unsaid
-    reason = f"no effect accounts for the residual; it is more probably {' or '.join(likely or ['noise'])}"
+    best = found.members[0].label if found.members else "no effect"
+    but = f"{best} accounts for the residual" + ", but" * bool(found.members) + ";" * (not found.members)
+    reason = f"{but} it is more probably {' or '.join(likely or ['noise'])}"
     return Judgement((*found.checks, check), (), reason)
 
 
@@ -153,7 +155,7 @@ def confirmed_on_test(baseline: Baseline, found: Judgement) -> Judgement:
     gained, error = baseline.lead(best, baseline.hypothesis, "test")
     shown = f"the log score changes by {gained:.3g} there, with a standard error of {error:.2g}"
     if checks[0].passed:
-        left = ", ".join(f"{r:.2f}" for r in best.rms(baseline.problem, "test") / baseline.noise.std)
+        left = ", ".join(f"{r:.2f}" for r in best.rms(baseline.problem, "test") / baseline.noise_of(best))
         shown = f"they leave {left} times the noise of the outputs there"
     reason = (
         f"{best.label} accounts for the residual on the part to choose, but the test part does not confirm "

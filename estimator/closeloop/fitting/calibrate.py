@@ -25,20 +25,21 @@ def without_input_noise(problem: Problem, h: Hypothesis) -> Problem | None:
     closely. This is asked of the whitened residual, because what the FMU lacks is mostly slower, unless noise
     of an input is declared.
     """
-    noise = InputNoise.of(problem.record, problem.policy.inputs)
+    record, limits = problem.record, problem.policy.inputs
+    noise = InputNoise.of(record, limits)
     if noise is None:
         return None
-    record = problem.record
-    found = replace(problem, record=noise.smoothed(record), input_noise=noise)
+    smoothed = noise.smoothed(record)
+    found = replace(problem, record=smoothed, input_noise=noise.drawn(smoothed, limits.draws))
     other = found.residuals(h.theta)
     moved = record.of([a - b for a, b in zip(other, h.residuals, strict=True)], "fit") / noise_floor(record)
-    if np.sum(moved**2) <= problem.policy.inputs.seen:
+    if np.sum(moved**2) <= limits.seen:
         return None
     if record.input_std:
         return found
     weighting, stretches = whitening(record, h.residuals), record.stretches("fit")
-    as_recorded, smoothed = (weighting.of(record.of(r, "fit"), stretches) for r in (h.residuals, other))
-    return found if np.sum(smoothed**2) < np.sum(as_recorded**2) else None
+    as_recorded, without = (weighting.of(record.of(r, "fit"), stretches) for r in (h.residuals, other))
+    return found if np.sum(without**2) < np.sum(as_recorded**2) else None
 
 
 def explains_most(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:

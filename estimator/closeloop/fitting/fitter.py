@@ -10,6 +10,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.closeloop.fitting.fit import REFUSED, fit
+from estimator.closeloop.fitting.noise_left import caused_rms
 from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
@@ -24,6 +25,8 @@ from fmus.host.fmu import FmuError
 BRIEF, LONG = 4, 20  # evaluations of a brief fit, which only ranks, and of a full fit
 GAINS = 0.98  # ratio of the sums of squares after and before a round, above which no other round follows
 FURTHER_ROUNDS, LAST = 4, 2  # rounds of further LONG fits, and leading hypotheses that they continue
+
+NEAR = 2.0  # mean square of the weighted residual, below which what noise of the inputs causes is simulated
 
 Columns = Mapping[str, Array]  # derivatives (m,) of the weighted residual, by the name of the unknown
 
@@ -180,19 +183,23 @@ def _hypotheses(
                 every = [*_doubting(problem, p.candidates, unknowns), *own]
                 fits[i] = fit(where[i], every, weighting, p.start, None, evaluations, known, guess, step=step)
             simulate_ahead([(where[i], fits[i].theta) for i in some])
-            made |= {i: _shown(where[i], promises[i], fits[i], weighting) for i in some}
+            made |= {i: _shown(where[i], promises[i], fits[i], weighting, evaluations > BRIEF) for i in some}
     return [made[i] for i in range(len(promises))]
 
 
-def _shown(here: Problem, promise: Promise, found: Fit, weighting: Weighting) -> Hypothesis | None:
-    """The hypothesis of a fit, with its residuals; None as for `hypothesis`."""
+def _shown(
+    here: Problem, promise: Promise, found: Fit, weighting: Weighting, full: bool
+) -> Hypothesis | None:
+    """The hypothesis of a brief or full fit, with its residuals; None as for `hypothesis`."""
     try:
         residuals = here.residuals(found.theta)
     except FmuError:
         return None
     if not all(np.all(np.abs(r) < REFUSED * weighting.size) for r in residuals):
         return None
-    return Hypothesis(promise.candidates, found, tuple(residuals))
+    near = full and np.mean(found.residual**2) < NEAR
+    noise = caused_rms(here, found.theta, residuals) if near else None
+    return Hypothesis(promise.candidates, found, tuple(residuals), caused=noise)
 
 
 def _doubting(

@@ -24,13 +24,19 @@ def noise_left(problem: Problem, theta: Mapping[str, float], residuals: Sequence
     return replace(found, uneven=unevenness(record, residuals, problem.policy.detection.roundings))
 
 
+def caused_rms(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> Array | None:
+    """Rms (n_y,) of the outputs' noise that comes from noise of the inputs and times, if there is any."""
+    found = caused(problem, theta, residuals)
+    return np.asarray(np.sqrt(np.mean(np.concatenate(found) ** 2, axis=0))) if found else None
+
+
 def caused(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Array]) -> list[Array]:
     """Draws (n, n_y) of the outputs' noise that comes from noise of the inputs and times, if there is any.
 
     They are made for each run that has a part to identify.
     """
     rng = np.random.default_rng(0)
-    found = _by_inputs(problem, theta, rng)
+    found = _by_inputs(problem, theta)
     scatter = jitter(problem.record, residuals, problem.policy.detection.chance)
     if not scatter:
         return found
@@ -46,15 +52,13 @@ def caused(problem: Problem, theta: Mapping[str, float], residuals: Sequence[Arr
     return [y + late(rate, len(y)) for y, rate in zip(found, cycle(moved), strict=False)]
 
 
-def _by_inputs(problem: Problem, theta: Mapping[str, float], rng: np.random.Generator) -> list[Array]:
+def _by_inputs(problem: Problem, theta: Mapping[str, float]) -> list[Array]:
     """The responses of the FMU to as much noise as is left in the inputs."""
     record, noise = problem.record, problem.input_noise
     if noise is None:
         return []
-    draws = problem.policy.inputs.draws
-    errors = zip(*(noise.left(run.u, rng, draws) for run in record.runs), strict=True)
     found, still = [], problem.simulate(theta)
-    for each in errors:
+    for each in zip(*noise.errors, strict=True):
         noisy = tuple(replace(run, u=run.u + e) for run, e in zip(record.runs, each, strict=True))
         moved = replace(problem, record=replace(record, runs=noisy)).simulate(theta)
         fitted = zip(moved, still, record.runs, strict=True)

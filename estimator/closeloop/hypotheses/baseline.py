@@ -84,7 +84,17 @@ class Baseline:
         """Outputs (n_y,) whose residual on a part comes down to the noise, or nearly so."""
         limits, samples = self.policy.decision, sum(self.problem.record.stretches(part))
         chance = limits.scatter * np.sqrt(self.noise.redundancy / (2 * samples))
-        return np.asarray(h.rms(self.problem, part) < (limits.clean + chance) * self.noise.std)
+        return np.asarray(h.rms(self.problem, part) < (limits.clean + chance) * self.noise_of(h))
+
+    def noise_of(self, h: Hypothesis) -> Array:
+        """Standard deviation (n_y,) of the noise that h leaves if it is right.
+
+        Noise of the inputs drives the FMU with its effects: less damping, for instance, makes more of it.
+        """
+        if h.caused is None:
+            return self.noise.std
+        sensors = np.maximum(self.noise.std**2 - np.square(self.noise.caused), 0.0)
+        return np.asarray(np.sqrt(sensors + h.caused**2))
 
     def noise_alone(self, part: Part) -> bool:
         """Whether the residual of the calibrated FMU on a part of the record is only noise."""

@@ -23,12 +23,15 @@ class Hypothesis:
 
     residuals: measured minus simulated outputs of each run (N, n_y), over the whole record. worth: increase
     of the sum of squares without a candidate, all others fitted again, by its label; only if it was tried.
+    caused: rms (n_y,) of the outputs' noise that noise of the inputs and times causes if it is right; None if
+    it is not told, and is then as in the calibrated FMU.
     """
 
     candidates: tuple[Candidate, ...]
     fit: Fit
     residuals: tuple[Array, ...]
     worth: Mapping[str, float] = field(default_factory=dict, hash=False)
+    caused: Array | None = None
 
     @property
     def theta(self) -> dict[str, float]:

@@ -24,11 +24,13 @@ WAVELET = "db2"  # it does not see straight lines, and is the shortest that does
 class InputNoise:
     """White noise of the inputs of a record.
 
-    std: (n_u,) standard deviation, zero for an input without noise; levels: see InputPolicy.
+    std: (n_u,) standard deviation, zero for an input without noise; levels: see InputPolicy; errors: draws of
+    the error (N, n_u) that smoothing has left, for each run.
     """
 
     std: Array
     levels: int
+    errors: tuple[tuple[Array, ...], ...] = ()
 
     @classmethod
     def of(cls, record: Record, limits: InputPolicy) -> InputNoise | None:
@@ -47,6 +49,11 @@ class InputNoise:
         how = {name: "declared" if name in record.input_std else "found" for name, _ in noisy}
         notes = [Note("input noise", n, f"{n}: {said.format(std, how[n])}") for n, std in noisy]
         return replace(record, runs=runs, notes=(*record.notes, *notes))
+
+    def drawn(self, record: Record, draws: int) -> InputNoise:
+        """The same noise with draws of what smoothing has left in the inputs of a smoothed record."""
+        rng = np.random.default_rng(0)
+        return replace(self, errors=tuple(tuple(self.left(run.u, rng, draws)) for run in record.runs))
 
     def left(self, u: Array, rng: np.random.Generator, draws: int) -> list[Array]:
         """Draws of the error that smoothing leaves in inputs (N, n_u), which have been smoothed.

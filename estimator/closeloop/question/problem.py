@@ -213,10 +213,14 @@ class Problem:
         return replace(self, steps=steps)
 
     def beginning(self, share: float) -> Problem:
-        """The same problem, restricted to the first share of the part to identify of each run."""
+        """The same problem, restricted to the first share of the part to identify of each run.
+
+        What is left of noise in its inputs is not known then.
+        """
         if share >= 1.0:
             return self
-        return replace(self, record=replace(self.record, runs=tuple(_cut(self.record.runs, share))))
+        runs = tuple(_cut(self.record.runs, share))
+        return replace(self, record=replace(self.record, runs=runs), input_noise=None)
 
     def _run(self, run: Run, theta: Mapping[str, float], more: Sequence[str]) -> Array:
         y = self.plant.simulate(run, self._start(run, theta), more, steps=self.steps)
