@@ -65,7 +65,7 @@ class Weighting:
             return weighted * self.size
         return _each(self._predictor.signal, weighted, stretches) * self.size
 
-    @property
+    @cached_property
     def redundancy(self) -> Array:
         """Samples per independent square, (n_y,): 1 for white noise, more if it is correlated."""
         return np.array([p.redundancy for p in self._alone])

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 from unittest.mock import patch
 
 from benchmarks.challenge.match import Answer, judged
 from benchmarks.challenge.truth import Truth
-from estimator.closeloop.decision import law_form
+from estimator.closeloop import probability, size_odds
+from estimator.closeloop.decision import law_form, model_form
 from estimator.closeloop.decision.model_form import form_of
-from estimator.closeloop.decision.verdict import confirmed_on_test, judge, needed, without_fits
+from estimator.closeloop.decision.verdict import confirmed_on_test, judge, needed, probable, without_fits
 from estimator.closeloop.detection.detect import Detection
 from estimator.closeloop.detection.importance import importance
 from estimator.closeloop.evidence import Judgement
@@ -20,15 +23,24 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import distinct
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.policy import DEFAULT, Policy
+from estimator.closeloop.question.problem import Problem
 from estimator.closeloop.screening.missing_force import MissingForce
 
+Result = TypeVar("Result")
 Told = tuple[str, list[tuple[str, str]]]  # verdict, and kind and place of what is named
 Answers = dict[str, dict[str, Told]]  # by limit and change
 
 STAGES = ("detection", "decision")  # limits of the search decide what is fitted: these need new fits
 NEEDS_DRAWS = ("detection.replicates", "detection.slow_blocks")  # the noise would have to be drawn again
-OF_SAMPLES = "share of the samples"  # unit of a limit that cannot exceed 1
-FACTORS = {"0": 0.0, "half": 0.5, "double": 2.0, "no end": 1e12}
+# units of limits that stay below 1
+BELOW_ONE = ("share of the samples", "share of the probability of a class", "probability")
+# what no limit changes; the record and the calibrated FMU are the same for all policies
+UNCHANGED: tuple[tuple[Any, str], ...] = (
+    (Baseline, "weighted"), (Baseline, "lead"), (Baseline, "in_noise"), (Baseline, "changed"),
+    (Hypothesis, "rms"), (probability, "_evidence"),
+    (size_odds, "signal_size"), (model_form, "signal_size"),
+)  # fmt: skip
+FACTORS = {"0": 1e-12, "half": 0.5, "double": 2.0, "no end": 1e12}
 SEARCHED = "would be searched"  # of a residual that the default leaves alone, so that there are no fits
 
 
@@ -41,19 +53,35 @@ def variants() -> Iterator[tuple[str, str, Policy]]:
         group = getattr(DEFAULT, stage)
         for how, factor in FACTORS.items():
             changed = round(value * factor) if isinstance(value, int) else value * factor
-            if about.metadata["unit"] == OF_SAMPLES:
-                changed = min(changed, 1.0)
+            if about.metadata["unit"] in BELOW_ONE:
+                changed = min(changed, 0.999)
             yield name, how, replace(DEFAULT, **{stage: replace(group, **{short: changed})})
 
 
 def ablated(found: Outcome) -> Answers:
     """The answers to a record by every policy, from its fits; those of the default under "default"."""
     again = _Again(found)
-    with patch.object(law_form, "curvature", again.curvature):
+    with ExitStack() as kept:
+        kept.enter_context(patch.object(law_form, "curvature", again.curvature))
+        for owner, name in UNCHANGED:
+            kept.enter_context(patch.object(owner, name, _once(getattr(owner, name))))
         answers: Answers = {"default": {"": again.answer(DEFAULT)}}
         for name, how, policy in variants():
             answers.setdefault(name, {})[how] = again.answer(policy)
     return answers
+
+
+def _once(work: Callable[..., Result]) -> Callable[..., Result]:
+    """The same function, computed once for the same arguments."""
+    made: dict[tuple[object, ...], tuple[tuple[object, ...], Result]] = {}
+
+    def kept(*args: object) -> Result:
+        key = tuple(a if isinstance(a, str) else id(a) for a in args if not isinstance(a, Baseline | Problem))
+        if key not in made:
+            made[key] = args, work(*args)  # held, so that no other object takes the place of one
+        return made[key][1]
+
+    return kept
 
 
 @dataclass
@@ -84,10 +112,12 @@ class _Again:
         singles = form_of(baseline).ranked(found.singles)
         kinds = len(distinct(found.promises))
         leading = judge(baseline, singles, found.pairs, kinds)
-        told = confirmed_on_test(baseline, law_form.confirmed(baseline, leading, found.forces)).after(before)
-        if not told.members:
-            again = replace(found, baseline=baseline, judgement=told)
-            told = needed(baseline, told, again.probability)
+        told = law_form.confirmed(baseline, leading, found.forces).after(before)
+        again = replace(found, baseline=baseline)
+        if told.members:
+            told = probable(baseline, told, replace(again, judgement=told).probability)
+        told = confirmed_on_test(baseline, told)
+        told = needed(baseline, told, replace(again, judgement=told).probability)
         return told.verdict, _named(told)
 
     def _detection(self, baseline: Baseline) -> Detection:

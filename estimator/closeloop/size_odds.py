@@ -47,9 +47,9 @@ def beyond_form(baseline: Baseline, h: Hypothesis) -> float:
     own = fault if fault.any() else ~fault
     found = [0.0]
     for part in WHOLE:
-        before, after = (x.of(b.problem, part) for x in (b.hypothesis, h))
-        found.append(float(np.max(np.sqrt(np.mean((after - before) ** 2, axis=0)) / form)))
-        was, left = (float(np.sum((np.mean(x**2, axis=0) / noise**2 - 1)[own])) for x in (before, after))
+        found.append(float(np.max(b.changed(h, part) / form)))
+        rms = (x.rms(b.problem, part) for x in (b.hypothesis, h))
+        was, left = (float(np.sum(((x / noise) ** 2 - 1)[own])) for x in rms)
         found.append((1 - left / was) / most if was > 0 else 0.0)
     return max(found)
 

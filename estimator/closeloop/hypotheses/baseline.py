@@ -96,6 +96,11 @@ class Baseline:
         sensors = np.maximum(self.noise.std**2 - np.square(self.noise.caused), 0.0)
         return np.asarray(np.sqrt(sensors + h.caused**2))
 
+    def changed(self, h: Hypothesis, part: Part) -> Array:
+        """Rms (n_y,) of what h changes in the simulated outputs on a part."""
+        change = h.of(self.problem, part) - self.hypothesis.of(self.problem, part)
+        return np.asarray(np.sqrt(np.mean(change**2, axis=0)))
+
     def noise_alone(self, part: Part) -> bool:
         """Whether the residual of the calibrated FMU on a part of the record is only noise."""
         return bool(np.all(self.at_noise(self.hypothesis, part)))
