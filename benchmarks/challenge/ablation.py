@@ -40,7 +40,8 @@ UNCHANGED: tuple[tuple[Any, str], ...] = (
     (Hypothesis, "rms"), (probability, "_evidence"),
     (size_odds, "signal_size"), (model_form, "signal_size"),
 )  # fmt: skip
-FACTORS = {"0": 1e-12, "half": 0.5, "double": 2.0, "no end": 1e12}
+DIVISORS = ("decision.most",)  # of shares; at zero they are hardly anything instead
+FACTORS = {"0": 0.0, "half": 0.5, "double": 2.0, "no end": 1e12}
 SEARCHED = "would be searched"  # of a residual that the default leaves alone, so that there are no fits
 
 
@@ -52,6 +53,7 @@ def variants() -> Iterator[tuple[str, str, Policy]]:
             continue
         group = getattr(DEFAULT, stage)
         for how, factor in FACTORS.items():
+            factor = factor or 1e-12 * (name in DIVISORS)
             changed = round(value * factor) if isinstance(value, int) else value * factor
             if about.metadata["unit"] in BELOW_ONE:
                 changed = min(changed, 0.999)
