@@ -13,12 +13,13 @@ from joblib import Parallel, delayed
 from estimator.closeloop.decision.verdict import explains
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.likelihood_profile import reaching_a_bound
+from estimator.closeloop.fitting.profile_trace import WIDTH
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis
 from estimator.closeloop.hypotheses.promise import Promise
 from estimator.closeloop.outcome import Outcome
-from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.question.problem import Problem, Unknown
 from estimator.closeloop.several.chart import chart
 from estimator.closeloop.several.estimates import (
     Difference,
@@ -191,9 +192,12 @@ def _transferred(task: _Task) -> Transfer:
 
 
 def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequence[Candidate]) -> Hypothesis:
-    """Fit with the effect held at given values, from the better of two sets of start values."""
+    """Fit with the effect held at given values, from the better of two sets of start values.
+
+    Unknowns of the effect without a given value stay within the intervals of the record that it is from.
+    """
     labels = {c.label for c in t.member.candidates}
-    effects = tuple(c for c in own.candidates if c.label in labels)
+    effects = tuple(_within(c, t.member) for c in own.candidates if c.label in labels)
     rest = t.explanation.fit.theta if t.explanation and beside else {}
     starts = [{**rest, **own.fit.theta}, {**own.fit.theta, **t.baseline.hypothesis.fit.theta, **rest}]
     parts = []
@@ -204,6 +208,23 @@ def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequen
         parts.append((float(first @ first), replace(part, start=part.chart.native(given))))
     _, best = min(parts, key=lambda p: p[0])
     return fit_together([best], values).parts[0]
+
+
+def _within(c: Candidate, known: Hypothesis) -> Candidate:
+    """A candidate whose unknowns of the machine are bounded by their 95 % intervals of a fit, if these meet."""
+    values, errors = known.fit.theta, known.fit.std
+    machine = {u.name for u in chart([c]).machine}
+
+    def bounded(u: Unknown) -> Unknown:
+        low = max(u.low, values[u.name] - WIDTH * errors[u.name])
+        high = min(u.high, values[u.name] + WIDTH * errors[u.name])
+        return replace(u, low=low, high=high) if low < high else u
+
+    amplitudes, shape = (
+        tuple(bounded(u) if u.name in machine & errors.keys() else u for u in some)
+        for some in (c.amplitudes, c.shape)
+    )
+    return replace(c, amplitudes=amplitudes, shape=shape)
 
 
 def _judged(
