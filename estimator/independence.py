@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.special import gammaincc
 
 from estimator.record import Array
@@ -43,6 +44,6 @@ def chance_of_independence(parts: Sequence[Array], lags: int) -> float:
 
 def _crossed(a: Array, b: Array, lags: int) -> Array:
     """Sums of the products of two signals (n,) at all lags, (2 lags + 1,)."""
-    length = len(a) + lags
+    length = next_fast_len(len(a) + lags, real=True)
     product = np.fft.irfft(np.fft.rfft(a, length) * np.fft.rfft(b, length).conj(), length)
     return np.append(product[-lags:], product[: lags + 1])

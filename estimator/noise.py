@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from estimator.record import Array, BoolArray, Record
 from estimator.weighting import Weighting, correlation_of, joint_of
@@ -159,8 +160,9 @@ def correlation_time(residual: Array) -> float:
     """
     r = residual - residual.mean()
     n = len(r)
-    spectrum = np.abs(np.fft.rfft(r, 2 * n)) ** 2
-    rho = np.fft.irfft(spectrum)[: n // 2]
+    length = next_fast_len(n + n // 2, real=True)
+    spectrum = np.abs(np.fft.rfft(r, length)) ** 2
+    rho = np.fft.irfft(spectrum, length)[: n // 2]
     if rho[0] <= 0:
         return 1.0
     tau = 2 * np.cumsum(rho / rho[0]) - 1

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.linalg import solve_toeplitz, solve_triangular
 from scipy.signal import freqz
 
@@ -211,7 +212,7 @@ def joint_of(draws: Sequence[Array], white: Array) -> Array:
 
 def _covariance(x: Array, lags: int) -> Array:
     """Covariance (lags, n, n) of a signal (N, n) of mean zero: of its samples with those k before."""
-    length = len(x) + max(len(x), lags)
+    length = next_fast_len(len(x) + lags, real=True)
     spectrum = np.fft.rfft(x, length, axis=0)
     crossed = spectrum[:, :, None] * spectrum[:, None, :].conj()
     return np.asarray(np.fft.irfft(crossed, length, axis=0)[:lags] / len(x))
@@ -231,7 +232,7 @@ def autocovariance(parts: Sequence[Array], lags: int) -> Array:
     """Autocovariance (lags,) of a signal of mean zero, given in stretches (N,), from lag 0 on."""
     sums = np.zeros(lags)
     for x in parts:
-        length = len(x) + max(len(x), lags)
+        length = next_fast_len(len(x) + lags, real=True)
         sums += np.fft.irfft(np.abs(np.fft.rfft(x, length)) ** 2, length)[:lags]
     return sums / sum(len(x) for x in parts)
 

@@ -128,12 +128,13 @@ def _of_fits(
 ) -> dict[str, float]:  # fmt: skip
     """Probability of each label, and of no discrepancy; refused, minor: see `probabilities`."""
     base, prior, kinds = baseline.hypothesis, baseline.policy.prior, len(distinct(promises))
+    erring = baseline.policy.detection.level  # of the checks of a right answer
     best = _closest(baseline, [h for h in fitted if h not in refused and h not in minor] or fitted)
     known: dict[str, float] = {}
     alone: dict[str, float] = {}  # without the share of singles or pairs, which a stranger does not have
     for h in fitted:
         value = _one_of_its_size(baseline, best, h, kinds)
-        stands = np.log(prior.refused if h in refused and h not in minor else 1 - prior.refused)
+        stands = np.log(erring if h in refused and h not in minor else 1 - erring)
         alone[h.label] = max(alone.get(h.label, -np.inf), value)
         known[h.label] = max(known.get(h.label, -np.inf), value + _share(baseline, h) + stands)
     library, stranger = (float(logsumexp(list(values.values()))) for values in (known, alone))

@@ -117,7 +117,7 @@ def test_noise_that_is_not_declared_may_be_all_that_a_right_answer_leaves(size, 
         1 - sum(probabilities(b, SEEN, judged("traced"), promised(measured), found).values())
         for b in (known, unknown)
     )
-    within = (1 - prior.outside) * (1 - prior.refused)
+    within = (1 - prior.outside) * (1 - DEFAULT.detection.level)
     assert declared > 0.9
     assert undeclared == pytest.approx(prior.outside / (prior.outside + within * prior.coloured), abs=0.05)
 
@@ -129,7 +129,7 @@ def test_checks_that_refuse_every_hypothesis_are_evidence_for_none_of_these(size
     passed, refused = (
         answered(measured, verdict)["constant_force@2"] for verdict in ("traced", "unexplained")
     )
-    error = DEFAULT.prior.refused
+    error = DEFAULT.detection.level
     odds = passed / (1 - passed) * error / (1 - error)
     assert refused / (1 - refused) == pytest.approx(odds, rel=1e-6)
 

@@ -69,7 +69,7 @@ class ModelForm(ABC):
 
     def _most_left(self, h: Hypothesis) -> float:
         """Most of the sum of squares that a law leaves beyond noise."""
-        return self.baseline.policy.decision.second_share * h.fit.beyond_noise
+        return self.baseline.policy.decision.most * h.fit.beyond_noise
 
     def noticed(self, h: Hypothesis) -> float:
         """Reduction of the sum of squares by a richer hypothesis, from which on h is incomplete."""

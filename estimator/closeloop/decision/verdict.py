@@ -55,7 +55,7 @@ def probable(baseline: Baseline, found: Judgement, probability: Mapping[str, flo
     together = sum(probability.get(m.label, 0.0) for m in found.members)
     check = Check.least("not improbable", together, baseline.policy.decision.probable)
     if check.passed:
-        found = found.credible(probability, baseline.policy.decision.left_out)
+        found = found.credible(probability, baseline.policy.detection.level)
         return replace(found, checks=(*found.checks, check))
     return _nothing(baseline, found.members[0]).after([*found.checks, check])
 
@@ -114,7 +114,7 @@ def without_fits(baseline: Baseline, detection: Detection) -> tuple[list[Check],
     dead = [n.sentence for n in problem.record.notes if n.kind == "constant"]
     checks = [
         Check("the residual is more than noise", detection.p_value, detection.level, detection.detected),
-        Check.least("the outputs move out of their noise", moves, baseline.policy.decision.excited),
+        Check.least("the outputs move out of their noise", moves, baseline.policy.detection.chance),
         Check.least("the residual is large enough to matter", detection.importance, 1.0),
         Check.most("every sensor moves", len(dead), 0),
     ]

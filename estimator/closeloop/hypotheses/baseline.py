@@ -82,9 +82,9 @@ class Baseline:
 
     def at_noise(self, h: Hypothesis, part: Part) -> BoolArray:
         """Outputs (n_y,) whose residual on a part comes down to the noise, or nearly so."""
-        limits, samples = self.policy.decision, sum(self.problem.record.stretches(part))
-        chance = limits.scatter * np.sqrt(self.noise.redundancy / (2 * samples))
-        return np.asarray(h.rms(self.problem, part) < (limits.clean + chance) * self.noise_of(h))
+        limits, samples = self.policy, sum(self.problem.record.stretches(part))
+        chance = limits.detection.chance * np.sqrt(self.noise.redundancy / (2 * samples))
+        return np.asarray(h.rms(self.problem, part) < (limits.decision.clean + chance) * self.noise_of(h))
 
     def noise_of(self, h: Hypothesis) -> Array:
         """Standard deviation (n_y,) of the noise that h leaves if it is right.

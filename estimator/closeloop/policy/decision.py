@@ -22,20 +22,8 @@ class DecisionPolicy:
         "distance of an effect's size from zero, below which the effect is not needed",
         "derivation: 1 in 16000 by the normal distribution, so 1 in 100 for the 150 candidates of a record",
     )
-    excited: float = limit(
-        3.0,
-        "times the noise",
-        "standard deviation of an output, below which the output shows nothing but noise",
-        "derivation: as `chance`",
-    )
     clean: float = limit(
-        1.05, "times the noise", "rms of a residual that counts as noise; `scatter` is added to it", CHALLENGE
-    )
-    scatter: float = limit(
-        3.0,
-        "standard errors",
-        "allowance for chance in the rms of a residual",
-        "derivation: 1 in 700, as `chance`",
+        1.05, "times the noise", "rms of a residual that counts as noise; `chance` is added to it", CHALLENGE
     )
     gap: float = limit(
         0.95,
@@ -49,8 +37,9 @@ class DecisionPolicy:
         "share of the variance",
         "share that one effect must explain of the variance beyond noise if the model form is open; a "
         "residual of which no effect could explain as much is left to the form; what inputs that were held "
-        "over a sample must explain of the variance beyond noise; least probability of an effect with which "
-        "a residual that no effect explains is unexplained",
+        "over a sample must explain of the variance beyond noise; what a free curve beside a law must "
+        "explain of what the law leaves beyond noise, so that it is rejected; least probability of an effect "
+        "with which a residual that no effect explains is unexplained",
         "derivation: what explains less than it leaves is not what the residual is mainly made of",
     )
     probable: float = limit(
@@ -58,12 +47,6 @@ class DecisionPolicy:
         "probability",
         "probability of the effects of an answer together, below which none is named",
         "convention, as the level of a test; a right pair beside undeclared noise rarely has more than 0.17",
-    )
-    left_out: float = limit(
-        0.01,
-        "share of the probability of a class",
-        "share that the least probable members of a class hold together, which are left out of it",
-        "convention: a credible set, with the level of detection",
     )
     open_alike: float = limit(
         0.25,
@@ -94,42 +77,6 @@ class DecisionPolicy:
         "share of what a law explains",
         "further reduction that is possible in the part to identify although the law is right",
         CHALLENGE,
-    )
-    second_share: float = limit(
-        0.5,
-        "share of what a law leaves beyond noise",
-        "share that a free curve beside the law must explain, so that it is rejected",
-        CHALLENGE,
-    )
-    rounded: float = limit(
-        1e-4,
-        "share of what a law explains",
-        "smallest misfit of a smooth curve that imitates a law with a corner, if the law has many unknowns",
-        CHALLENGE,
-    )
-    imitated: float = limit(
-        2.5e-3,
-        "share of what a law explains",
-        "smallest misfit of a smooth curve that imitates a law with a corner, if the law has few unknowns",
-        CHALLENGE,
-    )
-    plain_law: int = limit(
-        2,
-        "unknowns",
-        "largest number of unknowns of a law for which `imitated` holds; above it, `rounded` does",
-        CHALLENGE,
-    )
-    fastest: float = limit(
-        0.1,
-        "share of the samples",
-        "fastest samples; friction whose rounded part includes even these is not named friction",
-        CHALLENGE,
-    )
-    different: float = limit(
-        0.01,
-        "probability",
-        "p-value below which the estimates of several records differ, so that no common value is given",
-        "convention, as the level of detection",
     )
 
     def told(self, least: float) -> float:

@@ -13,7 +13,9 @@ class DetectionPolicy:
     level: float = limit(
         0.01,
         "probability",
-        "probability of reporting a discrepancy if the residual is pure noise, over all statistics together",
+        "probability of reporting a discrepancy if the residual is pure noise, over all statistics together; "
+        "that checks refuse a right answer; what the least probable members of a class hold together, which "
+        "are left out; p-value below which several records have no common value",
         "convention: 2 false reports in 100 records are allowed, and half of that is left to the search",
     )
     replicates: int = limit(
@@ -43,7 +45,8 @@ class DetectionPolicy:
     chance: float = limit(
         3.0,
         "standard deviations",
-        "allowance for chance: how far the mean square of pure noise may exceed its expectation",
+        "allowance for chance: how far the mean square or the rms of pure noise may exceed its expectation; "
+        "how many times its noise an output must move to show more than noise",
         "derivation: 1 in 700 by the normal distribution",
     )
     roundings: int = limit(

@@ -54,9 +54,3 @@ class PriorPolicy:
         "probability that undeclared noise is not white, so that a right answer may leave any share",
         "convention: nothing is known about noise of which nothing is said",
     )
-    refused: float = limit(
-        0.01,
-        "probability",
-        "probability that the checks of an answer refuse the right one",
-        "convention: as the level of detection; two of some hundred right ones were refused with seed 166636",
-    )

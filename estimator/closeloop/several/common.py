@@ -152,7 +152,7 @@ def _compared(
         likeness(together, costs, said),
         tuple(len(h.fit.residual) for h in alone),
         tuple(_accounts(r, h) for r, h in zip(records, together.parts, strict=True)),
-        records[0].problem.policy.decision.different,
+        records[0].problem.policy.detection.level,
     )
 
 

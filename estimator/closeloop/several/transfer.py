@@ -211,7 +211,7 @@ def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequen
 
 
 def _within(c: Candidate, known: Hypothesis) -> Candidate:
-    """A candidate whose unknowns of the machine are bounded by their 95 % intervals of a fit, if these meet."""
+    """A candidate whose unknowns of the machine are bounded by their 95 % intervals of a fit."""
     values, errors = known.fit.theta, known.fit.std
     machine = {u.name for u in chart([c]).machine}
 
@@ -238,7 +238,7 @@ def _judged(
             return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} fits better"
         if explains(t.baseline, held):
             return "confirmed", f"{label} with the values of {a} accounts for {b} too"
-        if apart.p_value >= t.baseline.policy.decision.different:
+        if apart.p_value >= t.baseline.policy.detection.level:
             return "agrees", f"{label} accounts for {b} with values that agree with those of {a}, {far}"
         return "differs", f"{label} accounts for {b} with other values only, {far}"
     if t.explanation is None:
@@ -247,7 +247,7 @@ def _judged(
     beside = [c for c in t.explanation.candidates if c.label not in labels]
     both = _held(t, own, values, beside) if beside else held
     worse = t.baseline.beats(t.explanation, both) and (
-        not t.quiet or apart.p_value < t.baseline.policy.decision.different
+        not t.quiet or apart.p_value < t.baseline.policy.detection.level
     )
     by = "needs no effect" if t.quiet else f"is explained by {t.explanation.label}"
     if worse:
