@@ -12,7 +12,6 @@ from estimator.closeloop.decision.law_form import (
     confirmed,
     curvature,
     misnamed,
-    of_its_own,
 )
 from estimator.closeloop.decision.model_form import form_of
 from estimator.closeloop.evidence import Judgement
@@ -224,9 +223,9 @@ def test_rounded_friction_is_named_where_any_other_curve_would_show(builder):
     here = problem(builder, record(to_and_fro(2.0), rounded(60.0), 3))
     traced = looked_at("one", here, ("coulomb_friction",))
     o, [h] = traced.found, traced.found.singles[:1]
-    [(c, *at)] = misnamed(h, o.forces)
+    [(_, own)] = misnamed(h, o.forces)
     explained = cost(o.baseline.hypothesis) - cost(h)
-    assert of_its_own(h, c, *at) * explained > NOTICED
+    assert own * explained > NOTICED
     assert h.theta["coulomb_friction_carriage_v_s"] == pytest.approx(ROUNDED, rel=0.05)
     told = judged("traced", (h,), "it accounts for the residual")
     assert confirmed(o.baseline, told, o.forces).members == told.members

@@ -15,6 +15,7 @@ from estimator.closeloop.hypotheses.hypothesis import Hypothesis, cost
 from estimator.closeloop.screening.curves import reductions
 from estimator.closeloop.screening.free_form import FREE_FORMS, offered
 from estimator.closeloop.screening.missing_force import MissingForce
+from estimator.closeloop.screening.plain_laws import of_its_own
 from fmus.effects import EFFECTS
 from fmus.effects.force_law import ForceLaw
 
@@ -53,59 +54,30 @@ def _follows(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) 
 
 def doubted(baseline: Baseline, h: Hypothesis, forces: Sequence[MissingForce]) -> list[Candidate]:
     """Laws of a hypothesis that are not true to their names with the fitted values, as the record shows."""
-    wrong = misnamed(h, forces)
-    if not form_of(baseline).exact:
-        return [c for c, _, _ in wrong]
-    return [c for c, law, missing in wrong if not told_apart(baseline, h, c, of_its_own(h, c, law, missing))]
+    exact = form_of(baseline).exact
+    return [c for c, own in misnamed(h, forces) if not (exact and told_apart(baseline, h, c, own))]
 
 
-def misnamed(
-    h: Hypothesis, forces: Sequence[MissingForce]
-) -> list[tuple[Candidate, type[ForceLaw], MissingForce]]:
-    """Laws that are not true to their names with the fitted values, each with the motion at its port."""
+def misnamed(h: Hypothesis, forces: Sequence[MissingForce]) -> list[tuple[Candidate, float]]:
+    """Laws that are not true to their names with the fitted values, each with its share of its own."""
     at, found = {missing.port.name: missing for missing in forces}, []
     for c in h.candidates:
         law = EFFECTS.get(c.kind)
         if law and issubclass(law, ForceLaw) and c.location in at:
-            missing = at[c.location]
-            if not law.true_to_name(_values(h, c), missing.displacement, missing.velocity):
-                found.append((c, law, missing))
+            values = {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
+            m = at[c.location]
+            if not law.true_to_name(values, m.displacement, m.velocity):
+                found.append((c, of_its_own(law, values, m)))
     return found
 
 
 def told_apart(baseline: Baseline, h: Hypothesis, c: Candidate, own: float) -> bool:
-    """Whether h leaves only noise, in which plain laws in place of its law c would be visible.
-
-    own: share of the squares of the law's force that plain laws cannot make.
-    """
+    """Whether h leaves only noise, in which plain laws in place of c would show; own: see of_its_own."""
     if not over_what(c) or not baseline.leaves_noise(h):
         return False
     alone = len(h.candidates) == 1
     explained = cost(baseline.hypothesis) - cost(h) if alone else h.significance()[h.candidates.index(c)] ** 2
     return own * explained > baseline.policy.decision.noticed
-
-
-def of_its_own(h: Hypothesis, c: Candidate, law: type[ForceLaw], missing: MissingForce) -> float:
-    """Share of the squares of a law's force along the motion that a constant and plain laws cannot make.
-
-    Plain laws have no shape and depend on the same motion, such as viscous and quadratic damping.
-    """
-    motion = missing.t, missing.displacement, missing.velocity
-    force = law.along(_values(h, c), *motion)
-    plain = [x.along(dict.fromkeys(x.amplitudes, 1.0), *motion) for x in _plain(over_what(c))]
-    basis = np.column_stack([np.ones_like(force), *plain])
-    basis /= np.linalg.norm(basis, axis=0)
-    rest = force - basis @ np.linalg.lstsq(basis, force, rcond=None)[0]
-    return float(rest @ rest / (force @ force))
-
-
-def _plain(over: str) -> list[type[ForceLaw]]:
-    laws = (e for e in EFFECTS.values() if issubclass(e, ForceLaw) and e.over == over)
-    return [e for e in laws if len(e.parameters("translation")) == len(e.amplitudes)]
-
-
-def _values(h: Hypothesis, c: Candidate) -> dict[str, float]:
-    return {n.removeprefix(c.prefix): v for n, v in h.theta.items() if n.startswith(c.prefix)}
 
 
 def motion(h: Hypothesis) -> tuple[str, str]:

@@ -69,11 +69,15 @@ def needed(baseline: Baseline, found: Judgement, probability: Mapping[str, float
     check = Check.least("an effect is more probable than none", some, limit)
     if check.passed:
         return replace(found, checks=(*found.checks, check))
-    form, unsaid = baseline.problem.form_error > 0, not baseline.noise.known
-    likely = ["what the FMU's form leaves open"] * form + ["noise, whose size is not declared"] * unsaid
-    best = found.members[0].label if found.members else "no effect"
-    but = f"{best} accounts for the residual" + ", but" * bool(found.members) + ";" * (not found.members)
-    reason = f"{but} it is more probably {' or '.join(likely or ['noise'])}"
+    likely = []
+    if baseline.problem.form_error:
+        likely.append("what the FMU's form leaves open")
+    if not baseline.noise.known:
+        likely.append("noise, whose size is not declared")
+    rather = f"it is more probably {' or '.join(likely or ['noise'])}"
+    if not found.members:
+        return Judgement((*found.checks, check), (), f"no effect accounts for the residual; {rather}")
+    reason = f"{found.members[0].label} accounts for the residual, but {rather}"
     return Judgement((*found.checks, check), (), reason)
 
 
