@@ -596,4 +596,4 @@ def test_the_ablation_judges_by_the_default_as_the_chain_did(tmp_path):
     rows = {line.split("`")[1]: line for line in table([(there, answers)], 7).splitlines() if "`" in line}
     assert rows.keys() == answers.keys() - {"default"}
     assert "right to abstained: 1" in rows["decision.significant"]
-    assert "right" not in rows["decision.excited"]
+    assert "right" not in rows["decision.open_alike"]

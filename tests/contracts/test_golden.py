@@ -13,7 +13,7 @@ KEPT = sorted(file.stem for file in FOLDER.glob("*.json"))
 DECISION = DEFAULT.decision
 LIMITS = {  # of the checks whose limit is one of the policy
     "the residual is more than noise": DEFAULT.detection.level,
-    "the outputs move out of their noise": DECISION.excited,
+    "the outputs move out of their noise": DEFAULT.detection.chance,
     "the size is clear of zero": DECISION.significant,
     "the reported size is clear of zero": DECISION.telling,
     "better than without it on the part to choose": DECISION.telling,
