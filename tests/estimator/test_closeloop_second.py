@@ -24,7 +24,7 @@ from estimator.closeloop.screening.candidates import physical_candidates
 from estimator.closeloop.screening.changes import Screening
 from estimator.closeloop.search import dating
 from estimator.closeloop.search.onset import grown
-from estimator.closeloop.search.pairs import beside, beyond_doubt, try_pairs, with_worth
+from estimator.closeloop.search.pairs import beside, beyond_doubt, enough_beside, try_pairs, with_worth
 from estimator.record import Record, Run
 from estimator.weighting import Weighting
 from fmus.effects import EFFECTS
@@ -121,6 +121,18 @@ def test_a_law_is_outgrown_where_more_gains_much_more_than_chance(before, enough
     for gain, expected in ((0.0, False), (0.9 * enough, False), (1.1 * enough, counts)):
         form = form_of(baseline(SimpleNamespace(policy=DEFAULT, form_error=0.0), base))
         assert form.outgrown(simple, several(*richer, squares=2e4 - gain)) is expected
+
+
+def test_a_second_effect_is_compared_with_noise_and_not_with_what_the_calibrated_fmu_leaves():
+    h = several(("coulomb_friction", "wheel"), squares=4000.0)
+    h = replace(h, fit=replace(h.fit, residual=np.ones(4000)))
+    declared = SimpleNamespace(policy=DEFAULT, noise=SimpleNamespace(std=np.ones(1), scale=np.ones(1)))
+    noise = SimpleNamespace(std=np.ones(1), scale=np.full(1, 2.0))  # weights by twice as much
+    limit = DEFAULT.search.second_effect**2 * 4000
+    assert enough_beside(declared, h) == pytest.approx(limit)
+    assert enough_beside(SimpleNamespace(policy=DEFAULT, noise=noise), h) == pytest.approx(limit / 4)
+    noise.scale = np.full(1, 100.0)  # chance remains
+    assert enough_beside(SimpleNamespace(policy=DEFAULT, noise=noise), h) == DEFAULT.decision.noticed
 
 
 class Seen:

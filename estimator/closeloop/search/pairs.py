@@ -104,7 +104,7 @@ def beside(
     """
     baseline, limits = fitter.baseline, fitter.baseline.policy.search
     best, outputs, promises = found[0], len(screening.weighting), list[Promise]()
-    enough = limits.second_effect**2 * len(best.fit.residual) / outputs
+    enough = enough_beside(baseline, best)
     for h in found[: limits.finalists]:
         if (h is not best and len(h.own) >= len(best.own)) or not calls_for_more(baseline, h):
             continue
@@ -113,6 +113,18 @@ def beside(
         promises += [p for p in _with(baseline.problem, h, fit, change) if p.gain > needed]
     pairs = dated(fitter, fitter.hypotheses(promises, limits.finalist_pairs)) if promises else []
     return [h for h in pairs if not baseline.idle(h)]
+
+
+def enough_beside(baseline: Baseline, best: Hypothesis) -> float:
+    """Reduction of the sum of squares that a second effect must promise beside the best one, which explains.
+
+    Where noise is not declared, residuals are weighted by what the calibrated FMU leaves. That is more than
+    the noise that the size of a second effect is compared with.
+    """
+    limits, noise = baseline.policy, baseline.noise
+    samples = len(best.fit.residual) / len(noise.std)
+    seen = samples * float(np.min(limits.search.second_effect * noise.std / noise.scale)) ** 2
+    return max(seen, limits.decision.noticed)
 
 
 def _from_base(problem: Problem, base: Fit, physical: Changes) -> list[Promise]:
