@@ -23,6 +23,7 @@ from estimator.closeloop.diagnostics.diagnostics import Diagnostics, diagnose
 from estimator.closeloop.evidence import Check, Judgement
 from estimator.closeloop.fitting.fitter import Fitter
 from estimator.closeloop.fitting.other_forms import over_forms
+from estimator.closeloop.fitting.over_clock import offset_shows, over_clock
 from estimator.closeloop.fitting.resolution import over_steps
 from estimator.closeloop.fitting.reweighted import noise_of_best, reweighted
 from estimator.closeloop.fitting.whole import calibrated_to_whole
@@ -100,7 +101,10 @@ class Chain:
         leading = [*singles[:1], *pairs[:1]]
         if again := self._late(shown, singles, pairs) or self._moved(shown.problem, leading):
             return again.run()
-        return self._over_forms(self._answer(found, shown, before, singles, pairs), shown)
+        found = self._answer(found, shown, before, singles, pairs)
+        if found.chosen and offset_shows(found.baseline, found.chosen):
+            return self._clocked(problem.record.sample).run()
+        return self._over_forms(found, shown)
 
     def _late(
         self, shown: Screened, singles: Sequence[Hypothesis], pairs: Sequence[Hypothesis]
@@ -143,14 +147,15 @@ class Chain:
         return replace(self, problem=other, stages=self.stages.under("seen"), moved=True)
 
     def _over_forms(self, found: Outcome, shown: Screened) -> Outcome:
-        """The outcome with errors that allow for the steps of the simulation and the form of the model."""
+        """The outcome with errors that allow for the steps, the outputs' clock and the form of the model."""
         shown = replace(shown, baseline=found.baseline)
-        members = tuple(shown.over_form(over_steps(found.baseline, m)) for m in found.judgement.members)
+        members = tuple(_reported(shown, m) for m in found.judgement.members)
         found = replace(found, judgement=replace(found.judgement, members=members))
         if found.chosen:
             return found
         fitter = self.fitter(found.baseline, self.jobs)
-        base = shown.over_form(self.stages.done("forms", lambda: over_forms(fitter, found.base)))
+        scattered = self.stages.done("forms", lambda: over_forms(fitter, found.base))
+        base = shown.over_form(over_clock(found.baseline, scattered))
         return replace(found, baseline=replace(found.baseline, hypothesis=base))
 
     def _detected(self, shown: Screened) -> Detection:
@@ -283,8 +288,7 @@ class Chain:
         """The judgement after the check of the best member's size by the errors that are reported."""
         if not judgement.members:
             return judgement
-        reported = shown.over_form(over_steps(shown.baseline, judgement.members[0]))
-        return clear_as_reported(shown.baseline, judgement, reported)
+        return clear_as_reported(shown.baseline, judgement, _reported(shown, judgement.members[0]))
 
     def _judged(
         self, shown: Screened, forces: Sequence[MissingForce], singles: Sequence[Hypothesis],
@@ -294,3 +298,9 @@ class Chain:
         ones, kinds = shown.twins.joined(singles), len(distinct(shown.promises))
         leading = judge(shown.baseline, ones, pairs, kinds)
         return leading, self.stages.done(stage, lambda: confirmed(shown.baseline, leading, forces))
+
+
+def _reported(shown: Screened, h: Hypothesis) -> Hypothesis:
+    """A hypothesis with errors that allow for steps of the simulation, the outputs' clock and the form."""
+    baseline = shown.baseline
+    return shown.over_form(over_clock(baseline, over_steps(baseline, h)))

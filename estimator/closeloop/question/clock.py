@@ -54,6 +54,11 @@ def rates(run: Run, residual: Array) -> Array:
     return np.column_stack([rate[some] for rate in _rates(run, residual)])
 
 
+def output_rates(run: Run, residual: Array) -> Array:
+    """Rates of the simulated outputs (N, n_y), from the residual (N, n_y)."""
+    return np.column_stack([*_rates(run, residual)])
+
+
 def _rates(run: Run, residual: Array) -> Iterator[Array]:
     """The rate of each simulated output, (N,)."""
     for y, r in zip(run.y.T, residual.T, strict=True):
