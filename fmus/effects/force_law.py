@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, ClassVar
@@ -184,8 +184,12 @@ def _compiled(law: type[ForceLaw]) -> _Compiled:
 
 def _left(law: type[ForceLaw], shape: dict[str, float], t: Array, q: Array, v: Array, force: Array) -> float:
     """Sum of squares of a force that a law with a shape and a constant leave unexplained."""
-    columns = [law.along({**shape, a: 1.0}, t, q, v) for a in law.amplitudes]
-    basis = np.column_stack([np.ones_like(t), *columns])
+    return unexplained(force, [law.along({**shape, a: 1.0}, t, q, v) for a in law.amplitudes])
+
+
+def unexplained(force: Array, columns: Sequence[Array]) -> float:
+    """Sum of squares of a force (n,) that regression on a constant and other forces (n,) leaves."""
+    basis = np.column_stack([np.ones_like(force), *columns])
     size = np.linalg.norm(basis, axis=0) + 1e-300
     rest = force - (basis / size) @ np.linalg.lstsq(basis / size, force, rcond=1e-9)[0]
     return float(rest @ rest)

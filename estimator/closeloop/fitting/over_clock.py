@@ -15,10 +15,11 @@ from estimator.record import Array
 
 
 def over_clock(baseline: Baseline, h: Hypothesis) -> Hypothesis:
-    """The hypothesis with what an offset would move its values in its covariance, to first order.
+    """The hypothesis with a covariance that allows for an offset of the outputs' clock, to first order.
 
-    Before the record is seen, the offset is uniform within a sample to both sides. What the values cannot
-    make up for then says how large it is: its mean square counts, by its estimate and the variance of that.
+    How far an offset moves the values counts times its mean square: the square of its estimate, and the
+    variance of the estimate. Before the record is seen, the offset is uniform within a sample to both sides.
+    The record then adds what the residual shows of it that no fitted value can make up for.
     """
     sample = baseline.problem.record.sample
     if baseline.problem.clock or not h.fit.unknowns:

@@ -2,11 +2,9 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from estimator.closeloop.screening.missing_force import MissingForce
 from fmus.effects import EFFECTS
-from fmus.effects.force_law import ForceLaw
+from fmus.effects.force_law import ForceLaw, unexplained
 
 
 def of_its_own(law: type[ForceLaw], values: Mapping[str, float], missing: MissingForce) -> float:
@@ -18,10 +16,7 @@ def of_its_own(law: type[ForceLaw], values: Mapping[str, float], missing: Missin
     motion = missing.t, missing.displacement, missing.velocity
     force = law.along(values, *motion)
     plain = [x.along(dict.fromkeys(x.amplitudes, 1.0), *motion) for x in plain_laws(law.over)]
-    basis = np.column_stack([np.ones_like(force), *plain])
-    basis /= np.linalg.norm(basis, axis=0) + 1e-300
-    rest = force - basis @ np.linalg.lstsq(basis, force, rcond=None)[0]
-    return float(rest @ rest / (force @ force + 1e-300))
+    return unexplained(force, plain) / (float(force @ force) + 1e-300)
 
 
 def plain_laws(over: str) -> list[type[ForceLaw]]:

@@ -211,9 +211,9 @@ def _held(t: _Task, own: Hypothesis, values: Mapping[str, float], beside: Sequen
 
 
 def _within(c: Candidate, known: Hypothesis) -> Candidate:
-    """A candidate whose unknowns of the machine are bounded by their 95 % intervals of a fit."""
+    """A candidate whose unknowns of the machine are bounded by their 95 % intervals in `known`."""
     values, errors = known.fit.theta, known.fit.std
-    machine = {u.name for u in chart([c]).machine}
+    machine = {u.name for u in chart([c]).machine} & errors.keys()
 
     def bounded(u: Unknown) -> Unknown:
         low = max(u.low, values[u.name] - WIDTH * errors[u.name])
@@ -221,8 +221,7 @@ def _within(c: Candidate, known: Hypothesis) -> Candidate:
         return replace(u, low=low, high=high) if low < high else u
 
     amplitudes, shape = (
-        tuple(bounded(u) if u.name in machine & errors.keys() else u for u in some)
-        for some in (c.amplitudes, c.shape)
+        tuple(bounded(u) if u.name in machine else u for u in some) for some in (c.amplitudes, c.shape)
     )
     return replace(c, amplitudes=amplitudes, shape=shape)
 
