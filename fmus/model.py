@@ -19,7 +19,6 @@ from fmus.effects.effect import Effect
 from fmus.effects.site import Site
 from fmus.integrators import integrator
 from fmus.integrators.integrator import Integrator
-from fmus.integrators.joined import joined_step
 from fmus.option import BuildOption, Choice, chosen
 from fmus.port import UNITS
 from fmus.variables import (
@@ -153,9 +152,9 @@ def equations(model: Model) -> Equations:
     return Equations(f, h, _method(model).step(f, _tolerated(model)))
 
 
-def joined(model: Model, made: Equations) -> cs.Function | None:
-    """The step of a model over several samples of its inputs; None where its method has no such step."""
-    return joined_step(made.f, _tolerated(model)) if _method(model).joins else None
+def joins(model: Model) -> bool:
+    """Whether a step over several samples of the inputs can take the place of the steps of a model's method."""
+    return _method(model).joins
 
 
 def _method(model: Model) -> Integrator:

@@ -13,7 +13,7 @@ class Integrator(ABC):
     """A method that integrates x' = f(x, u, p) with the inputs u held over the step.
 
     name: by which a model chooses it as its `method`; order: of convergence, in the limit of short steps;
-    joins: whether a step over several samples (see `joined`) can take the place of its steps.
+    joins: whether a step over several samples (see lanes_joined.c) can take the place of its steps.
     """
 
     name: ClassVar[str]

@@ -43,14 +43,14 @@ def sources(
     token: str,
     working: bool = False,
     in_rows: bool = False,
-    joined: cs.Function | None = None,
+    joins: bool = False,
 ) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others.
 
     working: for this machine and FMI 2.0 only, without derivatives, whose calls are refused; what the
     equations for several rows call is a unit of its own, `lanes_object.c`. in_rows: whether it is simulated
-    in rows, so that the equations of one instance are compiled without optimisation. joined: its step over
-    several samples, see fmus/integrators/joined.py.
+    in rows, so that the equations of one instance are compiled without optimisation. joins: whether a step
+    may go over several samples, see lanes_joined.c.
     """
     code, work = _equations(table.name, made, derivatives=not working)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
@@ -61,7 +61,7 @@ def sources(
         wrapper["lanes.h"] = f"#define WIDTH {widest()}\n{wrapper['lanes.h']}"
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
-    lanes = lanes_of((made.f, made.h, made.step, *([joined] if joined else ())))
+    lanes = lanes_of((made.f, made.h, made.step))
     rows = {"lanes_equations.c": lanes.functions, "lanes_called.c": lanes.called} if lanes else {}
     header = _header(
         table,
@@ -70,7 +70,7 @@ def sources(
         token,
         lanes=bool(lanes),
         working=working,
-        joins=bool(lanes and joined),
+        joins=bool(lanes) and joins,
         in_rows=bool(lanes) and in_rows and has_vectors(),
     )
     return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}

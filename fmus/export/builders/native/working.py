@@ -10,7 +10,7 @@ from fmus.export.builders.native.description2 import description2
 from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import table
 from fmus.files import write_at_once
-from fmus.model import Model, equations, joined
+from fmus.model import Model, equations, joins
 
 CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes.h", "quick.c")
 
@@ -27,7 +27,7 @@ def build_working(model: Model, out: Path, in_rows: bool = False) -> Path:
     """
     made = equations(model)
     about = table(model, made)
-    code = sources(about, made, 2, NO_TOKEN, working=True, in_rows=in_rows, joined=joined(model, made))
+    code = sources(about, made, 2, NO_TOKEN, working=True, in_rows=in_rows, joins=joins(model))
     files = identified(
         description2(about, NO_TOKEN, complete=False) | {n: text.encode() for n, text in code.items()}
     )
