@@ -8,7 +8,7 @@ come every FMU, the model description, the parameter tables and the Jacobians.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar
@@ -16,7 +16,8 @@ from typing import ClassVar
 import casadi as cs
 
 from fmus.effects.effect import Effect
-from fmus.effects.site import Site
+from fmus.effects.site import Law, Site
+from fmus.effects.switch import Switch
 from fmus.integrators import integrator
 from fmus.integrators.integrator import Integrator
 from fmus.option import BuildOption, Choice, chosen
@@ -47,6 +48,8 @@ class Model(Site, ABC):
     form_alike: ClassVar[tuple[str, ...]] = ()
     form_error: ClassVar[float] = 0.0
     build_options: ClassVar[tuple[BuildOption, ...]] = ()
+    # whether each law of an effect is a call that may be passed over while the law is off, see `Switch`
+    switched: ClassVar[bool] = False
 
     def __init__(
         self, effects: Iterable[tuple[type[Effect], str]] = (), probes: bool = False, **options: Choice
@@ -65,6 +68,12 @@ class Model(Site, ABC):
         self.build(self.effects)
         if probes:
             self._probe()
+
+    @classmethod
+    def with_switches(cls) -> type[Model]:
+        """The same model with `switched` laws, for many effects of which few are on at a time."""
+        same = {"__doc__": cls.__doc__, "__module__": cls.__module__, "switched": True}
+        return type(cls.__name__, (cls,), same)
 
     @property
     def about(self) -> str:
@@ -92,6 +101,22 @@ class Model(Site, ABC):
         graph = function if function.is_a("MXFunction") else function.wrap()
         inline, call = False, True
         return list(graph.call([cs.SX(a) for a in arguments], inline, call))
+
+    def by_law(
+        self, law: type[Law], symbols: Mapping[str, Expr], formula: Callable[..., Sequence[Expr]],
+        given: Sequence[Expr], through: bool = False,
+    ) -> Sequence[Expr]:  # fmt: skip
+        """See Site.by_law."""
+        if not self.switched:
+            return super().by_law(law, symbols, formula, given, through)
+        ordered = sorted(symbols, key=lambda name: name not in law.amplitudes)
+        first, end = len(given), len(given) + len(law.amplitudes)
+        x = [cs.SX.sym(f"x{i}") for i in range(len(given) + len(symbols))]
+        results = formula(law(dict(zip(ordered, x[first:], strict=True))), *x[:first])
+        name = Switch(first, end, through).name(law.kind)
+        called = cs.Function(name, [cs.vertcat(*x)], [cs.densify(cs.vertcat(*results))])
+        arguments = cs.vertcat(*given, *(symbols[name] for name in ordered))
+        return cs.vertsplit(self.call(called, arguments)[0])
 
     def of(self, *kinds: type[Variable]) -> list[Variable]:
         """Variables of the given kinds, in the order of declaration."""
@@ -123,7 +148,8 @@ def declared(model: type[Model]) -> dict[str, Variable]:
 class Equations:
     """A model as CasADi functions of column vectors: x, u, p in the order of `model.of(...)`.
 
-    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> (x after one internal step, its error).
+    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> (x after one internal step, its error). A step
+    calls f where the laws of the model's effects are switched, and holds its equations elsewhere.
     """
 
     f: cs.Function
@@ -149,11 +175,11 @@ def equations(model: Model) -> Equations:
     f = cs.Function("f", [x, u, p], [cs.cse(cs.vertcat(*dot.values()))], names, ["dx"])
     h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
     f, h = _own([f, h])
-    return Equations(f, h, _method(model).step(f, _tolerated(model)))
+    return Equations(f, h, _method(model).step(f, _tolerated(model), calls=model.switched))
 
 
 def joins(model: Model) -> bool:
-    """Whether a step over several samples of the inputs can take the place of the steps of a model's method."""
+    """Whether a step over several samples of the inputs can take the place of the steps of a model's own."""
     return _method(model).joins
 
 

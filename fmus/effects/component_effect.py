@@ -74,6 +74,8 @@ class ComponentEffect(Effect):
         shared = {
             p.name: site.add(replace(p, name=cls.name_at(location, p.name))) for p in cls.parameters("")
         }
-        law = cls({**shared, "clock": site.known("clock")})
+        shared["clock"] = site.known("clock")
         for name in place:
-            site.symbols[name] = law.changed(site.symbols[name])
+            [site.symbols[name]] = site.by_law(
+                cls, shared, lambda law, p: [law.changed(p)], [site.symbols[name]], True
+            )

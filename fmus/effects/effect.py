@@ -39,6 +39,7 @@ class Effect(ABC):
     complete: ClassVar[Mapping[str, float]] = MappingProxyType({})
     told: ClassVar[tuple[str, ...]] = ()
     asks: ClassVar[tuple[str, ...]] = ()
+    of_way: ClassVar[tuple[str, ...]] = ()  # parameters that make sense only where the way is known
     becomes: ClassVar[tuple[str, ...]] = ()
     one_way: ClassVar[tuple[str, ...]] = ()
     of_run: ClassVar[tuple[str, ...]] = ()

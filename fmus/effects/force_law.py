@@ -38,7 +38,6 @@ class ForceLaw(Effect):
 
     acts_on = "port"
     places: ClassVar[tuple[str, ...]] = ("rests", "turns", "slips")  # where the law makes sense
-    of_way: ClassVar[tuple[str, ...]] = ()  # parameters that make sense only where the way is known
     # shape parameters within which a turn of the force is rounded, by what they are part of: "velocity" or
     # "displacement"; the force may be as stiff as they are small
     rounded: ClassVar[Mapping[str, str]] = {}
@@ -142,17 +141,20 @@ class ForceLaw(Effect):
         shared |= {quantity: site.known(quantity) for quantity in cls.asks}
         if cls.of_way and site.has_way:
             shared["way"] = site.known("way")
-        acting: dict[str, Expr] = {}
         for i, port in enumerate(place.acting, 1):
             number = f"_{i}" if len(place.acting) > 1 else ""
             names = {s.name: cls.name_at(location, s.name + number) for s in cls.states(port.motion)}
             memory = {s.name: site.add(replace(s, name=names[s.name])) for s in cls.states(port.motion)}
-            law = cls({**shared, **memory})
-            rates = law.rates(port.displacement, port.velocity)
-            site.rates.update({names[name]: rate for name, rate in rates.items()})
-            port.act(acting, law.force(port.displacement, port.velocity))
-        for name, force in acting.items():
-            site.push(name, force)
+            given = site.force_at(port), port.displacement, port.velocity
+            force, *rates = site.by_law(cls, {**shared, **memory}, _added, given, through=True)
+            site.rates.update(zip(names.values(), rates, strict=True))
+            site.press(port, force)
+
+
+def _added(law: ForceLaw, others: Expr, q: Expr, v: Expr) -> list[Expr]:
+    """The force with that of others, and the derivatives of the law's states in the order of declaration."""
+    rates = law.rates(q, v)
+    return [others + law.force(q, v), *(rates[s.name] for s in law.states("translation"))]
 
 
 class _Compiled:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import casadi as cs
 import numpy as np
 from numpy.typing import NDArray
 
@@ -79,13 +80,19 @@ class InputEffect(Effect):
             for p in cls.parameters(u.unit)
         }
         value, rate = site.symbols[place], site.symbols.get(f"{place}_dot")
-        law = cls({**shared, **cls._memory(site, place, "")})
-        site.symbols[place] = within(u, law.passed(value))
-        cls._go_on(site, place, "", law.rates(value))
+        symbols = {**shared, **cls._memory(site, place, "")}
+        [site.symbols[place]] = site.by_law(
+            cls, symbols, lambda law, u_in: [within(u, law.passed(u_in))], [value], True
+        )
+        cls._go_on(site, place, "", symbols, value)
         if rate is not None:
-            late = cls({**shared, HOLD: 0.0, **cls._memory(site, place, "_dot")})
-            site.symbols[f"{place}_dot"] = late.passed_rate(value, rate)
-            cls._go_on(site, place, "_dot", late.rates(rate))
+            symbols = {**shared, **cls._memory(site, place, "_dot")}
+            if HOLD in symbols:
+                symbols[HOLD] = cs.SX(0.0)
+            [site.symbols[f"{place}_dot"]] = site.by_law(
+                cls, symbols, lambda law, u_dot, u_in: [law.passed_rate(u_in, u_dot)], [rate, value], True
+            )
+            cls._go_on(site, place, "_dot", symbols, rate)
 
     @classmethod
     def _memory(cls, site: Site, place: str, suffix: str) -> dict[str, Expr]:
@@ -99,5 +106,9 @@ class InputEffect(Effect):
         }
 
     @classmethod
-    def _go_on(cls, site: Site, place: str, suffix: str, rates: dict[str, Expr]) -> None:
-        site.rates.update({cls.name_at(place, name + suffix): rate for name, rate in rates.items()})
+    def _go_on(cls, site: Site, place: str, suffix: str, symbols: Mapping[str, Expr], u: Expr) -> None:
+        """The rates of its states."""
+        names = [s.name for s in cls.states("")]
+        if names:
+            found = site.by_law(cls, symbols, lambda law, u_in: [law.rates(u_in)[n] for n in names], [u])
+            site.rates.update({cls.name_at(place, n + suffix): r for n, r in zip(names, found, strict=True)})

@@ -87,7 +87,13 @@ class ParameterEffect(Effect):
                     shared[p.name] = site.add(replace(p, name=cls.name_at(location, own), doc=doc))
                 elif p.name not in shared:
                     shared[p.name] = site.add(replace(p, name=cls.name_at(location, p.name)))
-            site.symbols[name] = within(member, cls(shared).changed(site.symbols[name]))
+            [site.symbols[name]] = site.by_law(
+                cls,
+                shared,
+                lambda law, p, of=member: [within(of, law.changed(p))],
+                [site.symbols[name]],
+                True,
+            )
 
 
 def within(variable: Variable, value: Expr) -> Expr:

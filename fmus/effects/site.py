@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
 
 import casadi as cs
 
@@ -19,6 +19,7 @@ from fmus.variables import (
     Variable,
 )
 
+Law = TypeVar("Law", bound=Effect)
 CLOCK = State("s", doc="time since the start, for what depends on it", nominal=10.0, name="clock")
 WAY = State("m", doc="way since the start, for what depends on it", nominal=100.0, name="way")
 SORTS = {  # what a location of each sort is called
@@ -43,8 +44,10 @@ class Site:
     def __init__(self, variables: dict[str, Variable], symbols: dict[str, Expr]) -> None:
         self.variables, self.symbols, self.free_symbols = variables, symbols, dict(symbols)
         self.rates: dict[str, Expr] = {}
-        self.brought: set[str] = set()  # names of variables that are not the site's own
-        self._pushes: list[tuple[str, Expr]] = []
+        # by name, variables that are not the site's own, with the effect and location that brought them
+        self.brought: dict[str, tuple[type[Effect], str] | None] = {}
+        self._building: tuple[type[Effect], str] | None = None
+        self._pressed: dict[int, tuple[Port, Expr]] = {}  # forces of all effects at a port
 
     def ports(self) -> dict[str, Port]:
         """Locations at which a force can act, by the contract's names."""
@@ -75,26 +78,50 @@ class Site:
         chosen = list(effects)
         for effect, location in chosen:
             if effect.acts_on != "port":
-                effect.build(self, location, self._place_of(effect, location, effect.locations(self)))
+                self._build(effect, location, effect.locations(self))
         if any(effect.acts_on == "port" for effect, _ in chosen):
             at = self.ports()
             for effect, location in chosen:
                 if effect.acts_on == "port":
-                    effect.build(self, location, self._place_of(effect, location, at))
-        for name, force in self._pushes:
+                    self._build(effect, location, at)
+        acting: dict[str, Expr] = {}
+        for port, force in self._pressed.values():
+            port.act(acting, force)
+        for name, force in acting.items():
             self.symbols[name] = self.symbols[name] + force
-        self._pushes.clear()
+        self._pressed.clear()
 
-    def push(self, name: str, force: Expr) -> None:
-        """Have a force act through an input, after all effects have seen the motion without it."""
-        self._pushes.append((name, force))
+    def _build(self, effect: type[Effect], location: str, known: dict[str, Any]) -> None:
+        place = self._place_of(effect, location, known)
+        self._building = effect, location
+        effect.build(self, location, place)
+        self._building = None
+
+    def force_at(self, port: Port) -> Expr:
+        """The sum of the forces that effects put on a port so far."""
+        return self._pressed.get(id(port), (port, cs.SX(0.0)))[1]
+
+    def press(self, port: Port, force: Expr) -> None:
+        """Have this sum of forces act at a port, after all effects have seen the motion without it."""
+        self._pressed[id(port)] = port, force
+
+    def by_law(
+        self, law: type[Law], symbols: Mapping[str, Expr], formula: Callable[..., Sequence[Expr]],
+        given: Sequence[Expr], through: bool = False,
+    ) -> Sequence[Expr]:  # fmt: skip
+        """What a formula makes of a law with these symbols and of what is given.
+
+        through: whether the first result is the first of what is given where the law is off. All others are
+        zero then.
+        """
+        return formula(law(symbols), *given)
 
     def add(self, variable: Variable) -> Expr:
         """A further variable; its symbol."""
         if variable.name in self.variables:
             raise BadInput(f"{self.name}: '{variable.name}' is built in twice; name each effect once")
         self.variables[variable.name] = variable
-        self.brought.add(variable.name)
+        self.brought[variable.name] = None if variable in (CLOCK, WAY) else self._building
         self.symbols[variable.name] = self.free_symbols[variable.name] = cs.SX.sym(variable.name)
         return self.symbols[variable.name]
 

@@ -111,10 +111,17 @@ def joins(instance: Instance) -> bool:
 
 
 def base_of(description: FmuDescription, start: Mapping[str, float]) -> Array:
-    """Values of all variables that can be set, by reference: from `start`, by default their start values."""
+    """Values of all variables that can be set, by reference: from `start`, by default their start values.
+
+    Not a number for those that the description does not list, which have the library's start values.
+    """
     settable = {n: v for n, v in description.variables.items() if v.start is not None}
-    by_reference = sorted(settable, key=lambda n: settable[n].reference)
-    return np.array([float(start.get(n, settable[n].start or 0.0)) for n in by_reference])
+    first = 1 if description.fmi_version.startswith("3") else 0
+    base = np.full(max((v.reference for v in settable.values()), default=first - 1) + 1 - first, np.nan)
+    for n, v in settable.items():
+        given = start.get(n, v.start or 0.0)
+        base[v.reference - first] = np.inf if np.isnan(given) else given  # one is as wrong as the other
+    return base
 
 
 def _at(array: NDArray[Any]) -> int:

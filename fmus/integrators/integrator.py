@@ -30,12 +30,20 @@ class Integrator(ABC):
         shorter one (`fmus.export.runtime.stepping`). It is 0.0 where the method does not estimate it.
         """
 
-    def step(self, f: cs.Function, tolerated: Sequence[float]) -> cs.Function:
-        """The CasADi function step(x, u, p, dt) -> (x after dt, error) for f(x, u, p) -> x'."""
+    def step(self, f: cs.Function, tolerated: Sequence[float], calls: bool = False) -> cs.Function:
+        """The CasADi function step(x, u, p, dt) -> (x after dt, error) for f(x, u, p) -> x'.
+
+        calls: whether it calls f at each stage, else it holds the equations of f that often.
+        """
         kind: Expr = cs.SX if f.is_a("SXFunction") else cs.MX
         x, u, p = (kind.sym(f.name_in(i), f.size1_in(i)) for i in range(3))
         dt = kind.sym("dt")
-        x1, error = self.advance(lambda states: f(states, u, p), x, dt, tolerated)
+        graph = f.wrap() if calls else f
+
+        def rates(states: Expr) -> Expr:
+            return graph.call([states, u, p], False, calls)[0]
+
+        x1, error = self.advance(rates, x, dt, tolerated)
         if kind is cs.SX:
             both: Expr = cs.cse(cs.vertcat(x1, error))
             x1, error = both[:-1], both[-1]

@@ -21,7 +21,9 @@ from fmus.host.archive import describe
 from fmus.host.description import PortNames
 from fmus.host.fmu import Fmu
 from fmus.host.grading.check import grade
+from fmus.model import joins
 from fmus.models import MODELS
+from fmus.variables import State
 from tests.helpers.everything import EVERY_EFFECT, FALLBACK
 
 PORT = PortNames("carriage", "F_ext", "q_dot", "q")
@@ -222,15 +224,52 @@ def test_a_models_builder_offers_what_makes_sense_in_it(tmp_path):
     assert not {at for _, at in found} & {"pole_pairs", "T_w_ext"}
 
 
-def test_effects_that_share_an_fmu_do_not_change_each_others_numbers(tmp_path):
-    builder = ModelBuilder("drive", tmp_path / "shared")
-    for kind, at in builder.offers:
-        shared, start = builder(((kind, at),)), started(f"{kind}@{at}")
-        alone = build_working(Drive([(EFFECTS[kind], at)], probes=True), tmp_path / "alone.fmu", in_rows=True)
-        assert_array_equal(run(shared, start), run(alone, start))
+@pytest.mark.parametrize("joined", [False, True])
+def test_effects_that_share_a_library_do_not_change_each_others_numbers(joined, tmp_path):
+    """Two by two, in rows of which some have one of them, both or none; and from a start of their states."""
+    builder, rng = ModelBuilder("drive", tmp_path / "shared"), np.random.default_rng(1)
+    offers = list(builder.offers)
+    inputs = {"F": np.append(INPUTS["F"], 0.0)} if joined else INPUTS
+    for first, second in zip(offers, offers[1:] + offers[:1], strict=True):
+        alone = Drive([(EFFECTS[kind], at) for kind, at in sorted((first, second))], probes=True)
+        values = [started("@".join(e)) for e in (first, second)]
+        off = {n: 0.0 for own in values for n in own if n in amplitudes(alone)}
+        rows = [off | values[0], off | values[1], values[0] | values[1], off | {"M": 100.0}]
+        states = {s.name: 0.1 * rng.normal() for s in alone.of(State)}
+        found = []
+        for path in (builder((first, second)), build_working(alone, tmp_path / "alone.fmu", in_rows=True)):
+            with Fmu(path) as fmu:
+                assert set(fmu.description.states) == set(states)
+                whole = [values[0] | values[1] | row | states for row in rows]
+                found.append(fmu.simulate_rows(T, inputs, (*OUTPUTS, "q_ddot"), whole, joined))
+        assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)  # in another order of the effects
+        assert np.ptp(found[0], axis=0).max() > 0
 
 
-@pytest.mark.parametrize("model", sorted(MODELS))
+def amplitudes(model):
+    return {effect.name_at(at, name) for effect, at in model.effects for name in effect.amplitudes}
+
+
+@pytest.mark.parametrize("model", sorted(name for name in MODELS if joins(MODELS[name]())))
+def test_an_fmu_for_a_hypothesis_shows_no_other_effects(model, tmp_path):
+    """Its library has all that its model offers."""
+    builder = ModelBuilder(model, tmp_path)
+    for kind, at in (
+        builder.offers[0],
+        builder.offers[-1],
+        *(e for e in builder.offers if e[0] == "flexible_mode"),
+    ):
+        with Fmu(builder(((kind, at),))) as fmu, Fmu(builder(())) as bare:
+            more = set(fmu.description.variables) - set(bare.description.variables)
+            asked = {"clock", "way"} if EFFECTS[kind].asks or EFFECTS[kind].of_way else set()
+            assert more
+            assert all(
+                n.startswith(f"{kind}_{at}_") or n.startswith(tuple(asked)) for n in more if n[:4] != "der_"
+            )
+            assert not set(bare.description.variables) - set(fmu.description.variables)
+
+
+@pytest.mark.parametrize("model", sorted(name for name in MODELS if not joins(MODELS[name]())))
 def test_who_shares_an_fmu_does_not_depend_on_what_is_asked(model, tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hypotheses, "_once", lambda folder, effects, *_: effects)

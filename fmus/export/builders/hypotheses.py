@@ -15,7 +15,7 @@ from fmus.errors import BadInput
 from fmus.export.around.effects_alone import EffectsAlone
 from fmus.export.around.outside import Outside
 from fmus.export.builders.native.build import build_native
-from fmus.export.builders.native.working import build_working
+from fmus.export.builders.native.working import Working, build_working
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.container.carrier import build_carrier
 from fmus.export.container.coupled import COUPLING_STEP, build_coupled
@@ -23,12 +23,12 @@ from fmus.export.provenance import Origin
 from fmus.host.apart.isolation import Isolation
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription, PortNames
-from fmus.model import Model
+from fmus.model import Model, joins
 from fmus.models import model_class
 
 Effects = tuple[tuple[str, str], ...]  # (kind, location)
 LONGEST = 100  # characters of a folder's name, well below what file systems take
-# effects that share an FMU: to build one takes the time of fifty simulations, and ten add a tenth to these
+# effects that share an FMU where they are not switched: to build one takes the time of fifty simulations
 ABOARD = 10
 PLAIN = re.compile(r"[\w@+ .-]+")  # a name that is that of a folder on every file system
 
@@ -80,15 +80,21 @@ class ModelBuilder:
         """Path of an FMU with these effects and those that share it, all off at their start values.
 
         Which ones share it does not depend on the record, so that its library is kept for the next one.
-        Native where a C compiler is at hand, since hypotheses are run many times; PythonFMU otherwise.
+        Native where a C compiler is at hand, since hypotheses are run many times; otherwise a PythonFMU, with
+        these alone.
         """
-        aboard = _aboard(self.model, effects)
-        return _once(
-            self.folder,
-            aboard,
-            lambda path: build_working(self._model(aboard, probes=True), path, in_rows=True),
-            lambda path: build_python(self._model(aboard, probes=True), path),
-        )
+        try:
+            if effects and {*effects} <= {*_offered(self.model)} and joins(_bare(self.model)):
+                chosen = [(EFFECTS[kind], at) for kind, at in effects]
+                return _once(self.folder, effects, lambda to: _whole(self.model).write(to, chosen))
+            aboard = _aboard(self.model, effects)
+            return _once(
+                self.folder,
+                aboard,
+                lambda to: build_working(self._made(aboard, probes=True), to, in_rows=True),
+            )
+        except BadInput:
+            return _once(self.folder, effects, lambda to: build_python(self._made(effects, probes=True), to))
 
     def final(
         self, effects: Effects, starts: Mapping[str, float], out: Path, origin: Origin | None = None
@@ -105,12 +111,12 @@ class ModelBuilder:
         return build_native(model, out / f"{model.name}_augmented_native.fmu", origin=origin)
 
     def _found(self, effects: Effects, starts: Mapping[str, float]) -> Model:
-        model = self._model(effects, probes=False)
+        model = self._made(effects)
         for name in starts.keys() & model.variables.keys():
             model.variables[name] = replace(model.variables[name], start=starts[name])
         return model
 
-    def _model(self, effects: Effects, probes: bool) -> Model:
+    def _made(self, effects: Effects, probes: bool = False) -> Model:
         return model_class(self.model)([(EFFECTS[k], at) for k, at in effects], probes)
 
 
@@ -164,8 +170,11 @@ class ForeignBuilder:
         return _once(
             self.folder if self.coupling == COUPLING_STEP else self.folder / f"every {self.coupling:g} s",
             effects,
-            lambda path: build_carrier(self.fmu, self.ports, effects, path, self.coupling),
-            lambda path: build_coupled(self.fmu, self.ports, effects, path, step=self.coupling),
+            lambda to: _quickest(
+                to,
+                lambda path: build_carrier(self.fmu, self.ports, effects, path, self.coupling),
+                lambda path: build_coupled(self.fmu, self.ports, effects, path, step=self.coupling),
+            ),
             self.fmu.name,  # by which messages call it
         )
 
@@ -201,6 +210,13 @@ def co_simulated(fmu: Path, folder: Path) -> Path:
         build_carrier(fmu, (), (), part)
         part.replace(target)  # workers may build the same at once
     return target
+
+
+@cache
+def _whole(model: str) -> Working:
+    """The library of a model with all effects that it offers, each of which may be off."""
+    effects = [(EFFECTS[kind], at) for kind, at in _offered(model)]
+    return Working.of(model_class(model).with_switches()(effects, probes=True), in_rows=True)
 
 
 @cache
@@ -245,18 +261,15 @@ def _described(fmu: Path) -> FmuDescription:
     return describe(fmu)
 
 
-def _once(
-    folder: Path, effects: Effects, native: Callable[[Path], Path], python: Callable[[Path], Path],
-    file: str = "model.fmu",
-) -> Path:  # fmt: skip
-    """The build with these effects, made if it is not there yet: in Python if there is no compiler."""
+def _once(folder: Path, effects: Effects, build: Callable[[Path], object], file: str = "model.fmu") -> Path:
+    """The build with these effects, made if it is not there yet."""
     name = "+".join(["base", *(f"{k}@{at}" for k, at in effects)])
     if len(name) > LONGEST or not PLAIN.fullmatch(name):  # a slash would lead out of the folder
         name = f"{len(effects)}_effects_{sha256(name.encode()).hexdigest()[:16]}"
     target = folder / name / file
     if not target.exists():
         part = target.with_name(f"{os.getpid()}.fmu")
-        _quickest(part, native, python)
+        build(part)
         part.replace(target)  # workers may build the same at once
     return target
 

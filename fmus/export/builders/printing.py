@@ -6,14 +6,54 @@ with the same operations in the same order as in CasADi's own code.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from itertools import accumulate
-from typing import ClassVar
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import casadi as cs
 
 OF_A_TABLE = 2  # arguments of a look-up: the table, the place
+
+
+class Load(NamedTuple):
+    """An instruction of a scalar function: an argument, by its place, is read."""
+
+    to: str
+    place: int
+
+
+class Store(NamedTuple):
+    """An instruction of a scalar function: a result, by its place, is given."""
+
+    place: int
+    of: str
+
+
+class Line(NamedTuple):
+    """An instruction of a scalar function that is one line, what it assigns and what it reads."""
+
+    to: str
+    text: str
+    of: Sequence[str] = ()
+
+
+class Call(NamedTuple):
+    """An instruction of a scalar function: another one is called.
+
+    places: of those of the given scalars that are the calling function's own arguments. stored: places of
+    results that nothing else needs, by number.
+    """
+
+    function: cs.Function
+    given: Sequence[str]
+    wanted: Sequence[str | None]
+    places: Sequence[int | None]
+    stored: Mapping[int, int] = MappingProxyType({})
+
+
+Step: TypeAlias = Load | Store | Line | Call
 
 
 class Printer(ABC):
@@ -79,6 +119,20 @@ class Printer(ABC):
         """The lines of a function with what the language wants before and after them."""
         return lines
 
+    def sequence(self, steps: Sequence[Step]) -> list[str]:
+        """The lines of the instructions of a scalar function."""
+        lines: list[str] = []
+        for step in steps:
+            if isinstance(step, Load):
+                lines.append(self.assigned(step.to, self.element("x", step.place)))
+            elif isinstance(step, Store):
+                lines.append(self.assigned(self.element("y", step.place), step.of))
+            elif isinstance(step, Call):
+                lines += self.called(self.name(step.function), step.given, step.wanted)
+            else:
+                lines.append(step.text)
+        return lines
+
     def name(self, function: cs.Function) -> str:
         """The name of a function's text, which is written if it is not there yet."""
         key = hash(function)
@@ -93,28 +147,34 @@ class Printer(ABC):
     def _scalars(self, function: cs.Function) -> list[str]:
         """An SX function: its instructions, one after the other."""
         first_in, first_out = _first(function)
-        lines = self.array("w", function.sz_w())
+        steps: list[Step] = []
+        places: dict[int, int] = {}  # of the elements of w that are arguments still
         instructions = function.instructions_sx()
         for k in range(function.n_instructions()):
             code = function.instruction_id(k)
             to, of = function.instruction_output(k), function.instruction_input(k)
             if code == cs.OP_INPUT:
-                place = self.element("x", first_in[of[0]] + of[1])
-                lines.append(self.assigned(self.element("w", to[0]), place))
+                places[to[0]] = first_in[of[0]] + of[1]
+                steps.append(Load(self.element("w", to[0]), places[to[0]]))
+                continue
             elif code == cs.OP_OUTPUT:
-                place = self.element("y", first_out[to[0]] + to[1])
-                lines.append(self.assigned(place, self.element("w", of[0])))
+                steps.append(Store(first_out[to[0]] + to[1], self.element("w", of[0])))
             elif code == cs.OP_CONST:
+                into = self.element("w", to[0])
                 value = self.constant(float(function.instruction_constant(k)))
-                lines.append(self.assigned(self.element("w", to[0]), value))
+                steps.append(Line(into, self.assigned(into, value)))
             elif code == cs.OP_CALL:
                 given = [self.element("w", i) for i in of]
                 wanted = [self.element("w", i) if i >= 0 else None for i in to]
-                lines += self.called(self.name(instructions[k].which_function()), given, wanted)
+                own = [places.get(i) for i in of]
+                steps.append(Call(instructions[k].which_function(), given, wanted, own))
             else:
                 given = [self.element("w", i) for i in of]
-                lines.append(self.operation(code, self.element("w", to[0]), given))
-        return lines
+                into = self.element("w", to[0])
+                steps.append(Line(into, self.operation(code, into, given), given))
+            for i in to if code != cs.OP_OUTPUT else ():
+                places.pop(i, None)
+        return [*self.array("w", function.sz_w()), *self.sequence(steps)]
 
     def _switch(self, function: cs.Function) -> list[str]:
         calls = [self.name(case) for case in _cases(function)]

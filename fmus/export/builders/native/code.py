@@ -1,6 +1,7 @@
 """The C sources of a model: CasADi's code for its functions, a header of its tables, the wrapper's files."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,13 +45,15 @@ def sources(
     working: bool = False,
     in_rows: bool = False,
     joins: bool = False,
+    switched_by: Sequence[tuple[int, int]] = (),
 ) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others.
 
     working: for this machine and FMI 2.0 only, without derivatives, whose calls are refused; what the
     equations for several rows call is a unit of its own, `lanes_object.c`. in_rows: whether it is simulated
     in rows, so that the equations of one instance are compiled without optimisation. joins: whether a step
-    may go over several samples, see lanes_joined.c.
+    may go over several samples, see lanes_joined.c. switched_by: see `Model.switched`; for each state the
+    numbers of the parameters, from one to before another, that switch its law on.
     """
     code, work = _equations(table.name, made, derivatives=not working)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
@@ -72,6 +75,9 @@ def sources(
         working=working,
         joins=bool(lanes) and joins,
         in_rows=bool(lanes) and in_rows and has_vectors(),
+        switched_by=switched_by,
+        own_states=next((k for k, (first, end) in enumerate(switched_by) if first < end), len(switched_by)),
+        runs=lanes.runs if lanes else (),
     )
     return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}
 
@@ -105,7 +111,7 @@ def _derivatives(made: Equations) -> list[cs.Function]:
     return found
 
 
-def _header(table: Table, work: Work, fmi: int, token: str, **about: bool) -> str:
+def _header(table: Table, work: Work, fmi: int, token: str, **about: object) -> str:
     templates = Environment(
         loader=FileSystemLoader(HERE), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )

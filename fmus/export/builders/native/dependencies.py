@@ -34,7 +34,12 @@ def dependencies(made: Equations, model: Model) -> Dependencies:
     jacobian = stacked(made).jacobian()
     entries = jacobian.sparsity_out(0)
     rows, columns = entries.get_triplet()
-    word = {i: _how_it_varies(v) for i, v in enumerate(model.of(State, Input, Parameter))}
+    every = [
+        *model.of(State),
+        *model.of(Input),
+        *model.of(Parameter),
+    ]  # in the order of the functions' arguments
+    word = {i: _how_it_varies(v) for i, v in enumerate(every)}
     strength = ["constant", "fixed", "tunable", "dependent"]
     kinds = ["constant"] * len(rows)
     second = jacobian.jac_sparsity(0, 0, True)  # of the Jacobian's entries

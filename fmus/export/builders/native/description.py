@@ -67,6 +67,8 @@ def numbers(entry: Entry) -> dict[str, str]:
 
 def needs(unknown: Unknown, offset: int, kinds: bool = True) -> dict[str, str]:
     """What an unknown depends on, as attributes; `offset` from references to FMI's numbers."""
+    if unknown.depends_on is None:
+        return {}
     found = {"dependencies": " ".join(str(r + offset) for r in unknown.depends_on)}
     return found | ({"dependenciesKind": " ".join(unknown.kinds)} if kinds else {})
 

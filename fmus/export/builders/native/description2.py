@@ -48,12 +48,12 @@ def description2(table: Table, token: str, complete: bool = True) -> dict[str, b
     add_experiment(model, table)
     variables = SubElement(model, "ModelVariables")
     for entry in table.entries:
-        _add_variable(variables, entry)
+        _add_variable(variables, entry, table)
     _add_structure(model, table)
     return {"modelDescription.xml": text(model)}
 
 
-def _add_variable(parent: Element, entry: Entry) -> None:
+def _add_variable(parent: Element, entry: Entry, table: Table) -> None:
     about = {
         "name": entry.name,
         "valueReference": str(entry.reference),
@@ -62,7 +62,7 @@ def _add_variable(parent: Element, entry: Entry) -> None:
         **({"initial": entry.initial} if entry.initial else {}),
         "description": entry.description,
     }
-    derivative = {} if entry.derivative_of is None else {"derivative": str(entry.derivative_of + 1)}
+    derivative = {} if entry.derivative_of is None else {"derivative": str(table.number(entry.derivative_of))}
     SubElement(SubElement(parent, "ScalarVariable", about), "Real", numbers(entry) | derivative)
 
 
@@ -76,5 +76,5 @@ def _add_structure(parent: Element, table: Table) -> None:
         if unknowns:
             node = SubElement(structure, name)
             for unknown in unknowns:
-                about = {"index": str(unknown.reference + 1), **needs(unknown, 1, kinds)}
+                about = {"index": str(table.number(unknown.reference)), **needs(unknown, 1, kinds)}
                 SubElement(node, "Unknown", about)

@@ -13,7 +13,7 @@ from platformdirs import user_cache_path
 from fmus.export.builders.native.compilers import DEFINED, command, compile_library, host
 from fmus.files import write_at_once
 
-KEPT = 1000  # libraries on disk, of about 100 kB each
+KEPT = 1000  # libraries on disk, of 40 kB to 1 MB each
 DIGEST = sha256().digest_size
 OTHERS_MAY_WRITE = 0o022  # bits of a file's mode
 

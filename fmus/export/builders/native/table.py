@@ -4,8 +4,9 @@ References count states, inputs, parameters, outputs (as in every build), then d
 are no output, then the time where the FMI version wants it as a variable.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import count
 from typing import Any
 
@@ -37,19 +38,14 @@ class Entry:
     display_unit: str | None = None
     derivative_of: int | None = None  # reference of the state
 
-    @property
-    def number(self) -> int:
-        """Its place in the model description, from 1 on."""
-        return self.reference + 1
-
 
 @dataclass(frozen=True)
 class Unknown:
-    """A computed variable and the variables that it depends on, by reference."""
+    """A computed variable and the variables that it depends on, by reference; None where that is not told."""
 
     reference: int
-    depends_on: tuple[int, ...]
-    kinds: tuple[str, ...]  # FMI's words, one for each
+    depends_on: tuple[int, ...] | None = None
+    kinds: tuple[str, ...] = ()  # FMI's words, one for each
 
 
 @dataclass(frozen=True)
@@ -80,13 +76,39 @@ class Table:
     effects: tuple[str, ...]
     rights: dict[str, str]  # author, copyright, license as the attributes of the model description
 
+    @cached_property
+    def _numbers(self) -> dict[int, int]:
+        return {e.reference: number for number, e in enumerate(self.entries, 1)}
+
+    def number(self, reference: int) -> int:
+        """The place of a variable in the model description, from 1 on."""
+        return self._numbers[reference]
+
+    def without(self, names: Collection[str], effects: Collection[str]) -> "Table":
+        """The same with variables left out, with these effects; what depends on what is not said."""
+        left = {e.name: e.reference for e in self.entries if e.name in names}
+        gone = {*left.values()}
+        gone |= {e.reference for e in self.entries if e.derivative_of in gone}
+
+        def kept(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
+            return tuple(Unknown(u.reference) for u in unknowns if u.reference not in gone)
+
+        return replace(
+            self,
+            entries=tuple(e for e in self.entries if e.reference not in gone),
+            derivatives=kept(self.derivatives),
+            outputs=kept(self.outputs),
+            initial=kept(self.initial),
+            effects=tuple(effects),
+        )
+
 
 def table(model: Model, made: Equations) -> Table:
     """The table of a model."""
     entries, slopes, local = _entries(model)
     sizes = [len(model.of(kind)) for kind in KINDS]
     shown = {e.unit: e.display_unit for e in entries if e.display_unit}
-    needs = dependencies(made, model)
+    needs = [] if model.switched else dependencies(made, model)
     first_output = sum(sizes[:3])
     states = tuple(Unknown(i, (i,), ("constant",)) for i in range(sizes[0]))
     derivatives = tuple(_unknown(r, needs, i) for i, r in enumerate(slopes))
@@ -171,12 +193,16 @@ def rate_unit(unit: str) -> str:
 
 
 def _unknown(reference: int, needs: Dependencies, unknown: int) -> Unknown:
+    if not needs:
+        return Unknown(reference)
     found = needs[unknown]
     return Unknown(reference, tuple(found), tuple(found.values()))
 
 
 def _running(unknown: Unknown, sizes: list[int]) -> Unknown:
     """What it depends on while running: parameters are no argument then."""
+    if unknown.depends_on is None:
+        return unknown
     pairs = zip(unknown.depends_on, unknown.kinds, strict=True)
     kept = [(r, kind) for r, kind in pairs if r < sizes[0] + sizes[1]]
     return Unknown(unknown.reference, tuple(r for r, _ in kept), tuple(kind for _, kind in kept))

@@ -1,18 +1,70 @@
 """Native FMUs for simulations by railfmi itself: quick to compile, libraries kept for the next record."""
 
 import zipfile
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
+from fmus.effects.effect import Effect
 from fmus.export.builders.native.build import NO_TOKEN, identified, packed
 from fmus.export.builders.native.code import sources
 from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description2 import description2
 from fmus.export.builders.native.libraries import library
-from fmus.export.builders.native.table import table
+from fmus.export.builders.native.table import Table, table
 from fmus.files import write_at_once
 from fmus.model import Model, equations, joins
+from fmus.variables import Input, Parameter, State
 
+TOKEN = "token"  # a file beside the sources, which becomes what these are known by
+CLOCKS = ("clock", "way")  # states that some effects ask for
 CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes.h", "quick.c")
+
+
+@dataclass(frozen=True)
+class Working:
+    """A model's library for this machine, with what describes it and what its code is known by."""
+
+    table: Table
+    token: str
+    library: bytes
+    brought: Mapping[str, tuple[type[Effect], str] | None]  # see Site.brought
+
+    @classmethod
+    def of(cls, model: Model, in_rows: bool = False) -> "Working":
+        """See build_working."""
+        made = equations(model)
+        about = table(model, made)
+        by = _switches(model) if model.switched else ()
+        code = sources(
+            about, made, 2, NO_TOKEN, working=True, in_rows=in_rows, joins=joins(model), switched_by=by
+        )
+        sealed = {n: text.encode() for n, text in code.items()} | {TOKEN: NO_TOKEN.encode()}
+        sealed = identified(description2(about, NO_TOKEN, complete=False) | sealed)
+        apart = CALLED_BY_LANES if code.get("lanes_called.c") else ()
+        built = library({name: sealed[name] for name in code}, "fmu.c", apart=apart)
+        return cls(about, sealed[TOKEN].decode(), built, model.brought)
+
+    def write(self, out: Path, effects: Collection[tuple[type[Effect], str]] | None = None) -> None:
+        """Write it as an FMU; effects: of those that it has, the ones that are known outside, by default all.
+
+        The library is the same then; it keeps the others off.
+        """
+        about = self.table
+        if effects is not None:
+            needed = {
+                asked
+                for effect, _ in effects
+                for asked in (*effect.asks, *(["way"] if effect.of_way else []))
+            }
+            gone = [
+                n for n, by in self.brought.items()
+                if (by not in effects if by else n in CLOCKS and n not in needed)
+            ]  # fmt: skip
+            about = about.without(gone, [f"{effect.kind}@{place}" for effect, place in effects])
+        files = description2(about, self.token, complete=False)
+        files[f"binaries/{host().folder(2)}/{about.name}{host().suffix}"] = self.library
+        write_at_once(out, packed(files, zipfile.ZIP_STORED))
 
 
 def build_working(model: Model, out: Path, in_rows: bool = False) -> Path:
@@ -25,14 +77,20 @@ def build_working(model: Model, out: Path, in_rows: bool = False) -> Path:
     sources, page and record of provenance are left out, and nothing is compressed. Its library is taken
     from the user's cache folder if the same sources were compiled before. BadInput without a compiler.
     """
-    made = equations(model)
-    about = table(model, made)
-    code = sources(about, made, 2, NO_TOKEN, working=True, in_rows=in_rows, joins=joins(model))
-    files = identified(
-        description2(about, NO_TOKEN, complete=False) | {n: text.encode() for n, text in code.items()}
-    )
-    apart = CALLED_BY_LANES if code.get("lanes_called.c") else ()
-    built = library({name: files.pop(name) for name in code}, "fmu.c", apart=apart)
-    files[f"binaries/{host().folder(2)}/{model.name}{host().suffix}"] = built
-    write_at_once(out, packed(files, zipfile.ZIP_STORED))
+    Working.of(model, in_rows).write(out)
     return out
+
+
+def _switches(model: Model) -> list[tuple[int, int]]:
+    """See `sources`; an effect declares its amplitudes one after the other."""
+    amplitudes: dict[tuple[type[Effect], str], list[int]] = {}
+    for k, v in enumerate([*model.of(State), *model.of(Input), *model.of(Parameter)]):
+        by = model.brought.get(v.name)
+        if (
+            by
+            and isinstance(v, Parameter)
+            and by[0].is_amplitude(v.name.removeprefix(by[0].name_at(by[1], "")))
+        ):
+            amplitudes.setdefault(by, []).append(k)
+    found = (amplitudes.get(by) if (by := model.brought.get(v.name)) else None for v in model.of(State))
+    return [(min(own), max(own) + 1) if own else (0, 0) for own in found]

@@ -28,7 +28,7 @@ static bool has_vectors(void) { return true; }
 /* What is asked: rows of values to set at first, samples of inputs that all rows share, what to read. */
 typedef struct {
     size_t n_base;
-    const double *base; /* all that can be set, (N_SET) */
+    const double *base; /* the first of all that can be set, or all; what is not a number has its start value */
     size_t n_rows, n_put;
     const unsigned *put;
     const double *rows; /* (n_rows, n_put) */
@@ -85,9 +85,9 @@ LANES_EXPORTED int LANES_NAMED(railfmi_rows_at_once)(void) { return WIDTH; }
 LANES_EXPORTED long long LANES_NAMED(railfmi_rows_2)(Rows *asked) {
     if (!asked->processor) asked->processor = has_vectors() ? WITH_VECTORS : WITHOUT_VECTORS;
     if (asked->processor == WITHOUT_VECTORS) return 0;
-    if (asked->n_base != N_SET || asked->n_samples == 0 || asked->every == 0) return 0;
-    for (size_t k = 0; k < N_SET; k++)
-        if (!within((unsigned)k, asked->base[k])) return 0;
+    if (asked->n_base > N_SET || asked->n_samples == 0 || asked->every == 0) return 0;
+    for (size_t k = 0; k < asked->n_base; k++)
+        if (!isnan(asked->base[k]) && !within((unsigned)k, asked->base[k])) return 0;
     for (size_t k = 0; k < asked->n_put; k++)
         if (index_of(asked->put[k]) >= N_SET) return 0;
     for (size_t k = 0; k < asked->n_inputs; k++)

@@ -2,8 +2,9 @@
 
    An FMU holds its inputs over a communication step. Where inputs are samples of continuous signals, that makes an error
    of second order in the step, however exact the integrator is. A host that has the whole record can give a step the
-   samples within it instead: the step is then exact to fifth order, and takes the place of four. At the samples within a step, the states are on cubics through its ends with their slopes. A row for which a step is
-   no good makes four of a sample each, and what is no good even then is divided further, with its inputs held. */
+   samples within it instead: the step is then exact to fifth order, and takes the place of four. At the samples within
+   a step, the states are on cubics through its ends with their slopes. A row for which a step is no good makes four of a
+   sample each, and what is no good even then is divided further, with its inputs held. */
 
 enum { QUARTERS = 4 };
 #define GUARD 100.0         /* times the tolerated error of a state: what a step may miss before it is divided */
@@ -17,7 +18,7 @@ typedef double Driving[QUARTERS + 1][AT_LEAST_1(N_INPUTS)];
 
 VECTORS static void slopes_of(Group *m, const double *inputs, Lanes *slopes) {
     for (int j = 0; j < N_INPUTS; j++) m->values[FIRST_INPUT + j] = ALL(inputs[j]);
-    lanes_f(m->values, slopes);
+    lanes_f(m->values, m->on, m->runs, slopes);
 }
 
 /* Inputs by quarters of a quarter q of a step, on a curve of fourth order through those by quarters of the step. */
@@ -34,10 +35,11 @@ static void within_step(const Driving *whole, int q, Driving *part) {
     }
 }
 
-/* States `beyond` those of a group, by an expression of a state's number i, at a quarter of a step, and their slopes. */
-#define STAGE(beyond, quarter, slopes)                                                                            \
-    for (int i = 0; i < N_STATES; i++) at.values[i] = m->values[i] + (beyond);                                    \
-    slopes_of(&at, (*driving)[quarter], slopes);
+/* Of each state, the slope of a stage, and from its slopes k so far how far `beyond` its start the next stage is, at a
+   quarter of the step; then the slopes there. */
+#define STAGE(stage, beyond, quarter)                                                                             \
+    EACH_STATE(m, i, Lanes *k = stages[i]; k[stage] = after[i]; m->values[i] = x[i] + (beyond);)                  \
+    slopes_of(m, (*driving)[quarter], after);
 
 /* Advance the lanes of `going` from these slopes, and give those at the end; lanes for which the step is no good, `bad`,
    stay where they are.
@@ -46,22 +48,20 @@ static void within_step(const Driving *whole, int q, Driving *part) {
    Equations, section 32. A step is no good where it is unstable or by far too long: the slopes at its end are then not
    those of its last stage. How exact steps are that are good enough, this does not tell. */
 VECTORS static void join(
-    Group *m, const Driving *driving, double duration, const Bits *going, const Lanes *k1, Bits *bad, Lanes *after) {
-    Group at;
-    memcpy(at.values, m->values, sizeof at.values);
-    Lanes k2[N_STATES], k3[N_STATES], k4[N_STATES], k5[N_STATES], k6[N_STATES], dt = ALL(duration);
-    STAGE(dt / 4 * k1[i], 1, k2)
-    STAGE(dt / 8 * (k1[i] + k2[i]), 1, k3)
-    STAGE(dt / 2 * (2 * k3[i] - k2[i]), 2, k4)
-    STAGE(dt / 16 * (3 * k1[i] + 9 * k4[i]), 3, k5)
-    STAGE(dt / 7 * (8 * k5[i] + 12 * (k3[i] - k4[i]) + 2 * k2[i] - 3 * k1[i]), 4, k6)
-    STAGE(dt * (LAST_WEIGHT * (k1[i] + k6[i]) + 32.0 / 90 * (k3[i] + k5[i]) + 12.0 / 90 * k4[i]), 4, after)
+    Group *m, const Driving *driving, double duration, const Bits *going, const Lanes *slopes, Bits *bad, Lanes *after) {
+    Lanes x[N_STATES], stages[N_STATES][7], dt = ALL(duration); /* the stages of a state side by side, from 1 on */
+    EACH_STATE(m, i, x[i] = m->values[i]; after[i] = slopes[i];)
+    STAGE(1, dt / 4 * k[1], 1)
+    STAGE(2, dt / 8 * (k[1] + k[2]), 1)
+    STAGE(3, dt / 2 * (2 * k[3] - k[2]), 2)
+    STAGE(4, dt / 16 * (3 * k[1] + 9 * k[4]), 3)
+    STAGE(5, dt / 7 * (8 * k[5] + 12 * (k[3] - k[4]) + 2 * k[2] - 3 * k[1]), 4)
+    STAGE(6, dt * (LAST_WEIGHT * (k[1] + k[6]) + 32.0 / 90 * (k[3] + k[5]) + 12.0 / 90 * k[4]), 4)
     Bits good = *going;
-    for (int i = 0; i < N_STATES; i++) {
-        Lanes error = LAST_WEIGHT * dt * (after[i] - k6[i]) / (GUARD * (TOLERANCE * NOMINALS[i]));
-        good = good & (Bits)(MAGNITUDE(error) + at.values[i] * 0.0 <= 1.0); /* false where one is not finite */
-    }
-    for (int i = 0; i < N_STATES; i++) m->values[i] = CHOICE(good, at.values[i], m->values[i]);
+    EACH_STATE(
+        m, i, Lanes error = LAST_WEIGHT * dt * (after[i] - stages[i][6]) / (GUARD * (TOLERANCE * NOMINALS[i]));
+        good = good & (Bits)(MAGNITUDE(error) + m->values[i] * 0.0 <= 1.0);) /* false where one is not finite */
+    EACH_STATE(m, i, m->values[i] = CHOICE(good, m->values[i], x[i]);)
     *bad = *going & ~good;
 }
 
@@ -79,27 +79,27 @@ VECTORS static bool join_quarters(
             for (int j = 0; j < N_INPUTS; j++) m->values[FIRST_INPUT + j] = ALL((own[0][j] + own[QUARTERS][j]) / 2);
             if (!advance_group(m, part, &bad)) return false;
             slopes_of(m, own[QUARTERS], instead);
-            for (int k = 0; k < N_STATES; k++) next[k] = CHOICE(bad, instead[k], next[k]);
+            EACH_STATE(m, k, next[k] = CHOICE(bad, instead[k], next[k]);)
         }
-        for (int k = 0; k < N_STATES; k++) {
-            slopes[k] = CHOICE(*going, next[k], slopes[k]);
-            (*path)[q + 1][k] = CHOICE(*going, m->values[k], (*path)[q + 1][k]);
-        }
+        EACH_STATE(m, k, slopes[k] = CHOICE(*going, next[k], slopes[k]);
+                   (*path)[q + 1][k] = CHOICE(*going, m->values[k], (*path)[q + 1][k]);)
     }
     return true;
 }
 
-/* States at the samples within a step, from those at its ends and their slopes there. */
-VECTORS static void fill(Path *path, double duration, const Lanes *before, const Lanes *after, const Needed *needed) {
-    for (int k = 0; k < N_STATES; k++) {
-        if (!needed->states[k]) continue;
-        Lanes begin = (*path)[0][k], rise = (*path)[QUARTERS][k] - begin;
-        Lanes left = before[k] * duration - rise, right = rise - after[k] * duration;
-        for (int q = 1; q < QUARTERS; q++) {
-            double s = (double)q / QUARTERS;
-            (*path)[q][k] = begin + rise * s + (left * (1 - s) + right * s) * (s * (1 - s));
-        }
+/* A state at the samples within a step, from those at its ends and their slopes there. */
+VECTORS static inline void fill_state(Path *path, int k, double duration, Lanes before, Lanes after) {
+    Lanes begin = (*path)[0][k], rise = (*path)[QUARTERS][k] - begin;
+    Lanes left = before * duration - rise, right = rise - after * duration;
+    for (int q = 1; q < QUARTERS; q++) {
+        double s = (double)q / QUARTERS;
+        (*path)[q][k] = begin + rise * s + (left * (1 - s) + right * s) * (s * (1 - s));
     }
+}
+
+VECTORS static void fill(
+    const Group *m, Path *path, double duration, const Lanes *before, const Lanes *after, const Needed *needed) {
+    EACH_STATE(m, k, if (needed->states[k]) fill_state(path, k, duration, before[k], after[k]);)
 }
 
 /* All inputs at a sample. */
@@ -135,17 +135,17 @@ VECTORS static long long group_of_joined(const Rows *asked, size_t row) {
     for (; k + QUARTERS < asked->n_samples; k += QUARTERS) {
         double duration = asked->t[k + QUARTERS] - asked->t[k];
         for (int q = 0; q <= QUARTERS; q++) sampled(&m, asked, k + (size_t)q, driving[q]);
-        memcpy(path[0], m.values, sizeof path[0]);
+        EACH_STATE(&m, i, path[0][i] = m.values[i];)
         join(&m, &driving, duration, &everyone, slopes, &bad, after);
-        memcpy(path[QUARTERS], m.values, sizeof path[QUARTERS]);
-        fill(&path, duration, slopes, after, &needed);
+        EACH_STATE(&m, i, path[QUARTERS][i] = m.values[i];)
+        fill(&m, &path, duration, slopes, after, &needed);
         if (any_lane(&bad)) {
             if (!join_quarters(&m, &driving, duration, &bad, slopes, &path)) return (long long)row;
-            for (int j = 0; j < N_STATES; j++) after[j] = CHOICE(bad, slopes[j], after[j]);
+            EACH_STATE(&m, i, after[i] = CHOICE(bad, slopes[i], after[i]);)
         }
         for (int q = 1; q <= QUARTERS; q++) {
             if (q < QUARTERS && (k + (size_t)q) % asked->every) continue;
-            memcpy(m.values, path[q], sizeof path[q]);
+            EACH_STATE(&m, i, m.values[i] = path[q][i];)
             for (int j = 0; j < N_INPUTS; j++) m.values[FIRST_INPUT + j] = ALL(driving[q][j]);
             read_group(&m, asked, &needed, row, k + (size_t)q, active);
         }

@@ -2,7 +2,48 @@
 
 typedef struct {
     Lanes values[N_SET], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
+#ifdef SWITCHES
+    int moving[N_STATES], n_moving; /* states of laws that are on; slopes of the others are not computed */
+    bool on[N_SET], runs[N_RUNS];   /* whether a value is other than zero in any lane, and one of a run's */
+#else
+    bool on[1], runs[1];
+#endif
 } Group;
+
+/* Lines for each state number i that can move. */
+#ifdef SWITCHES
+#define EACH_STATE(m, i, ...)                                                                                      \
+    for (int i = 0; i < N_OWN_STATES; i++) {                                                                      \
+        __VA_ARGS__                                                                                               \
+    }                                                                                                             \
+    for (int n_ = 0; n_ < (m)->n_moving; n_++) {                                                                  \
+        int i = (m)->moving[n_];                                                                                  \
+        __VA_ARGS__                                                                                               \
+    }
+
+VECTORS static void find_moving(Group *m) {
+    m->n_moving = 0;
+    for (int k = 0; k < N_SET; k++) {
+        Bits other = (Bits)(m->values[k] != 0.0);
+        m->on[k] = any_lane(&other);
+    }
+    for (int i = 0; i < N_RUNS; i++) {
+        m->runs[i] = false;
+        for (int k = RUNS[i]; k < RUNS[i + 1]; k++) m->runs[i] = m->runs[i] || m->on[RUN[k]];
+    }
+    memset(m->slopes, 0, sizeof m->slopes);
+    for (int k = N_OWN_STATES; k < N_STATES; k++) {
+        bool moves = SWITCHED_BY[k][0] == SWITCHED_BY[k][1];
+        for (int by = SWITCHED_BY[k][0]; by < SWITCHED_BY[k][1]; by++) moves = moves || m->on[by];
+        if (moves) m->moving[m->n_moving++] = k;
+    }
+}
+#else
+#define EACH_STATE(m, i, ...)                                                                                      \
+    for (int i = 0; i < N_STATES; i++) {                                                                          \
+        __VA_ARGS__                                                                                               \
+    }
+#endif
 
 /* What has to be known to read what is asked. */
 typedef struct {
@@ -47,13 +88,13 @@ VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted)
         EACH(i) if (moving[i]) h[i] = h_now[i] = least(least(h_now[i], LONGEST_STEP), duration - done[i]);
         memcpy(given, m->values, sizeof m->values);
         given[N_SET] = h;
-        lanes_step(given, next);
+        lanes_step(given, m->on, m->runs, next);
         Lanes sum = next[N_STATES];
-        for (int k = 0; k < N_STATES; k++) sum = sum + next[k] * 0.0; /* not a number where a state is not finite */
+        EACH_STATE(m, k, sum = sum + next[k] * 0.0;) /* not a number where a state is not finite */
         Bits good = (Bits)(sum <= 1.0), going = ALL_BITS(0);
         EACH(i) going[i] = moving[i] ? -1 : 0;
         Bits taken = good & going;
-        for (int k = 0; k < N_STATES; k++) m->values[k] = CHOICE(taken, next[k], m->values[k]);
+        EACH_STATE(m, k, m->values[k] = CHOICE(taken, next[k], m->values[k]);)
         EACH(i) {
             if (!moving[i]) continue;
             double error = next[N_STATES][i];
@@ -79,8 +120,8 @@ VECTORS static void read_group(
     if (sample % asked->every || place < left_out) return;
     size_t n_found = (asked->n_samples - 1) / asked->every + 1 - left_out;
     place -= left_out;
-    if (needed->outputs) lanes_h(m->values, m->outputs);
-    if (needed->slopes) lanes_f(m->values, m->slopes);
+    if (needed->outputs) lanes_h(m->values, m->on, m->runs, m->outputs);
+    if (needed->slopes) lanes_f(m->values, m->on, m->runs, m->slopes);
     for (size_t k = 0; k < asked->n_get; k++) {
         unsigned from = index_of(asked->get[k]);
         const Lanes *value = from < N_SET         ? &m->values[from]
@@ -104,12 +145,18 @@ VECTORS static bool set_inputs(Group *m, const Rows *asked, const double *sample
 /* Set a group to its rows; the number of lanes that have one. */
 VECTORS static int begin_group(Group *m, const Rows *asked, size_t row) {
     int active = asked->n_rows - row < WIDTH ? (int)(asked->n_rows - row) : WIDTH;
-    for (int k = 0; k < N_SET; k++) m->values[k] = ALL(asked->base[k]);
+    for (size_t k = 0; k < N_SET; k++) {
+        double given = k < asked->n_base ? asked->base[k] : NAN;
+        m->values[k] = ALL(isnan(given) ? VARIABLES[k].start : given);
+    }
     for (size_t k = 0; k < asked->n_put; k++)
         EACH(i) {
             size_t from = row + (size_t)(i < active ? i : 0); /* lanes without a row do as the first one */
             m->values[index_of(asked->put[k])][i] = asked->rows[from * asked->n_put + k];
         }
+#ifdef SWITCHES
+    find_moving(m);
+#endif
     return active;
 }
 
