@@ -8,7 +8,7 @@ from pathlib import Path
 from fmus.effects.effect import Effect
 from fmus.export.builders.native.build import NO_TOKEN, identified, packed
 from fmus.export.builders.native.code import sources
-from fmus.export.builders.native.compilers import host
+from fmus.export.builders.native.compilers import command, host
 from fmus.export.builders.native.description2 import description2
 from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import Table, table
@@ -33,6 +33,7 @@ class Working:
     @classmethod
     def of(cls, model: Model, in_rows: bool = False) -> "Working":
         """See build_working."""
+        command(None, [host()])  # without a compiler the work would be for nothing
         made = equations(model)
         about = table(model, made)
         by = _switches(model) if model.switched else ()
