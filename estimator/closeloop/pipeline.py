@@ -174,7 +174,10 @@ class Chain:
         if not found.material:
             return found
         whole = self.stages.done("whole", lambda: calibrated_to_whole(shown.baseline))
-        return replace(of(replace(shown.baseline, hypothesis=whole)), whole=whole) if whole else found
+        if not whole:
+            return found
+        other = replace(shown.baseline, hypothesis=whole)
+        return replace(self.stages.done("detection_of_whole", lambda: of(other)), whole=whole)
 
     def _diagnosed(self, shown: Screened, detection: Detection) -> Diagnostics:
         self.tell("diagnostics", "fitting a black-box model and computing the smallest detectable effects")

@@ -92,7 +92,8 @@ def test_a_run_goes_on_where_it_stopped(carriage: Path, in_one_go: str, tmp_path
     assert "--resume" in capsys.readouterr().err
     assert not (out / "result.json").exists()
     with pytest.MonkeyPatch.context() as patch:
-        for done in ("calibrate", "missing_forces", "detect", "diagnose"):
+        patch.setattr(calibrated, "calibrate", refused)
+        for done in ("missing_forces", "detect", "diagnose"):
             patch.setattr(chain, done, refused)
         patch.setattr(screened, "onset", refused)
         patch.setattr(Fitter, "briefly", refused)
