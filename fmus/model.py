@@ -122,6 +122,10 @@ class Model(Site, ABC):
         """Variables of the given kinds, in the order of declaration."""
         return [v for v in self.variables.values() if isinstance(v, kinds)]
 
+    def settable(self) -> list[Variable]:
+        """What can be set, in the order of the equations' arguments: states, inputs, parameters."""
+        return [*self.of(State), *self.of(Input), *self.of(Parameter)]
+
     def _probe(self) -> None:
         """Open each location by a force input and by outputs of its motion."""
         for location, port in self.ports().items():
@@ -148,8 +152,8 @@ def declared(model: type[Model]) -> dict[str, Variable]:
 class Equations:
     """A model as CasADi functions of column vectors: x, u, p in the order of `model.of(...)`.
 
-    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> (x after one internal step, its error). A step
-    calls f where the laws of the model's effects are switched, and holds its equations elsewhere.
+    f(x, u, p) -> x', h(x, u, p) -> y, step(x, u, p, dt) -> (x after one internal step, its error). The
+    step of a model with switched laws calls f at each stage. Any other step contains its equations instead.
     """
 
     f: cs.Function

@@ -120,7 +120,7 @@ def base_of(description: FmuDescription, start: Mapping[str, float]) -> Array:
     base = np.full(max((v.reference for v in settable.values()), default=first - 1) + 1 - first, np.nan)
     for n, v in settable.items():
         given = start.get(n, v.start or 0.0)
-        base[v.reference - first] = np.inf if np.isnan(given) else given  # one is as wrong as the other
+        base[v.reference - first] = np.inf if np.isnan(given) else given  # the library refuses it
     return base
 
 

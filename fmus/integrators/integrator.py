@@ -33,7 +33,7 @@ class Integrator(ABC):
     def step(self, f: cs.Function, tolerated: Sequence[float], calls: bool = False) -> cs.Function:
         """The CasADi function step(x, u, p, dt) -> (x after dt, error) for f(x, u, p) -> x'.
 
-        calls: whether it calls f at each stage, else it holds the equations of f that often.
+        calls: whether the step calls f at each stage; otherwise it contains its equations instead.
         """
         kind: Expr = cs.SX if f.is_a("SXFunction") else cs.MX
         x, u, p = (kind.sym(f.name_in(i), f.size1_in(i)) for i in range(3))

@@ -7,9 +7,7 @@ import casadi as cs
 from fmus.model import Equations, Model
 from fmus.variables import (
     Expr,
-    Input,
     Parameter,
-    State,
     Variable,
 )
 
@@ -34,12 +32,7 @@ def dependencies(made: Equations, model: Model) -> Dependencies:
     jacobian = stacked(made).jacobian()
     entries = jacobian.sparsity_out(0)
     rows, columns = entries.get_triplet()
-    every = [
-        *model.of(State),
-        *model.of(Input),
-        *model.of(Parameter),
-    ]  # in the order of the functions' arguments
-    word = {i: _how_it_varies(v) for i, v in enumerate(every)}
+    word = {i: _how_it_varies(v) for i, v in enumerate(model.settable())}
     strength = ["constant", "fixed", "tunable", "dependent"]
     kinds = ["constant"] * len(rows)
     second = jacobian.jac_sparsity(0, 0, True)  # of the Jacobian's entries

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fmus.effects.effect import Effect
+from fmus.effects.site import CLOCK, WAY
 from fmus.export.builders.native.build import NO_TOKEN, identified, packed
 from fmus.export.builders.native.code import sources
 from fmus.export.builders.native.compilers import command, host
@@ -14,10 +15,9 @@ from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import Table, table
 from fmus.files import write_at_once
 from fmus.model import Model, equations, joins
-from fmus.variables import Input, Parameter, State
+from fmus.variables import Parameter, State
 
 TOKEN = "token"  # a file beside the sources, which becomes what these are known by
-CLOCKS = ("clock", "way")  # states that some effects ask for
 CALLED_BY_LANES = ("lanes_object.c", "lanes_called.c", "lanes.h", "quick.c")
 
 
@@ -53,15 +53,10 @@ class Working:
         """
         about = self.table
         if effects is not None:
-            needed = {
-                asked
-                for effect, _ in effects
-                for asked in (*effect.asks, *(["way"] if effect.of_way else []))
-            }
-            gone = [
-                n for n, by in self.brought.items()
-                if (by not in effects if by else n in CLOCKS and n not in needed)
-            ]  # fmt: skip
+            idle = {CLOCK.name, WAY.name} - {name for effect, _ in effects for name in effect.asks}
+            if any(effect.of_way for effect, _ in effects):
+                idle.discard(WAY.name)
+            gone = [n for n, by in self.brought.items() if n in idle or (by and by not in effects)]
             about = about.without(gone, [f"{effect.kind}@{place}" for effect, place in effects])
         files = description2(about, self.token, complete=False)
         files[f"binaries/{host().folder(2)}/{about.name}{host().suffix}"] = self.library
@@ -85,7 +80,7 @@ def build_working(model: Model, out: Path, in_rows: bool = False) -> Path:
 def _switches(model: Model) -> list[tuple[int, int]]:
     """See `sources`; an effect declares its amplitudes one after the other."""
     amplitudes: dict[tuple[type[Effect], str], list[int]] = {}
-    for k, v in enumerate([*model.of(State), *model.of(Input), *model.of(Parameter)]):
+    for k, v in enumerate(model.settable()):
         by = model.brought.get(v.name)
         if (
             by
