@@ -31,6 +31,12 @@ fault in `late` happens in `fmi2DoStep` at t = 0.05 s. "One line" and "one sente
 stream. "All commands" are
 {commands}.
 
+In short: an FMU that crashes, hangs, takes all memory or returns an error ends the command with one
+sentence that names the FMU, the call and the time, and exit code 2; what was recorded or finished is kept.
+Numbers that are not finite never pass for a result. A full disk, a signal or a damaged file leaves no
+half-written result. Archives and XML that would harm the machine are refused before anything of them is
+used.
+
 | fault | command | what happens | test |
 |---|---|---|---|
 """

@@ -118,8 +118,7 @@ def _several(case: Case) -> Story:
     explained, rest = explained_words(case)
     return Story(
         _lacks(case, "Together they close"),
-        f"No single effect explains the residual. These effects together explain {explained}, and each is "
-        f"needed.{rest}",
+        f"These effects together explain {explained}, and each is needed.{rest}",
         "The effects were built into the FMU. Their parameters were fitted to the identify part by "
         "simulation, together with the calibrated parameters.",
     )
