@@ -74,8 +74,9 @@ class Equilibria:
         x, sizes = self._last, self.flow.nominal
         for _ in range(MOST):
             after, slopes = self._stepped(x, p)
-            move = lstsq(slopes - np.eye(len(x)), (x - after) / sizes)[0]
-            x = x + move * sizes
+            with np.errstate(over="ignore", invalid="ignore"):  # a step that leads nowhere
+                move = lstsq(slopes - np.eye(len(x)), (x - after) / sizes)[0]
+                x = x + move * sizes
             if not np.isfinite(x).all():
                 break
             if np.abs(move).max() <= PRECISE * max(1.0, float(np.abs(x / sizes).max())):

@@ -4,6 +4,7 @@ import ast
 import errno
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
@@ -28,6 +29,7 @@ COMMANDS = {  # module by the name of its command
 
 UNWRITABLE = (*DISK, errno.EACCES, errno.EPERM)  # errors of a disk or a folder
 
+OWN_FAULT = 70  # exit code of a command that failed by a fault of railfmi, EX_SOFTWARE of BSD's sysexits.h
 PIPE_CLOSED = 1  # exit code of a command whose output nobody reads, as that of the library click
 
 # libraries' worker processes would each use every core for small matrices
@@ -143,10 +145,21 @@ def _run_safely(arguments: Sequence[str]) -> int:
             return _wrong(error)
         shown = getattr(error, "format_message", None)  # click's own errors of usage
         if shown is None:
-            raise
+            return _own_fault(error)
         if shown():  # empty if the help was shown
             return _wrong(" ".join(shown().split()))
         return 2
+
+
+def _own_fault(error: Exception) -> int:
+    """Say that railfmi failed, and how to report it; the exit code."""
+    if VOICE.verbose:
+        said.print(traceback.format_exc(), markup=False, soft_wrap=True)
+    _wrong(
+        f"internal error, {type(error).__name__}: {error}; this is a fault of railfmi: please report it, "
+        "with what the same command prints with -v"
+    )
+    return OWN_FAULT
 
 
 def _flush_output() -> None:

@@ -49,6 +49,8 @@ def bifurcation(
         fmu, parameter, low, high, output, _values(held or []), tuple(state or ()), step,
         float("inf") if largest is None else largest,
     )  # fmt: skip
+    if not question.largest > 0:
+        raise BadInput(f"--largest {question.largest:g}: give an amplitude above 0")
     isolation = None if trust_fmu else Isolation(call_limit, run_limit, memory_limit)
     will_write(out)
     with progress("unpacking the FMU") as status:

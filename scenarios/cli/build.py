@@ -39,6 +39,8 @@ def build(
     **options: Choice | None,
 ) -> None:
     """Build FMUs of the models, with or without effects."""
+    if effect and not models:
+        raise BadInput(f"--effect {effect[0]}: name the model that gets it, of {', '.join(MODELS)}")
     given = {name: value for name, value in options.items() if value is not None}
     made = [model_with(name, effect or [], given) for name in models or MODELS]
     write = _writer(kind, fmi, platform or [], compiler)

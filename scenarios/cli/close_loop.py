@@ -34,7 +34,7 @@ def close_loop(
     out: Out = RESULTS / "close-loop",
     data: Annotated[Path | None, typer.Option(help="folder of the data files, if elsewhere")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="processes; one per core by default")] = None,
-    seed: Annotated[int, typer.Option(help="seed of the random numbers")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the random numbers")] = 0,
     resume: Annotated[
         bool, typer.Option("--resume", help="continue from the checkpoints of an interrupted run")
     ] = False,

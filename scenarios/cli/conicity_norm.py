@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from fmus import limits
+from fmus.errors import BadInput
 from scenarios.cli.console import RESULTS, Out, app, will_write
 from scenarios.cli.voice import echo, found, progress
 
@@ -41,12 +42,15 @@ def conicity_norm(
 ) -> None:
     """Test the calculation, and the reading of points, by EN 15302; exit 1 if a conicity is outside."""
     from scenarios.conicity.norm.measuring import Instrument, reader_of
-    from scenarios.conicity.norm.pairs import references
+    from scenarios.conicity.norm.pairs import check_folder, references
     from scenarios.conicity.norm.report import NormReport
     from scenarios.conicity.norm.steps import step_1, step_2
     from scenarios.output import writable, written_at_once
 
     pairs = references(pair)
+    check_folder(reference, pairs)
+    if smoothing is not None and not smoothing > 0:
+        raise BadInput(f"--smoothing {smoothing:g}: give the noise of the points, m, above 0")
     instrument = Instrument(reader_of(reader, smoothing), random, grid, spacing, seed)
     will_write(out)
     folder = writable(out)

@@ -1,5 +1,7 @@
 """Parts shared by all commands: the application, the console for progress, common options."""
 
+import errno
+import os
 from collections.abc import Callable, Sequence
 from functools import wraps
 from importlib.metadata import version
@@ -79,7 +81,9 @@ def railfmi(
 
 
 def declared(file: Path, what: str = EXPERIMENT) -> Path:
-    """A file of declarations; BadInput where it is a file of another kind, such as a record or an FMU."""
+    """A file of declarations; BadInput where there is none, or a file of another kind, such as a record."""
+    if not file.exists():
+        raise BadInput(f"{file}: cannot be read ({os.strerror(errno.ENOENT)}); give the path of {what}")
     if file.is_file() and file.suffix.lower() != ".toml":
         raise BadInput(f"{file}: is no file of TOML; give {what}")
     return file

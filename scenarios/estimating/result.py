@@ -1,5 +1,6 @@
 """The result of estimate, as it is written to result.json and estimate.csv."""
 
+import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -167,6 +168,7 @@ def estimated(
     variables = joint.archive.description.variables
     unit = {n: v.unit for n, v in variables.items()}
     unit |= {name: unit[of] for name, of in joint.noises.items()}
+    unit |= {rate: f"{u}/s" for n, u in [*unit.items()] if u and (rate := f"{n}_rate") not in unit}
     believed = {p.name: [p.start, p.std] for p in joint.parameters if not p.walk and p.name not in form}
     return {
         name: {
@@ -246,9 +248,9 @@ def finite(value: float) -> float | None:
 
 def write_csv(path: Path, names: tuple[str, ...], t: Array, value: Array, std: Array) -> None:
     """Write the columns time, then NAME and NAME_std of each quantity."""
-    header = ",".join(["time", *(c for n in names for c in (n, f"{n}_std"))])
-    with path.open("w", encoding="latin1") as stream:
-        stream.write(f"{header}\n")
+    header = ["time", *(c for n in names for c in (n, f"{n}_std"))]
+    with path.open("w", encoding="utf-8") as stream:
+        csv.writer(stream, lineterminator="\n").writerow(header)  # names of an FMU may hold commas
         for rows in blocks(len(t), 8 * (1 + 2 * len(names))):
             both = np.stack([value[rows], std[rows]], axis=2).reshape(-1, 2 * len(names))
             np.savetxt(stream, np.column_stack([t[rows], both]), fmt="%.9g", delimiter=",")

@@ -146,7 +146,7 @@ def init(
     if not made.outputs:
         raise BadInput(
             f"{', '.join(map(str, records))}: no column looks like an output of {model.name} "
-            f"({', '.join(description.outputs)}); the columns are {', '.join(made.columns)}; rename one, or "
+            f"({', '.join(description.outputs)}); {_columns(made)}; rename one, or "
             "run the command on a terminal, where it asks"
         )
     with during("finding how far the clocks of the files are apart"):
@@ -166,6 +166,12 @@ def init(
     finally:
         part.unlink(missing_ok=True)
     return Initialised(file, made, tuple(records))
+
+
+def _columns(made: Draft) -> str:
+    if made.columns:
+        return f"the columns are {', '.join(made.columns)}"
+    return "no column beside the time holds numbers in enough rows"
 
 
 def _asked(made: Draft, ask: Ask) -> Draft:

@@ -123,7 +123,12 @@ def _shown(value: Value, unit: str | None, where: str) -> Array:
     """Samples in the unit that the axis shows."""
     if unit is None or value.unit is None:
         return np.asarray(value.y, dtype=np.float64)
-    factor, offset = conversion(value.unit, unit, where)
+    try:
+        factor, offset = conversion(value.unit, unit, where)
+    except BadInput as error:
+        raise BadInput(
+            f"{where}: curves in '{value.unit}' cannot be shown in '{unit}'; give a unit of the same kind"
+        ) from error
     return np.asarray(factor * value.y + offset, dtype=np.float64)
 
 

@@ -154,6 +154,32 @@ USAGE = {
     "FMI version that is not built": (["build", "testrig", "--fmi", "1"], "--fmi 1"),
     "no such FMU": (["check", "gone.fmu"], "gone.fmu"),
     "a number that is none": (["close-loop", "x", "--jobs", "many"], "--jobs"),
+    "a seed below zero": (["close-loop", "x", "--seed", "-5"], "--seed"),
+    "no such experiment": (["close-loop", "gone"], "railfmi init"),
+    "an effect for every model": (["build", "--effect", "viscous_damping@roller"], "name the model"),
+    "a branch without length": (
+        [
+            "bifurcation",
+            "x.fmu",
+            "--parameter",
+            "V",
+            "--from",
+            "1",
+            "--to",
+            "2",
+            "--output",
+            "y",
+            "--largest",
+            "-1",
+        ],
+        "--largest",
+    ),
+    "a folder without tables": (["conicity-norm", "--reference", "gone"], "WheelARailA_conicity.csv"),
+    "points without noise": (["conicity-norm", "--smoothing", "0"], "--smoothing"),
+    "wheels beside the rails": (
+        ["conicity", "--wheel", "S1002", "--rail", "60E1", "--gauge", "1"],
+        "never touch",
+    ),
 }
 
 
@@ -169,6 +195,19 @@ def test_wrong_usage_gets_one_line_and_exit_2(
     assert len(lines) == 1, lines
     assert word in lines[0]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_fault_of_railfmi_is_one_line_and_has_an_exit_code_of_its_own(monkeypatch, capfd):
+    def fails(*_):
+        raise TypeError("not this")
+
+    monkeypatch.setattr("fmus.host.grading.check.grade", fails)
+    assert railfmi("check", "x.fmu") == 70
+    [line] = capfd.readouterr().err.strip().splitlines()
+    assert "TypeError: not this" in line
+    assert "please report it" in line
+    assert railfmi("check", "x.fmu", "-v") == 70
+    assert "Traceback" in capfd.readouterr().err
 
 
 def test_build_and_check_work_together(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

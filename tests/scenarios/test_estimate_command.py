@@ -5,12 +5,14 @@ import re
 import shutil
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fmus.errors import BadInput
 from fmus.host.fmu import Fmu
 from scenarios.estimating.alarms import stretches
 from scenarios.estimating.estimating import estimate
+from scenarios.estimating.result import write_csv
 from scenarios.experiment.estimated import Alarm, Options
 from tests.estimator.test_filters_fmu import PYTHON_VDP, SHOW_SPEED
 from tests.helpers.vdp import solved
@@ -344,6 +346,12 @@ def test_without_the_table_there_is_nothing_to_estimate(vdp, tmp_path):
     with pytest.raises(BadInput, match=r"has no \[estimate\]; list there the parameters"):
         estimate(file, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["A[1,2]", 'x"y', "ω_0", "µ"])
+def test_a_name_with_any_letters_is_one_column(name, tmp_path):
+    write_csv(tmp_path / "estimate.csv", (name,), np.arange(3.0), np.ones((3, 1)), np.zeros((3, 1)))
+    assert list(pd.read_csv(tmp_path / "estimate.csv")) == ["time", name, f"{name}_std"]
 
 
 @pytest.mark.parametrize("where", ["write_csv", "write_page"])

@@ -94,9 +94,22 @@ def references(named: Sequence[str] | None = None) -> list[Reference]:
     return [known[name] for name in named or known]
 
 
+def check_folder(folder: Path | None, pairs: Sequence[Reference]) -> None:
+    """BadInput if a folder has none of the norm's tables of some pairs."""
+    if folder is not None and not any(_table(folder, p, what).is_file() for p in pairs for what in COLUMNS):
+        raise BadInput(
+            f"--reference {folder}: has no table of these pairs; give a folder with files such as "
+            f"{_table(folder, pairs[0], 'conicity').name}"
+        )
+
+
+def _table(folder: Path, pair: Reference, what: str) -> Path:
+    return folder / f"Wheel{pair.name}RailA_{what}.csv"
+
+
 def printed(folder: Path | None, pair: Reference, what: str) -> pd.DataFrame | None:
     """The norm's table "dr" or "conicity" of a pair, where the folder has it; mm as printed."""
-    file = None if folder is None else folder / f"Wheel{pair.name}RailA_{what}.csv"
+    file = None if folder is None else _table(folder, pair, what)
     if file is None or not file.is_file():
         return None
     check_text(file)
