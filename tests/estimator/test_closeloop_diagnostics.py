@@ -86,7 +86,7 @@ def found_in(base: Fit, change: Sequence[tuple[Candidate, Array]]) -> tuple[Arra
 def stated(base: Fit, change: Sequence[tuple[Candidate, Array]], seed: int) -> tuple[list[Visible], float]:
     """The power statement, and the limit that it was made with: the same draws give the same."""
     rng = np.random.default_rng(seed)
-    limit = threshold(alike(Calibration.of(base), [g for _, g in change], rng, M)[1], LEVEL, rng)
+    limit = threshold(alike(Calibration.of(base), [g for _, g in change], rng)[1], LEVEL, rng)
     return power(change, found_in(base, change), LEVEL, np.random.default_rng(seed)), limit
 
 
@@ -173,7 +173,7 @@ def test_long_regressors_are_as_alike_as_their_sums_say(seed: int) -> None:
     exact = Calibration.of(fitted(np.zeros(20_000), g[:, :1]))
     left = exact.without(g[:, 1:])
     left /= np.linalg.norm(left, axis=0)
-    length, found = alike(exact, [g for _, g in change], rng, 2000)
+    length, found = alike(exact, [g for _, g in change], rng)
     assert np.all(found[0] == 0)
     assert length[0] == 0
     assert_allclose(found[1:, 1:], left.T @ left, atol=6 / np.sqrt(2000))

@@ -46,7 +46,7 @@ def all_is_long(monkeypatch):
     monkeypatch.setattr(aside, "BLOCK", 1 << 12)
     monkeypatch.setattr(aside._SHELF, "_last", None)
     monkeypatch.setattr(changes, "TOGETHER", 1)
-    monkeypatch.setattr(regressors, "BATCH", 1)
+    monkeypatch.setattr(regressors, "READ_AT_ONCE", 1)
     monkeypatch.setattr(levers, "SAMPLES_AT_ONCE", 100)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.screening.regressors import RIDGE, Calibration, Changes, batches, is_wave
+from estimator.closeloop.screening.regressors import Batch, Calibration, Changes, batches, is_wave
 from estimator.record import Array
 from fmus.aside import set_aside
 
@@ -37,7 +37,7 @@ def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generato
     best = []
     for _ in range(copies):
         made = [decoy(spectrum, len(residual) // outputs, rng) for spectrum in spectra]
-        best.append(max(gain(residual, calibration.without(g)) for g in made))
+        best.append(max(calibration.left(Batch([g]), residual).gain(slice(None)) for g in made))
     return float(np.median(best))
 
 
@@ -50,11 +50,10 @@ def leading(base: Fit, change: Changes, outputs: int) -> list[Array]:
     residual = calibration.without(base.residual)
     best: dict[str, tuple[float, Array]] = {}
     some = iter([(c, g) for c, g in change if not is_wave(c)])
-    for places, batch in batches(g for c, g in change if not is_wave(c)):
-        left = calibration.without(batch)
-        gram, along = left.T @ left, left.T @ residual
-        for at, (c, g) in zip(places, some, strict=False):
-            reached = _gain(gram[at, at], along[at])
+    for batch in batches(g for c, g in change if not is_wave(c)):
+        left = calibration.left(batch, residual)
+        for at, (c, g) in zip(batch.places, some, strict=False):
+            reached = left.gain(at)
             if c.label not in best or reached > best[c.label][0]:
                 best[c.label] = reached, g
     order = sorted(best.values(), key=lambda found: -found[0])
@@ -76,15 +75,3 @@ def lines(g: Array, outputs: int) -> float:
     """Effective number of spectral lines of columns (m, k), the participation ratio of their power."""
     power = np.sum(np.abs(np.fft.rfft(g.reshape(-1, outputs, g.shape[1]), axis=0)) ** 2, axis=(1, 2))
     return float(power.sum() ** 2 / (np.sum(power**2) + 1e-300))
-
-
-def gain(residual: Array, g: Array) -> float:
-    """Reduction of the sum of squares of the residual (m,) by regression on columns (m, k)."""
-    return _gain(g.T @ g, g.T @ residual)
-
-
-def _gain(gram: Array, along: Array) -> float:
-    """The same by the products (k, k) of the columns with each other, and (k,) with the residual."""
-    size = np.sqrt(np.diag(gram) + 1e-300)
-    scaled = gram / size[:, None] / size + RIDGE * np.eye(len(size))
-    return float(along / size @ np.linalg.solve(scaled, along / size))

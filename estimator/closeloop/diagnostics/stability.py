@@ -11,7 +11,7 @@ import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
-from estimator.closeloop.screening.regressors import NOTHING, RIDGE, Changes, batches
+from estimator.closeloop.screening.regressors import RIDGE, Batch, Changes, batches, lengths_left
 from estimator.record import Array
 
 PAIRS = 25  # pairs of complementary halves
@@ -37,14 +37,14 @@ def stability(
     blocks = np.array_split(np.arange(len(base.residual)), BLOCKS)
     edges = [slice(int(b[0]), int(b[-1]) + 1) if len(b) else slice(0, 0) for b in blocks]
     jacobian = base.jacobian
-    own = _pieces(jacobian, base.residual, edges)
+    own, _ = _pieces(Batch([jacobian]), jacobian, base.residual, edges)
     inverse = np.linalg.pinv(np.einsum("hb,bnm->hnm", halves, own.gram), hermitian=True)
     gains: dict[str, Array] = {}
     candidates = iter([c for c, _ in change])
-    for places, g in batches(g for _, g in change):
-        every = _pieces(g, base.residual, edges)
-        across = np.einsum("hb,bnk->hnk", halves, np.array([jacobian[e].T @ g[e] for e in edges]))
-        for at, c in zip(places, candidates, strict=False):
+    for batch in batches(g for _, g in change):
+        every, beside = _pieces(batch, jacobian, base.residual, edges)
+        across = np.einsum("hb,bnk->hnk", halves, beside)
+        for at, c in zip(batch.places, candidates, strict=False):
             mine = _Pieces(every.gram[:, at, at], every.along[:, at])
             found = _gains(c, mine, own, across[:, :, at], inverse, halves)
             gains[c.label] = np.maximum(gains[c.label], found) if c.label in gains else found
@@ -63,9 +63,11 @@ def _halves(rng: np.random.Generator, pairs: int) -> Array:
     return np.vstack([one, ~one]).astype(float)
 
 
-def _pieces(columns: Array, residual: Array, edges: list[slice]) -> _Pieces:
-    gram = np.array([columns[e].T @ columns[e] for e in edges])
-    return _Pieces(gram, np.array([columns[e].T @ residual[e] for e in edges]))
+def _pieces(batch: Batch, jacobian: Array, residual: Array, edges: list[slice]) -> tuple[_Pieces, Array]:
+    """Those of a batch, and products (B, n, K) of the Jacobian (m, n) with its columns."""
+    found = (batch.products(jacobian, residual, within=e) for e in edges)
+    gram, across, along = (np.array(p) for p in zip(*found, strict=True))
+    return _Pieces(gram, along), across
 
 
 def _gains(c: Candidate, mine: _Pieces, own: _Pieces, across: Array, inverse: Array, halves: Array) -> Array:
@@ -80,7 +82,8 @@ def _gains(c: Candidate, mine: _Pieces, own: _Pieces, across: Array, inverse: Ar
         gram = gram - np.swapaxes(across, 1, 2) @ taken
         along = along - np.einsum("hnk,hn->hk", taken, halves @ own.along)
     left, whole = np.einsum("hkk->hk", gram), halves @ np.einsum("bkk->bk", mine.gram)
-    size = np.where(left > NOTHING**2 * whole, np.sqrt(np.maximum(left, 0.0)), np.inf)
+    length = lengths_left(whole, left)
+    size = np.where(length > 0, length, np.inf)
     scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(gram.shape[1])
     z = along / size
     beta = np.linalg.solve(scaled, z[..., None])[..., 0]

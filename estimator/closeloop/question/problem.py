@@ -53,6 +53,9 @@ def clock_within(most: float) -> Unknown:
 class Builder(Protocol):
     """Builds the FMU with effects; must be picklable, and must return quickly for effects built before."""
 
+    def __hash__(self) -> int:
+        """Equal builders build the same."""
+
     @property
     def offers(self) -> tuple[tuple[str, str], ...]:
         """(kind, location) of every effect that can be built in."""

@@ -7,7 +7,7 @@ FMU has hidden states.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import islice
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
-from estimator.closeloop.question.problem import Problem
+from estimator.closeloop.question.problem import Builder, Problem
 from estimator.closeloop.screening.grouped import group_size, grouped, grouped_fit
 from estimator.closeloop.screening.levers import Course, shifts
 from estimator.closeloop.screening.linear import (
@@ -45,6 +45,7 @@ FIRST_ORDER = 1e-3  # share of a change, to which an FMU answers to first order
 
 
 SHARES_TRIED = (1.0, FIRST_ORDER)  # of a change, of which the first is simulated that the FMU can follow
+EFFECTS_KEPT = 1024  # whose equations are kept for the next screening; no model offers as many
 RUNAWAY = 1e9  # weighted residual above which the linearised response is taken as diverged
 
 
@@ -67,7 +68,6 @@ class Screening:
         # prediction errors change from sample to sample, so that they have no means over groups
         self.group = group_size(problem, self._shown[0]) if weighting.is_white else 1
         self.fit = grouped_fit(base, len(weighting), self.group)
-        self._made: dict[str, Around] = {}
         self._local: tuple[Linearised, dict[str, Influence]] | None = None
 
     def changes(
@@ -114,9 +114,7 @@ class Screening:
 
     def _around(self, c: Candidate) -> Around:
         """The equations of a candidate's effect."""
-        if c.label not in self._made:
-            self._made[c.label] = around(self.problem.builder.outside(), [(c.kind, c.location)])
-        return self._made[c.label]
+        return _around(self.problem.builder, c.kind, c.location)
 
     @cached_property
     def samples(self) -> NDArray[np.intp]:
@@ -258,6 +256,12 @@ class Screening:
         """The change of the residual of `fit` by a change (m, n_y) of the outputs on the part to identify."""
         weighted = self.weighting.of(change, self._stretches).ravel()
         return grouped(-weighted, len(self.weighting), self.group)
+
+
+@lru_cache(maxsize=EFFECTS_KEPT)
+def _around(builder: Builder, kind: str, location: str) -> Around:
+    """The equations of an effect around the FMU of a builder."""
+    return around(builder.outside(), [(kind, location)])
 
 
 def _along(free: Course, missing: MissingForce) -> Course:

@@ -25,6 +25,7 @@ SAMPLES_AT_ONCE = 50_000  # samples whose steps CasADi makes in one call, which 
 ROUNDING, MOST = 1e-6, 100  # tolerance of the step count; largest number of steps between two samples
 STABLE = 2.0  # largest product of a step and the states' fastest rate; Runge-Kutta steps diverge above 2.8
 LOOKED_AT = 16  # samples at which that rate is looked for
+STEPS_KEPT = 256  # effects with states, whose compiled steps are kept
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def _fastest(made: Around, samples: int, m: Array, z: Sequence[Row]) -> float:
     return float(np.abs(np.linalg.eigvals(sound)).max(initial=0.0))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=STEPS_KEPT)
 def _slopes(made: Around) -> cs.Function:
     """Derivatives of the rates with respect to the states, at LOOKED_AT samples of (m, x, z)."""
     m, x, z = (cs.SX.sym(name, made.rates.size1_in(i)) for i, name in enumerate("mxz"))
@@ -101,7 +102,7 @@ def _between(at: Array, rows: Array) -> Array:
     return np.array([np.interp(at, np.arange(rows.shape[1]), row) for row in rows])
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=STEPS_KEPT)
 def _stepped(made: Around) -> tuple[Stepped, list[tuple[int, int]]]:
     """Runge-Kutta steps of the effect's states, and the rows of (m, x, z) in the w of these.
 

@@ -1,7 +1,14 @@
-"""Regressors of candidates, projected orthogonal to the Jacobian of the calibrated parameters."""
+"""Regressors of candidates, projected orthogonal to the Jacobian of the calibrated parameters.
+
+They are long and many, and what is asked of them follows from their products with each other, with the
+Jacobian and with the residual. These are summed over pieces of a few rows, which the processor's cache holds.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +21,9 @@ from fmus.aside import let_go
 Changes = Sequence[tuple[Candidate, Array]]  # candidates with their changes (m, k) of the weighted residual
 NOTHING = 1e-6  # share of a regressor's length after projection, below which only rounding is left
 RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
-COLUMNS_AT_ONCE = 64  # largest number of columns per batch
-SKETCHED = 2000  # length of the random sketch of a long regressor
-BATCH = 1 << 26  # bytes of a batch; copies of hundreds of long columns would not fit into memory
+COLUMNS_AT_ONCE = 64  # smallest number of columns per batch, if there are so many
+ROWS_AT_ONCE = 2000  # rows of a piece, and length of the random sketch of a long regressor
+READ_AT_ONCE = 1 << 26  # bytes that are read before their memory is released
 
 
 @dataclass(frozen=True)
@@ -26,7 +33,7 @@ class Calibration:
     basis: Array
 
     @classmethod
-    def of(cls, base: Fit) -> "Calibration":
+    def of(cls, base: Fit) -> Calibration:
         """The basis of the range of a fit's Jacobian."""
         jacobian = base.jacobian
         return cls(np.linalg.qr(jacobian)[0] if jacobian.shape[1] else jacobian)
@@ -36,23 +43,89 @@ class Calibration:
         rest: Array = x - self.basis @ (self.basis.T @ x)
         return rest
 
+    def left(self, batch: Batch, residual: Array) -> Left:
+        """What is left of the columns of a batch; residual: (m,), projected."""
+        own, within, along = batch.products(self.basis, residual)
+        return Left(np.diag(own), within, own - within.T @ within, along)
 
-def batches(columns: Iterable[Array]) -> Iterator[tuple[list[slice], Array]]:
-    """Columns (m, k) one set after the other, many in an array, with the slice of each set in it.
+
+@dataclass(frozen=True)
+class Left:
+    """Columns projected orthogonal to a basis, by their products.
+
+    squares: (K,) of the columns before; within: (n, K) of the basis with them; gram: (K, K) of what is left
+    with each other; along: (K,) of what is left with the residual.
+    """
+
+    squares: Array
+    within: Array
+    gram: Array
+    along: Array
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Lengths (K,) of what is left, 0 where that is rounding."""
+        return lengths_left(self.squares, np.diag(self.gram))
+
+    def gain(self, of: slice) -> float:
+        """Reduction of the residual's sum of squares by regression on some of the columns."""
+        size = np.where(self.lengths[of] > 0, self.lengths[of], np.inf)
+        scaled = self.gram[of, of] / np.outer(size, size) + RIDGE * np.eye(len(size))
+        z = self.along[of] / size
+        return float(z @ np.linalg.solve(scaled, z))
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Several sets of columns (m, k), K columns in all.
 
     A product with many columns takes little more time than one with few, as both read the other factor once.
     """
+
+    sets: Sequence[Array]
+
+    @property
+    def places(self) -> list[slice]:
+        """The slice of each set among all columns."""
+        return columns_of(self.sets)
+
+    def pieces(self, within: slice | None = None) -> Iterator[tuple[slice, Array]]:
+        """All columns in a few rows after the other, (n, K), with the slice of these; within: of all rows."""
+        whole = within or slice(0, len(self.sets[0]))
+        read = 0
+        for first in range(whole.start, whole.stop, ROWS_AT_ONCE):
+            rows = slice(first, min(first + ROWS_AT_ONCE, whole.stop))
+            piece = np.concatenate([g[rows] for g in self.sets], axis=1)
+            yield rows, piece
+            if (read := read + piece.nbytes) > READ_AT_ONCE:
+                let_go()
+                read = 0
+
+    def products(self, *others: Array, within: slice | None = None) -> tuple[Array, ...]:
+        """Products of the columns with each other, (K, K), and of each of others, (m, q) or (m,), with them.
+
+        within: the rows that count.
+        """
+        width = self.places[-1].stop
+        own, found = np.zeros((width, width)), [np.zeros((*x.shape[1:], width)) for x in others]
+        for rows, piece in self.pieces(within):
+            own += piece.T @ piece
+            for sums, x in zip(found, others, strict=True):
+                sums += x[rows].T @ piece
+        return own, *found
+
+
+def batches(columns: Iterable[Array]) -> Iterator[Batch]:
+    """Sets of columns (m, k) one after the other, many at once."""
     held: list[Array] = []
-    width = 0
     for g in columns:
         held.append(g)
-        width += g.shape[1]
-        if width >= COLUMNS_AT_ONCE or width * len(g) * g.itemsize >= BATCH:
-            yield columns_of(held), np.hstack(held)
-            held, width = [], 0
+        if sum(some.shape[1] for some in held) >= COLUMNS_AT_ONCE:
+            yield Batch(held)
+            held = []
             let_go()
     if held:
-        yield columns_of(held), np.hstack(held)
+        yield Batch(held)
 
 
 def columns_of(columns: Iterable[Array]) -> list[slice]:
@@ -66,30 +139,45 @@ def is_wave(c: Candidate) -> bool:
     return sorted(u.name[-4:] for u in c.amplitudes) == ["_cos", "_sin"]
 
 
+def lengths_left(before: Array, after: Array) -> Array:
+    """Lengths of columns from their squares before and after a projection, 0 where only rounding is left."""
+    return np.sqrt(np.where(after > NOTHING**2 * before, after, 0.0))
+
+
 def alike(
-    calibration: Calibration, columns: Iterable[Array], rng: np.random.Generator, rows: int = SKETCHED
+    calibration: Calibration, columns: Iterable[Array], rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Lengths of all projected columns (K,), zero if only rounding is left, and their cosines (K, K).
 
     columns: (m, k), one set after the other. For long columns cosines are estimated from random sums of rows
     (a count sketch: Charikar, Chen, Farach-Colton, Theoretical Computer Science 312 (2004), 3-15), with an
-    error of about 1 / sqrt(rows).
+    error of about 1 / sqrt(ROWS_AT_ONCE).
     """
-    m = len(calibration.basis)
-    rows = min(rows, m)
-    signs = rng.choice([-1.0, 1.0], m) if m > rows else np.ones(m)
+    basis = calibration.basis
+    m = len(basis)
+    signs = rng.choice([-1.0, 1.0], m) if m > ROWS_AT_ONCE else np.ones(m)
+    of_basis, _ = _summed(Batch([basis]), signs, basis)
     sums, lengths = [], []
-    for _, g in batches(columns):
-        left = calibration.without(g)
-        length = np.linalg.norm(left, axis=0)
-        nothing = length <= NOTHING * np.linalg.norm(g, axis=0)
-        left[:, nothing] = length[nothing] = 0.0
+    for batch in batches(columns):
+        summed, (own, within) = _summed(batch, signs, basis)
+        length = lengths_left(own, own - np.sum(within**2, axis=0))
         lengths.append(length)
-        padded = np.zeros((-(-m // rows) * rows, g.shape[1]))
-        padded[:m] = left * signs[:, None]
-        sums.append(padded.reshape(-1, rows, g.shape[1]).sum(axis=0))
+        sums.append(np.where(length > 0, summed - of_basis @ within, 0.0))
     if not sums:
         return np.zeros(0), np.zeros((0, 0))
     s = np.hstack(sums)
     s /= np.linalg.norm(s, axis=0) + 1e-300
     return np.concatenate(lengths), s.T @ s
+
+
+def _summed(batch: Batch, signs: Array, basis: Array) -> tuple[Array, tuple[Array, Array]]:
+    """Sums (rows, K) of the rows of a batch with signs (m,); squares (K,), and products (n, K)."""
+    width = batch.places[-1].stop
+    summed = np.zeros((min(ROWS_AT_ONCE, len(signs)), width))
+    squares, within = np.zeros(width), np.zeros((basis.shape[1], width))
+    for rows, piece in batch.pieces():
+        within += basis[rows].T @ piece
+        squares += np.einsum("ij,ij->j", piece, piece)
+        piece *= signs[rows, None]
+        summed[: len(piece)] += piece
+    return summed, (squares, within)

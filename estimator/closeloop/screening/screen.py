@@ -13,11 +13,8 @@ from scipy.optimize import lsq_linear
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.hypotheses.promise import Promise
-from estimator.closeloop.screening.regressors import batches
+from estimator.closeloop.screening.regressors import Calibration, batches
 from estimator.record import Array
-
-USABLE = 1e-9  # share of a regressor's length after projection, below which it is not used
-
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -32,7 +29,7 @@ def screen(base: Fit, sets: Iterable[tuple[tuple[Candidate, ...], Array]]) -> li
     """The promise of each set of candidates from its changes (m, k) by linear regression, best first."""
     basis, triangle = np.linalg.qr(base.jacobian)
     back, seen = np.linalg.pinv(triangle, rcond=EPSILON * len(triangle)), basis.T @ base.residual
-    r = base.residual - basis @ seen
+    calibration, r = Calibration(basis), base.residual - basis @ seen
     names: deque[tuple[Candidate, ...]] = deque()
 
     def columns() -> Iterator[Array]:
@@ -41,32 +38,28 @@ def screen(base: Fit, sets: Iterable[tuple[tuple[Candidate, ...], Array]]) -> li
             yield raw
 
     found = []
-    for places, raw in batches(columns()):
-        within = basis.T @ raw
-        size = np.linalg.norm(raw, axis=0) + 1e-300
-        g = raw - basis @ within
-        gram, along = g.T @ g, g.T @ r
-        for at in places:
+    for batch in batches(columns()):
+        left = calibration.left(batch, r)
+        for at in batch.places:
             candidates = names.popleft()
-            beta, gain = _regressed(candidates, gram[at, at], along[at], size[at])
+            beta, gain = _regressed(candidates, left.gram[at, at], left.along[at], left.lengths[at])
             beta = np.clip(beta, -TRUSTED, TRUSTED)
-            shift = -back @ (seen + within[:, at] @ beta)
+            shift = -back @ (seen + left.within[:, at] @ beta)
             found.append(Promise(candidates, gain, _start(base, candidates, beta, shift)))
     return sorted(found, key=lambda p: -p.gain)
 
 
 def _regressed(
-    candidates: tuple[Candidate, ...], gram: Array, along: Array, size: Array
+    candidates: tuple[Candidate, ...], gram: Array, along: Array, left: Array
 ) -> tuple[Array, float]:
     """Amplitudes (k,) within bounds, in their scales, and the reduction of the sum of squares by these.
 
-    gram, along: products of the projected columns with each other (k, k) and with the residual (k,); size:
-    lengths (k,) of the columns before the projection. Columns of which nothing is left have no amplitude.
+    gram, along: products of the projected columns with each other (k, k) and with the residual (k,); left:
+    their lengths (k,). Columns of which nothing is left have no amplitude.
     """
     amplitudes = [u for c in candidates for u in c.amplitudes]
     low, high = (np.array([getattr(u, side) / u.scale for u in amplitudes]) for side in ("low", "high"))
-    left = np.sqrt(np.diag(gram))
-    usable = np.flatnonzero(left > USABLE * size)
+    usable = np.flatnonzero(left > 0)
     beta = np.zeros(len(amplitudes))
     if len(usable):
         scale = left[usable]
