@@ -13,7 +13,7 @@ Rule: TypeAlias = tuple[Callable[[Array], NDArray[np.bool_]], str]  # what must 
 
 POSITIVE: Rule = (lambda x: x > 0, "greater than 0")
 NOT_NEGATIVE: Rule = (lambda x: x >= 0, "0 or greater")
-ANY: Rule = (lambda x: np.isfinite(x), "finite")
+ANY: Rule = (lambda x: np.isfinite(x), "")
 
 
 def between(low: float, high: float) -> Rule:
@@ -30,7 +30,8 @@ def checked(name: str, unit: str, value: ArrayLike, rule: Rule = ANY) -> Array:
     holds, words = rule
     wrong = ~(np.isfinite(array) & holds(array))
     if wrong.any():
-        raise ValueError(f"{name} must be finite and {words} [{unit}], found {array[wrong].flat[0]:g}")
+        must = f"finite and {words}" if words else "finite"
+        raise ValueError(f"{name} must be {must} [{unit}], found {array[wrong].flat[0]:g}")
     return array
 
 

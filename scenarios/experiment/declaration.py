@@ -7,12 +7,18 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, ConfigDict, Field, PlainValidator, model_validator
 
 from scenarios.experiment.estimated import Estimate
-from scenarios.experiment.table import Interval, Number, Positive, Share, Table, is_number
+from scenarios.experiment.table import Interval, Number, Positive, Share, Table, Truth, is_number
 
 
 def key_of(column: str, file: str | None) -> str:
     """How a column is called within an experiment: with its file, if it is one of [files]."""
     return f"{file}: {column}" if file else column
+
+
+def _a_name(value: str) -> str:
+    if not value.strip() or not value.isprintable():
+        raise ValueError("must be a name in one line, not an empty one")
+    return value
 
 
 def _not_zero(value: float) -> float:
@@ -149,7 +155,7 @@ class Port(Table):
     force: str
     velocity: str
     displacement: str | None = None
-    integrate: bool = False
+    integrate: Truth = False
 
     @model_validator(mode="after")
     def _integrated_or_given(self) -> Self:
@@ -214,7 +220,7 @@ class Declaration(Table):
     rate: Hz, to which a record is thinned, behind a low-pass filter; by default all its rows are used.
     """
 
-    id: str
+    id: Annotated[str, AfterValidator(_a_name)]
     model: str | None = None
     fmu: str | None = None
     data: Annotated[str | DataFile, PlainValidator(_data)] | None = None

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
-from scenarios.experiment.table import Interval, NotNegative, Number, Positive, Share, Table, is_number
+from scenarios.experiment.table import Interval, NotNegative, Number, Positive, Share, Table, Truth, is_number
 
 
 def _filter(value: object) -> str:
@@ -101,7 +101,7 @@ class Options(Table):
     """
 
     filter: Filter = "ukf"
-    smooth: bool = False
+    smooth: Truth = False
     process_std: dict[str, NotNegative] = Field(default_factory=dict)
     walk: dict[str, Positive] = Field(default_factory=dict)
     initial_std: dict[str, Positive] = Field(default_factory=dict)
@@ -111,7 +111,7 @@ class Options(Table):
     gate: Positive | None = None
     adapt: tuple[Literal["measurement", "process"], ...] = ()
     input_parts: Annotated[int, Field(strict=True, ge=1)] | None = None
-    form: bool = True
+    form: Truth = True
     alpha: Annotated[float, Field(strict=True, gt=0, le=1)] = 1.0
     beta: Number = 2.0
     kappa: Number = 0.0

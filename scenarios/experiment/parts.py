@@ -70,4 +70,7 @@ def _windows(
 
 def _check_enough(e: Experiment, where: str, mask: BoolArray) -> None:
     if mask.sum() < MIN_SAMPLES:
-        raise BadInput(f"{e.file}: {where} holds {mask.sum()} samples; at least {MIN_SAMPLES} are needed")
+        raise BadInput(
+            f"{e.file}: {where} holds {mask.sum()} samples; at least {MIN_SAMPLES} are needed: give a longer "
+            "window, or time_unit if the times are not in s"
+        )

@@ -21,6 +21,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
 Share = Annotated[float, Field(strict=True, gt=0, lt=1)]
+Truth = Annotated[bool, Field(strict=True)]
 Interval = Annotated[tuple[float, float], PlainValidator(interval_of)]
 
 

@@ -25,6 +25,8 @@ SAID = MappingProxyType(
         "tuple_type": "must be a list",
         "int_type": "must be a whole number",
         "too_short": "must hold at least one entry",
+        "string_pattern_mismatch": "must begin with a letter or digit and hold letters, digits, _ . - only",
+        "bool_type": "must be true or false",
     }
 )
 
@@ -74,6 +76,9 @@ def _one_line(cls: type[Table], error: ValidationError, key: str) -> str:
     Unknown keys go first: a misspelt key is also a missing one.
     """
     problems = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+    missing = [".".join([key, *map(str, p["loc"])]).lstrip(".") for p in problems if p["type"] == "missing"]
+    if len(missing) > 1 and len(missing) == len(problems):
+        return f"keys {', '.join(map(repr, missing))} are missing"
     return " ".join(_sentence(cls, problems[0], key).split()) + and_more(len(problems))
 
 

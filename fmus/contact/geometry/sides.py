@@ -49,7 +49,10 @@ def said(left: Item, right: Item) -> Both[Item]:
 
 def number(name: str, unit: str, value: float, positive: bool = False) -> float:
     """One finite number; BadInput, a ValueError, names it where it is something else."""
-    found = checked(name, unit, value, POSITIVE if positive else ANY)
+    try:
+        found = checked(name, unit, value, POSITIVE if positive else ANY)
+    except ValueError as error:
+        raise BadInput(str(error)) from error
     if found.ndim:
         raise BadInput(f"{name} must be one number [{unit}], not an array of shape {found.shape}")
     return float(found)

@@ -152,7 +152,8 @@ def _stored_by_calls(steps: Sequence[Step]) -> list[Step]:
         if isinstance(step, Store) and step.of in zero:
             at = zero.pop(step.of)
             call = found[at]
-            assert isinstance(call, Call)
+            if not isinstance(call, Call):
+                raise TypeError(f"{call} stores what a call gives")
             stored = {**call.stored, call.wanted.index(step.of): step.place}
             found[at] = call._replace(stored=stored)
             gone.add(step.of)
@@ -258,7 +259,8 @@ class _InLanes(Printer):
     def _switched(self, step: Call) -> tuple[str, list[str], set[int]]:
         """Of a call: what is left of it if its law is off, itself, and the arguments that switch it on."""
         switch = Switch.of(step.function.name())
-        assert switch is not None
+        if switch is None:
+            raise ValueError(f"{step.function.name()} is no law that can be off")
         places = zip(step.given, step.places, strict=True)
         given = [v if k is None else self.element("x", k) for v, k in places]
         zeros = ["ALL(0.0)"] * len(step.wanted)
