@@ -94,6 +94,8 @@ def problems(path: str | Path) -> list[str]:
 
 
 def _checked_names(path: Path) -> list[str]:
+    if path.is_dir():
+        raise BadInput(f"{path}: is a folder; give the .fmu file that it was unpacked from")
     if not path.is_file():
         raise BadInput(f"{path}: no such FMU file; build one with 'railfmi build' or mend the path")
     try:
@@ -112,7 +114,7 @@ def _checked_names(path: Path) -> list[str]:
         if ".." in parts or name.startswith(("/", "\\")) or ":" in name:
             raise BadInput(f"{path}: holds the path '{name}', which leads outside; do not use this file")
     if "modelDescription.xml" not in names:
-        raise BadInput(f"{path}: has no modelDescription.xml, so it is no FMU")
+        raise BadInput(f"{path}: has no modelDescription.xml, so it is no FMU; export it again")
     return names
 
 
@@ -135,8 +137,8 @@ def _description(path: Path, folder: Path) -> FmuDescription:
                 raise
             model = read_model_description(str(folder), validate=False)
     except Exception as error:
-        line = " ".join(str(error).split())
-        raise BadInput(f"{path}: its modelDescription.xml cannot be read ({line[:200]})") from error
+        why = _why_not_read(folder / "modelDescription.xml", error)
+        raise BadInput(f"{path}: its modelDescription.xml {why}; export the FMU again") from error
     if model.fmiVersion not in FMI_VERSIONS:
         raise BadInput(f"{path}: is FMI {model.fmiVersion}; FMI {' and '.join(FMI_VERSIONS)} are read here")
     if model.coSimulation is None and model.modelExchange is None:
@@ -147,6 +149,21 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         return reduced(model)
     except ValueError as error:
         raise BadInput(f"{path}: its modelDescription.xml cannot be read ({error})") from error
+
+
+def _why_not_read(file: Path, error: Exception) -> str:
+    """Why a model description was not read, without words of Python where the reason shows."""
+    try:
+        root = ElementTree.parse(file).getroot()
+    except ElementTree.ParseError as broken:
+        return f"is no XML ({broken})"
+    if root.tag != "fmiModelDescription":
+        return f"is none: it holds <{root.tag[:40]}>"
+    if not (version := root.get("fmiVersion")):
+        return "states no version of FMI"
+    if version not in FMI_VERSIONS:
+        return f"is of FMI {version}; FMI {' and '.join(FMI_VERSIONS)} are read"
+    return f"cannot be read ({' '.join(str(error).split())[:200]})"
 
 
 def _mended(file: Path) -> bool:
@@ -173,4 +190,6 @@ def _check_platform(path: Path, description: FmuDescription, names: list[str]) -
     library = f"binaries/{here}/{description.identifier}{fmpy.sharedLibraryExtension}"
     if library not in names:
         has = ", ".join(held) or "none"
-        raise BadInput(f"{path}: has no binary for this platform ({here}); it holds {has}")
+        raise BadInput(
+            f"{path}: has no binary for this platform ({here}); it holds {has}; export it for this platform"
+        )
