@@ -78,8 +78,8 @@ def close_loop(
     with tempfile.TemporaryDirectory(prefix="railfmi_loop_") as work:
         declared = with_test_part(given(experiment, data_dir, data, Path(work)))
         posed = Posed.of(declared, Path(work), isolation)
-        show([*conversion_lines(posed.problem.record), *suspicions(posed.problem)])
         folder = None if out is None else writable(Path(out))
+        show([*conversion_lines(posed.problem.record), *suspicions(posed.problem)])
         stages = stages_of(declared, folder, seed, resume)
         result = closed(posed, folder, tell, jobs, seed, begun, stages)[1]
         stages.forget()

@@ -92,8 +92,8 @@ def estimate(
             check_honest(fmu, isolation or ISOLATED)
         with Archive(fmu, isolation_of(fmu, isolation) if e.model is None else None) as archive:
             record = load_record(e, archive.description, missing=True)
-            show(conversion_lines(record))
             setup = set_up(e, chosen, record, archive)
+            show(conversion_lines(record))
             found = find(setup, archive, tell)
             try:
                 notes = [n.sentence for n in record.notes] + _notes(found)
