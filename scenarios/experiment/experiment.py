@@ -10,7 +10,6 @@ from typing import Any
 
 from fmus.errors import BadInput, did_you_mean
 from fmus.host.description import FmuDescription, FmuVariable
-from fmus.units import another_kind
 from scenarios.experiment.declaration import Declaration
 from scenarios.experiment.validation import and_more, read_file
 
@@ -78,7 +77,7 @@ def _check_model(file: Path, name: str) -> None:
 def check_names(experiment: Experiment, description: FmuDescription) -> None:
     """Check the names and values of an experiment against the FMU; raises BadInput for the first error."""
     names, values = [*_wrong_names(experiment, description)], [*_wrong_values(experiment, description)]
-    problems = names + values or [*_wrong_motions(experiment, description)]
+    problems = names + values
     if problems:
         raise BadInput(f"{experiment.file}: {problems[0]}{and_more(len(problems))}")
 
@@ -124,17 +123,6 @@ def _parts(e: Experiment, fmu: FmuDescription) -> Iterator[Part]:
 
 def _start_can_be_set(v: FmuVariable) -> bool:
     return v.causality in ("output", "local") and v.initial in ("exact", "approx", None)
-
-
-def _wrong_motions(e: Experiment, fmu: FmuDescription) -> Iterator[str]:
-    """Ports whose velocity is, by the units that the FMU states, no rate of their displacement."""
-    for port in e.ports:
-        way, rate = (fmu.variables[n].unit if n else None for n in (port.displacement, port.velocity))
-        if way and rate and another_kind(f"({way})/s", rate):
-            yield (
-                f"[[ports]] '{port.name}': {port.velocity} in '{rate}' is no rate of {port.displacement} "
-                f"in '{way}'; name the outputs of one motion"
-            )
 
 
 def _wrong_values(e: Experiment, fmu: FmuDescription) -> Iterator[str]:

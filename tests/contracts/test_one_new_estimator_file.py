@@ -129,7 +129,7 @@ def test_a_new_sensor_fault_is_found_by_closing_the_loop(mine):
 )
 def test_a_sensor_fault_that_cannot_be_used_is_refused_in_one_line(mine, text, words):
     mine.write(SQUARE_FILE, text)
-    said = mine.refused("close-loop", "nothing.toml", "--out", "out")
+    said = mine.refused("close-loop", ".", "--out", "out")
     assert words in said
     assert re.search("sensor_faults.square", said)
 
