@@ -348,7 +348,7 @@ def test_the_example_of_the_documentation_runs(tmp_path):
 def test_a_figure_that_cannot_be_drawn_leaves_the_verdicts(tmp_path):
     file = write(tmp_path, edited(GOOD, ('unit = "mm/s"', 'unit = "kg"')))
     with pytest.raises(
-        BadInput, match=r"key 'figure\[0\].panels\[0\].unit': curves in 'm/s' cannot be shown in 'kg'"
+        BadInput, match=r"figure\[0\].panels\[0\].unit': curves in 'm/s' cannot be shown in 'kg'"
     ):
         run(file, tmp_path / "out")
     written = json.loads((tmp_path / "out" / "result.json").read_text())

@@ -681,9 +681,7 @@ def test_bad_declarations_in_one_line(changes, words):
 def test_what_is_missing_is_named():
     with pytest.raises(BadInput, match=r"key 'track\.kind' is missing; known are defect, file, spectrum"):
         read_track({}, HERE)
-    with pytest.raises(
-        BadInput, match=r"keys 'track\.length', 'track\.wavelengths', 'track\.seed' are missing"
-    ):
+    with pytest.raises(BadInput, match=r"'track\.length', 'track\.wavelengths', 'track\.seed' are missing"):
         read_track({"kind": "spectrum", "spectrum": "fra_5"}, HERE)
     with pytest.raises(BadInput, match="key 'track' must be a table, not '3'"):
         read_track(3, HERE)
