@@ -82,7 +82,7 @@ def detect(
     if regressors:
         lengths, cosines = found
         rest = Calibration.of(screened).without(screened.residual)
-        along = np.concatenate([g.T @ rest for batch in batches(regressors) for g in batch.sets])
+        along = np.concatenate([batch.along(rest) for batch in batches(regressors)])
         observed[LIKENESS] = float(np.max((along / np.where(lengths > 0, lengths, np.inf)) ** 2))
         references[LIKENESS] = _likeness_of_noise(cosines, limits.replicates, rng)
     p_values, figures = [], {}

@@ -114,6 +114,13 @@ class Batch:
                 sums += x[rows].T @ piece
         return own, *found
 
+    def along(self, x: Array) -> Array:
+        """Products (K,) of the columns with another one (m,)."""
+        found = np.zeros(self.places[-1].stop)
+        for rows, piece in self.pieces():
+            found += x[rows] @ piece
+        return found
+
 
 def batches(columns: Iterable[Array]) -> Iterator[Batch]:
     """Sets of columns (m, k) one after the other, many at once."""
