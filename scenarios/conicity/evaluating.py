@@ -18,7 +18,7 @@ from fmus.contact.geometry.conicity import (
     turning_points,
 )
 from fmus.contact.geometry.pair import Sides
-from fmus.contact.geometry.search import stand
+from fmus.contact.geometry.search import check_touches, stand
 from fmus.contact.geometry.sides import Both, Given, sides_of
 from fmus.contact.geometry.table import contact_table, default_shifts
 from fmus.errors import BadInput
@@ -129,11 +129,7 @@ def evaluated(request: Request, amplitudes: Sequence[float] | None = None) -> Ev
     """The contact of a pair over all shifts, and its conicities at amplitudes, m, by default 1 to 7.5 mm."""
     wanted = AMPLITUDES if amplitudes is None else _amplitudes(amplitudes)
     sides = request.sides
-    if not stand(sides, np.zeros(1), request.roll).rests.all():
-        raise BadInput(
-            f"wheels and rails never touch on their running surfaces with gauge {request.gauge:g} m; correct "
-            "--gauge, --back-to-back or the profiles"
-        )
+    check_touches(sides, request.roll)
     reach = _reach(sides, request.roll)
     if amplitudes is not None and max(wanted) > reach:
         raise BadInput(

@@ -168,7 +168,8 @@ def estimated(
     variables = joint.archive.description.variables
     unit = {n: v.unit for n, v in variables.items()}
     unit |= {name: unit[of] for name, of in joint.noises.items()}
-    unit |= {rate: f"{u}/s" for n, u in [*unit.items()] if u and (rate := f"{n}_rate") not in unit}
+    rates = [(w.states[0], rate) for w in joint.unknown for rate in w.states[1:] if rate not in unit]
+    unit |= {rate: f"{of}/s" for name, rate in rates if (of := unit.get(name))}
     believed = {p.name: [p.start, p.std] for p in joint.parameters if not p.walk and p.name not in form}
     return {
         name: {
