@@ -36,6 +36,7 @@ from scenarios.estimating.unknowns import (
 from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 
+UNEVEN = 0.01  # relative error of the rate of a record, whose times may jitter
 MOST_PARTS = 16  # largest number of parts of a step
 BAND = 1.959964  # half width of the 95 % band in standard deviations
 Bands = Mapping[str, Mapping[str, tuple[float, float]]]
@@ -127,9 +128,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     check_noise(e, options)
     record = undelayed(e, record, d.variable_step)
     run = record.runs[0]
-    every = 1
-    if e.estimate and e.estimate.rate:
-        every = max(1, round(1 / (e.estimate.rate * float(np.median(np.diff(run.t))))))
+    every = _every(e, options, float(np.median(np.diff(run.t))))
     s = samples(run.t, run.u, run.y, every)
     if len(s.t) < POLICY.fewest_samples:
         raise BadInput(
@@ -157,6 +156,30 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
         tuple(choices(e, options)), input_noise=declared_errors(record, every),
         possible=possible_errors(options, record, every),
     )  # fmt: skip
+
+
+def _every(e: Experiment, options: Options, step: float) -> int:
+    """Every how many samples of the record, `step` s apart, the filter uses one.
+
+    Raises BadInput if the record has fewer samples than the rate asks for, or if they are too few for the
+    frequency of an unknown input.
+    """
+    if not e.estimate:
+        return 1
+    recorded, rate = 1 / step, e.estimate.rate
+    if rate and rate > recorded * (1 + UNEVEN):
+        raise BadInput(
+            f"{e.file}: [estimate] rate = {rate:g} Hz is above the {recorded:.6g} Hz of the record; "
+            "leave it out to use every sample"
+        )
+    every = max(1, round(recorded / rate)) if rate else 1
+    for name, unknown in e.estimate.inputs.items():
+        if name not in options.random_walk and unknown.frequency > recorded / every / 2:
+            raise BadInput(
+                f"{e.file}: [estimate.inputs.{name}] frequency = {unknown.frequency:g} Hz does not show in "
+                f"samples at {recorded / every:.6g} Hz; name one of at most half of that"
+            )
+    return every
 
 
 def _check_measured(e: Experiment, record: Record, s: Samples) -> None:

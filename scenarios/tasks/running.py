@@ -33,7 +33,8 @@ try:
     from distributed.diagnostics.plugin import WorkerPlugin
 except ImportError as missing:
     raise BadInput(
-        f"this command needs dask.distributed ({missing}); install it with: pip install 'railfmi[fleet]'"
+        f"this command needs dask.distributed ({missing}); install its extra in the folder of railfmi: "
+        "pip install '.[fleet]'"
     ) from missing
 
 CONNECTING = 30  # s, to reach a scheduler

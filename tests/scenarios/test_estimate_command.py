@@ -317,6 +317,14 @@ def test_half_the_rate_is_half_the_samples(vdp, tmp_path):
             ("start = 1.5", "start = 0.0"),
             r"[estimate.parameters] mu: start 0 is not between its bounds 0 and 10",
         ),
+        (
+            ("[estimate]\n", "[estimate]\nrate = 50.0\n"),
+            "[estimate] rate = 50 Hz is above the 20 Hz of the record; leave it out to use every sample",
+        ),
+        (
+            ('[inputs]\nu = "u"\n', "[estimate.inputs]\nu = {std = 1.0, frequency = 12.0}\n"),
+            "[estimate.inputs.u] frequency = 12 Hz does not show in samples at 20 Hz; name one of at most",
+        ),
         (("std = 0.5, ", ""), None),
     ],
 )

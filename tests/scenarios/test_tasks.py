@@ -284,4 +284,4 @@ def test_without_the_extra_the_command_says_how_to_get_it(name, tmp_path, capfd,
     assert run_safely([name, str(tmp_path / "none.toml"), "--out", str(tmp_path / "out")]) == 2
     said = capfd.readouterr().err
     assert said.count("\n") == 1
-    assert "pip install 'railfmi[fleet]'" in said
+    assert "pip install '.[fleet]'" in said
