@@ -2,15 +2,15 @@
 
     python -m benchmarks.long_record --seconds 3600 --rate 1000 --out out/benchmarks/long_record
 
-The record is simulated with the native FMU of the rig, whose friction, or that and a drag at the roller with
-`--drag`, differs from what is declared, and has white noise. The commands run in processes of their own, with
-one job. Memory is the largest resident set of any of their processes; time is processor time of all of them.
+The native FMU of the rig makes the record, and white noise is added. Its friction differs from what the
+experiment declares; with `--drag`, it also has a drag at the roller that the model lacks. The commands run in
+processes of their own, with one job. Memory is the largest resident set of any of these; it includes pages of
+files that the system takes back when it needs them. Time is the processor time of all of them.
 """
 
 import argparse
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ OUTPUTS = {  # unit and noise of the sensors
 MU0, DRAG = 0.32, 1.5  # true friction, for 0.4; drag at the roller, N.m.s/rad
 EFFECT, SIZE = "viscous_damping@roller", "viscous_damping_roller_c"
 START = {"omega_w": 12.22, "omega_r": 9.41}
-HELD = 5.0  # s, over which the inputs stay at a value
+KNOTS = 5.0  # s, between the random values of an input
 EXPERIMENT = """\
 id = "long-record"
 model = "testrig"
@@ -63,20 +63,19 @@ parameters.mu0 = {{start = 0.4, std = 0.1, bounds = [0.05, 0.8]}}
 
 
 def inputs(t: Array, rng: np.random.Generator) -> dict[str, Array]:
-    """Torque request, N.m, and supply frequency, Hz, which change smoothly between levels."""
-    knots = np.arange(0.0, t[-1] + 2 * HELD, HELD)
+    """Torque request, N.m, and supply frequency, Hz, linear between random values."""
+    knots = np.arange(0.0, t[-1] + 2 * KNOTS, KNOTS)
     torque, supply = rng.uniform(-400, 400, len(knots)), rng.uniform(7.2, 7.8, len(knots))
     supply[0] = 7.5
     return {"T_P": np.interp(t, knots, torque), "f_sync": np.interp(t, knots, supply)}
 
 
 def write_record(folder: Path, seconds: float, rate: float, drag: float) -> Path:
-    """A record and its experiment file, which is returned."""
+    """Write a record and its experiment file, which is returned; drag: of the roller, N.m.s/rad."""
     rng = np.random.default_rng(1)
     t = np.arange(round(seconds * rate)) / rate
     given = inputs(t, rng)
-    started = railfmi("build", "testrig", "--kind", "native", "--effect", EFFECT, "--out", str(folder))
-    if os.waitstatus_to_exitcode(os.waitpid(started.pid, 0)[1]):
+    if taken("build", "testrig", "--kind", "native", "--effect", EFFECT, "--out", str(folder)).exit:
         raise SystemExit("the FMU of the rig cannot be built")
     with Fmu(folder / "Testrig.fmu") as rig:
         y = rig.simulate(t, given, list(OUTPUTS), {"mu0": MU0, SIZE: drag, **START})
@@ -104,16 +103,10 @@ class Taken:
     says: str
 
 
-def railfmi(*arguments: str) -> subprocess.Popen[str]:
-    """The command in a process of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "scenarios.cli", *arguments], stdout=subprocess.PIPE, text=True
-    )
-
-
 def taken(*arguments: str) -> Taken:
-    """Run a command to its end."""
-    started = railfmi(*arguments)
+    """Run a command in a process of its own to its end."""
+    command = [sys.executable, "-m", "scenarios.cli", *arguments]
+    started = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert started.stdout is not None
     said = started.stdout.read()
     _, status, used = os.wait4(started.pid, 0)
@@ -135,8 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--drag", action="store_true", help="the record has a drag that the model lacks")
     parser.add_argument("--most", type=float, default=2.0, help="GiB of memory that are allowed")
     a = parser.parse_args(arguments)
-    shutil.rmtree(a.out, ignore_errors=True)
-    a.out.mkdir(parents=True)
+    a.out.mkdir(parents=True, exist_ok=True)
     file = write_record(a.out, a.seconds, a.rate, DRAG if a.drag else 0.0)
     found = []
     for command, more in (("estimate", []), ("close-loop", ["--jobs", "1"])):

@@ -83,7 +83,8 @@ def samples(t: Array, u: Array, y: Array, every: int = 1, parts: int = 1) -> Sam
     held = by_rows(
         (len(at) - 1, parts, u.shape[1]), lambda rows: _means(t, u, at[rows], every, np.arange(parts) / parts)
     )
-    of_t, of_u, of_y = (np.ascontiguousarray(x[::every]) for x in (t, u, y))  # all samples are not copied
+    # where every sample is kept, these are the arrays of the record, which take no further memory
+    of_t, of_u, of_y = (np.ascontiguousarray(x[::every]) for x in (t, u, y))
     return Samples(of_t, of_u, held, of_y)
 
 

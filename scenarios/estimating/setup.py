@@ -35,8 +35,9 @@ from scenarios.estimating.unknowns import (
 )
 from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
+from scenarios.experiment.sampling import step_of
 
-UNEVEN = 0.01  # relative error of the rate of a record, whose times may jitter
+UNEVEN = 0.01  # share by which a rate may exceed that of the record, whose times may jitter
 MOST_PARTS = 16  # largest number of parts of a step
 BAND = 1.959964  # half width of the 95 % band in standard deviations
 Bands = Mapping[str, Mapping[str, tuple[float, float]]]
@@ -128,7 +129,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
     check_noise(e, options)
     record = undelayed(e, record, d.variable_step)
     run = record.runs[0]
-    every = _every(e, options, float(np.median(np.diff(run.t))))
+    every = _every(e, options, step_of(run.t))
     s = samples(run.t, run.u, run.y, every)
     if len(s.t) < POLICY.fewest_samples:
         raise BadInput(
@@ -159,7 +160,7 @@ def set_up(e: Experiment, options: Options, record: Record, archive: Archive) ->
 
 
 def _every(e: Experiment, options: Options, step: float) -> int:
-    """Every how many samples of the record, `step` s apart, the filter uses one.
+    """The filter uses every so manyth sample of the record; step: usual time between two of these, s.
 
     Raises BadInput if the record has fewer samples than the rate asks for, or if they are too few for the
     frequency of an unknown input.

@@ -33,7 +33,7 @@ try:
     from distributed.diagnostics.plugin import WorkerPlugin
 except ImportError as missing:
     raise BadInput(
-        f"this command needs dask.distributed ({missing}); install its extra in the folder of railfmi: "
+        f"this command needs the extra 'fleet' ({missing}); install it in the folder of railfmi with: "
         "pip install '.[fleet]'"
     ) from missing
 
