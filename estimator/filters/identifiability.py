@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from estimator.filters.policy import POLICY
 from estimator.record import Array
-from fmus.aside import blocks, set_aside
+from fmus.aside import blocks, by_rows, let_go
 
 NUDGE = 1e-3  # finite difference, as share of the prior standard deviation
 
@@ -47,17 +48,25 @@ def information(simulate: Callable[[Array], Array], z: Array, std: Array, noise:
 
     simulate: function of z that returns (N, m), nan where nothing is measured; std: (n,) prior deviations.
     """
-    columns = []
+    slopes = []
     for i, s in enumerate(std):
+        let_go()
         away = np.zeros(len(z))
         away[i] = NUDGE * s
-        slope = (simulate(z + away) - simulate(z - away)) / (2 * NUDGE * s)
-        columns.append(set_aside(np.nan_to_num(slope / noise).ravel()))
+        ahead, behind, scale = simulate(z + away), simulate(z - away), 2 * NUDGE * s * noise
+        slopes.append(by_rows(ahead.shape, partial(_slope, ahead, behind, scale)))
     found: Array = np.zeros((len(z), len(z)))
-    for rows in blocks(len(columns[0]), 8 * len(columns)):
-        J = np.column_stack([column[rows] for column in columns])
+    for rows in blocks(len(slopes[0]), 8 * len(slopes) * len(noise)):
+        J = np.column_stack([slope[rows].ravel() for slope in slopes])
         found += J.T @ J
+        let_go()
     return found
+
+
+def _slope(ahead: Array, behind: Array, scale: Array, rows: slice) -> Array:
+    """Difference of some rows of two arrays (N, m) over a scale (m,), 0 where nothing is measured."""
+    slope: Array = np.nan_to_num((ahead[rows] - behind[rows]) / scale)
+    return slope
 
 
 def before(names: Sequence[str], F: Array, std: Array, wanted: int) -> Identifiability:

@@ -13,6 +13,7 @@ import numpy as np
 from estimator.filters.algebra import compiled
 from estimator.filters.policy import POLICY
 from estimator.record import Array
+from fmus.aside import set_aside
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def whitened(y: Array, steps: Array, noise: Sequence[SensorNoise]) -> Array:
     for j, n in enumerate(noise):
         kept = np.exp(-steps / n.time) if n.share else np.zeros(len(steps))
         found[:, j] = _whitened(np.ascontiguousarray(y[:, j]), kept, n.white(usual) ** 2, n.share * n.std**2)
-    return found
+    return set_aside(found)
 
 
 @compiled
