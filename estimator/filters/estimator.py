@@ -15,6 +15,7 @@ from estimator.filters.algebra import (
     weigh,
 )
 from estimator.filters.matching import matched
+from estimator.filters.policy import POLICY
 from estimator.record import Array, BoolArray
 
 Covariance = Array | Callable[[float], Array]  # constant, or a function of the step length [s]
@@ -85,7 +86,7 @@ class Gate:
     """
 
     deviations: float = 5.0
-    patience: int = 50
+    patience: int = POLICY.gate_patience
 
 
 @dataclass(frozen=True)
@@ -95,10 +96,11 @@ class Adaptation:
     measurement: whether the variance of each channel is adapted; process: whether a common factor of Q is.
     """
 
-    samples: float = 500.0
+    samples: float = POLICY.adapted_samples
     measurement: bool = True
     process: bool = False
-    limits: tuple[float, float] = (1e-2, 1e4)  # of the ratio of a variance to the declared one
+    # of the ratio of a variance to the declared one
+    limits: tuple[float, float] = (POLICY.least_adapted, POLICY.most_adapted)
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,54 @@ class FilterPolicy(Limits):
         "smallest part that is correlated, and smallest part that is white, where this is estimated",
         "convention: a part of 3 % of the noise's standard deviation is as good as none",
     )
+    gate_patience: int = limit(
+        50,
+        "samples",
+        "in a row that a gate leaves out of a channel, after which the channel is used again",
+        "convention: then the model is wrong and not the sensor",
+    )
+    adapted_samples: float = limit(
+        500.0,
+        "samples",
+        "memory with which noise is adapted to the innovations",
+        "derivation: a variance from 500 samples is known to within a sixteenth",
+    )
+    least_adapted: float = limit(
+        1e-2,
+        "times the declared variance",
+        "smallest variance to which noise is adapted",
+        "convention: a sensor is not ten times better than declared",
+    )
+    most_adapted: float = limit(
+        1e4,
+        "times the declared variance",
+        "largest variance to which noise is adapted",
+        "convention: a sensor of a hundred times the noise says nothing",
+    )
+    particles: int = limit(
+        300,
+        "particles",
+        "of the filter `rbpf`",
+        "derivation: a standard deviation from 300 particles is known to within a twentieth",
+    )
+    particles_that_count: float = limit(
+        0.5,
+        "share of the particles",
+        "effective number of particles (1 over the sum of squared weights) below which they are drawn again",
+        "convention: half of them, as is usual since Liu and Chen (1998)",
+    )
+    kernel_discount: float = limit(
+        0.98,
+        "1",
+        "discount of the kernel by which particles are spread when they are drawn again",
+        "Liu and West (2001), who advise 0.95 to 0.99",
+    )
+    least_kernel: float = limit(
+        1e-3,
+        "standard deviations at the start",
+        "smallest spread of this kernel",
+        "convention: particles that have become alike can still follow a slow change",
+    )
 
 
 POLICY = FilterPolicy()

@@ -16,15 +16,10 @@ from scipy.special import logsumexp
 from estimator.filters.estimator import NO_CHANNELS, NONE, Covariance, Diverged, Estimate, System
 from estimator.filters.modes import Entry, mixed
 from estimator.filters.named import Estimator, Request
+from estimator.filters.policy import POLICY
 from estimator.filters.system import Joint
 from estimator.record import Array, BoolArray
 from fmus.errors import BadInput
-
-USUAL_PARTICLES = 300
-ENOUGH = 0.5  # share of the particles that must count, else they are drawn again
-DISCOUNT = 0.98  # of Liu and West's kernel; they advise 0.95 to 0.99
-FLOOR = 1e-3  # start deviations: smallest spread of the kernel
-
 
 Numbers: TypeAlias = NDArray[np.integer[Any]]
 
@@ -60,7 +55,7 @@ class Rbpf(Estimator):
         dt: float,
         modes: tuple[Entry, ...] = (),
         stay: float | None = None,
-        particles: int = USUAL_PARTICLES,
+        particles: int = POLICY.particles,
         seed: int = 0,
     ) -> None:
         self.system, self.names, self.now, self.dt = system, system.names, start, dt
@@ -209,9 +204,9 @@ class Rbpf(Estimator):
     def _redrawn(self, c: Cloud, rng: np.random.Generator) -> Cloud:
         """The particles drawn again, each as often as it weighs, if too few of them count."""
         w, N = np.exp(c.weights), len(c.weights)
-        if 1 / float(w @ w) > ENOUGH * N:
+        if 1 / float(w @ w) > POLICY.particles_that_count * N:
             return c
-        theta, shrink = c.theta.copy(), (3 * DISCOUNT - 1) / (2 * DISCOUNT)
+        theta, shrink = c.theta.copy(), (3 * POLICY.kernel_discount - 1) / (2 * POLICY.kernel_discount)
         width = np.empty_like(theta)
         for k in range(len(self.modes)):
             here = c.mode == k
@@ -219,7 +214,7 @@ class Rbpf(Estimator):
             mean = share @ c.theta[here]
             std = np.sqrt(share @ (c.theta[here] - mean) ** 2)
             theta[here] = shrink * c.theta[here] + (1 - shrink) * mean
-            width[here] = np.sqrt(1 - shrink**2) * np.maximum(std, FLOOR * self._width)
+            width[here] = np.sqrt(1 - shrink**2) * np.maximum(std, POLICY.least_kernel * self._width)
         which = systematic(w / w.sum(), rng)
         theta = theta[which] + rng.standard_normal(theta.shape) * width[which]
         return Cloud(np.full(N, -np.log(N)), theta, c.x[which], c.P[which], c.mode[which], c.drawn)

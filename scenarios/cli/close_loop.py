@@ -135,12 +135,13 @@ def _try(
     experiments: list[Path], out: Path, data: Path | None, jobs: int | None, isolation: "Isolation | None"
 ) -> None:
     """Show for each experiment what a run would do."""
+    from scenarios.closing.several import experiments_of
     from scenarios.preparing.trial import dry_run as tried
 
+    folders = [out] if len(experiments) == 1 else [out / e.id for e in experiments_of(experiments, data)]
     trials = []
-    for experiment in experiments:
+    for experiment, folder in zip(experiments, folders, strict=True):
         with progress("simulating the record once"):
-            folder = out if len(experiments) == 1 else out / experiment.stem
             trial = tried(experiment, folder, data, jobs, isolation)
         trials.append({"experiment": experiment, **trial.result()})
         for line in trial.lines():

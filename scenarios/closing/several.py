@@ -66,8 +66,7 @@ def close_loops(
     After Ctrl-C, the finished results are kept, and `interrupted` is set in the result.
     Raises BadInput if an experiment is wrong, before the first one is run.
     """
-    declared = [experiment_of(e, data_dir) for e in experiments]
-    _check_ids(declared)
+    declared = experiments_of(experiments, data_dir)
     with tempfile.TemporaryDirectory(prefix="railfmi_loops_") as work:
         posed = [_posed(e, Path(work) / f"{i}", isolation) for i, e in enumerate(declared)]
         for p in posed:
@@ -87,7 +86,12 @@ def close_loops(
     return found
 
 
-def _check_ids(declared: Sequence[Experiment]) -> None:
+def experiments_of(paths: Sequence[str | Path], data_dir: str | Path | None = None) -> list[Experiment]:
+    """Read experiments, each of which can have a folder of its own, named by its id, beside the common table.
+
+    Raises BadInput if one is wrong, if there is none, or if an id is used twice or names no such folder.
+    """
+    declared = [experiment_of(path, data_dir) for path in paths]
     if not declared:
         raise BadInput("no experiment given; name at least one experiment.toml")
     files: dict[str, Path] = {}
@@ -101,6 +105,7 @@ def _check_ids(declared: Sequence[Experiment]) -> None:
                 f"{e.file}: id '{e.id}' cannot name a folder beside {', '.join(OURS)}; choose another id"
             )
         files[e.id] = e.file
+    return declared
 
 
 def _posed(e: Experiment, work: Path, isolation: Isolation | None) -> Posed:

@@ -22,6 +22,12 @@ class EstimatePolicy(Limits):
         "error too",
         "derivation: an error of a tenth of the noise adds half a percent to the innovations' deviation",
     )
+    most_parts: int = limit(
+        16,
+        "parts",
+        "largest number of parts into which a step is divided for that, unless `input_parts` says how many",
+        "derivation: an error of second order is then a two hundred and fiftieth of that of the whole step",
+    )
     undeclared_std: float = limit(
         0.25,
         "distance of the bounds, or the value where there are none",

@@ -38,7 +38,6 @@ from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.sampling import step_of
 
 UNEVEN = 0.01  # share by which a rate may exceed that of the record, whose times may jitter
-MOST_PARTS = 16  # largest number of parts of a step
 BAND = 1.959964  # half width of the 95 % band in standard deviations
 Bands = Mapping[str, Mapping[str, tuple[float, float]]]
 
@@ -245,7 +244,7 @@ def _fine_enough(
     run = record.runs[0]
     found = samples(run.t, run.u, run.y, every, parts or 1)
     free = _free_run(archive, values, found, record, states)
-    while parts is None and found.held.shape[1] < MOST_PARTS:
+    while parts is None and found.held.shape[1] < POLICY.most_parts:
         finer = samples(run.t, run.u, run.y, every, 2 * found.held.shape[1])
         other = _free_run(archive, values, finer, record, states)
         if not np.any(_apart(free, other, len(noise)) > POLICY.told_apart * noise):

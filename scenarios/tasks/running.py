@@ -264,7 +264,7 @@ def _reached(address: str, stack: ExitStack) -> Any:
     except TimeoutError as error:
         raise BadInput(
             f"--scheduler {address}: has no workers; start some with 'dask worker {address} --nthreads 1 "
-            "--nworkers auto'"
+            "--nworkers=-1'"
         ) from error
     return client
 

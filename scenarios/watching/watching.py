@@ -60,7 +60,8 @@ def watch(
     anew: forget the checkpoint that is there. port: of the local page, None for none. show: gets lines that
     stay, as of alarms. isolation: limits of the process in which a foreign FMU runs, None for this process.
     Raises BadInput if a declaration or the record of the experiment is wrong; a window that is wrong is left
-    out. KeyboardInterrupt leaves the checkpoint of the last window, from which the same call goes on.
+    out. KeyboardInterrupt leaves the checkpoint of the last window, from which the same call goes on, and the
+    result so far.
     """
     refuse_links(Path(out).absolute(), checkpoint.FILE, FILE, OLD, LAST, EVENTS)
     declared = load_watching(watching)
@@ -95,7 +96,11 @@ def watch(
             stack.enter_context(watcher.serving.at(port))
             show([f"page: http://127.0.0.1:{watcher.serving.port}/"])
         stack.callback(watcher.tracing.stop)
-        watcher.run(once, tell)
+        try:
+            watcher.run(once, tell)
+        except KeyboardInterrupt:
+            watcher.finish()
+            raise
         return watcher.finish()
 
 

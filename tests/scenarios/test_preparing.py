@@ -419,6 +419,20 @@ def test_a_trial_tells_mapping_fit_and_cost(tmp_path, capsys):
     assert [f.name for f in sorted(out.iterdir())] == ["dry_run.png", "dry_run.svg"]
 
 
+def test_trials_of_several_experiments_have_a_folder_by_their_id(tmp_path):
+    files = []
+    for name in ("slow", "fast"):
+        file = tmp_path / name / "experiment.toml"
+        file.parent.mkdir()
+        file.write_text((DEMO / "experiment.toml").read_text().replace('id = "', f'id = "{name}-'))
+        files.append(str(file))
+    out = tmp_path / "out"
+    assert run_safely(["close-loop", *files, "--dry-run", "--data", str(DEMO), "--out", str(out)]) == 0
+    ids = sorted(folder.name for folder in out.iterdir())
+    assert [name.split("-")[0] for name in ids] == ["fast", "slow"]
+    assert all((out / name / "dry_run.png").exists() for name in ids)
+
+
 def test_a_trial_notices_a_wrong_unit(tmp_path):
     """Columns in rad/s that are declared as rpm are ten times too small after the conversion."""
     (tmp_path / "data.csv").write_bytes((DEMO / "data.csv").read_bytes())

@@ -224,6 +224,7 @@ def test_a_signal_ends_it_and_keeps_the_checkpoint(stream, number):
     assert process.returncode == 128 + number
     assert "goes on from the last window" in said
     assert (stream / "out" / FILE).exists()
+    assert json.loads((stream / "out" / "watch.json").read_text())["counts"]["windows"] == 3
     assert time.monotonic() - begun < PATIENCE / 4
 
 
