@@ -72,7 +72,7 @@ def false_alarms(
         return Found(0.0, 0.0, streams)
     whole = Reference(
         np.concatenate([r.mean for r in references]), np.concatenate([r.scale for r in references]),
-        np.repeat([r.blocks for r in references], STATISTICS),  # type: ignore[arg-type]  # one of each stream
+        np.concatenate([r.blocks for r in references]),
     )  # fmt: skip
     alarms = _watched(np.concatenate(kept, axis=1), whole, h, len(kept))
     return Found(len(kept) * hours, alarms / (len(kept) * hours), streams - len(kept))

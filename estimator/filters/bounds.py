@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, inf, log
+from math import asinh, atanh, cosh, exp, inf, log, sqrt
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -83,6 +83,24 @@ class Transform:
     def spread(self, z: Array, std: Array) -> Array:
         """Half the distance between the parameters at z plus and minus one standard deviation."""
         return (self.theta(z + std) - self.theta(z - std)) / 2
+
+    def deviation(self, z: float, std: float) -> float:
+        """The deviation of the coordinate at z whose `spread` is std, > 0; beyond `widest`, that of `widest`.
+
+        For a small std it is std over the slope. Near a bound the slope changes within it, and this quotient
+        would stand for a prior that is far wider than the one that was asked for.
+        """
+        if self.kind in ("free", "clip"):
+            return std
+        if self.kind == "log":
+            return asinh(std / self.slope(z))
+        share = 2 * min(std, self.widest) / (self.high - self.low)
+        return atanh(share) + asinh(share * cosh(z) / sqrt(1 - share**2))
+
+    @property
+    def widest(self) -> float:
+        """Largest standard deviation that means anything: that of a uniform one between both bounds."""
+        return (self.high - self.low) / sqrt(12) if self.kind == "logit" else inf
 
     def settled(self, z: Array) -> Array:
         """The coordinate after a correction, which only clipping changes."""

@@ -7,6 +7,7 @@ import numpy as np
 from estimator.access.copies import Refused
 from estimator.access.exchange import Exchange
 from estimator.access.probe import Dishonest
+from estimator.filters.estimator import Diverged
 from estimator.filters.linear import (
     NUDGE,
     central,
@@ -88,10 +89,10 @@ def differentiated(joint: Joint, u: Array, t: float, dt: float) -> Differentiate
     made = Differentiated(joint, exchange)
     begun = joint.start(t)
     x, carried = begun.x, begun.carried
-    line = linearised(joint, x, u, dt, np.sqrt(np.diag(begun.P)), t, carried)
     try:
+        line = linearised(joint, x, u, dt, np.sqrt(np.diag(begun.P)), t, carried)
         own = made.dfdx(x, u, t, dt, carried), made.dhdx(x, u, t, carried)
-    except Refused:
+    except (Refused, Diverged):
         return None
     agree = all(
         np.allclose(found, expected, rtol=0.0, atol=AGREES * float(np.abs(expected).max()))

@@ -58,11 +58,11 @@ class Dual(Estimator):
             raise BadInput(
                 f"[estimate.options] filter = '{cls.name}' does not support gate and adapt; leave them out"
             )
-        if joint.noises:
+        if joint.noises or joint.unknown:
             raise BadInput(
-                f"[estimate.options] filter = '{cls.name}' takes all but the states for constant, which "
-                "noise of an input or noise that is correlated in time is not; choose 'ukf', or leave out "
-                "[estimate.noise] and noise_std of [inputs]"
+                f"[estimate.options] filter = '{cls.name}' takes all but the states for constant, which an "
+                "unknown input, noise of an input or noise that is correlated in time is not; choose 'ukf', "
+                "or leave out [estimate.inputs], [estimate.noise] and noise_std of [inputs]"
             )
         return cls(joint, len(joint.states), start, joint.noise, asked.R, asked.dt, asked.spread)
 

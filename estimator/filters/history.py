@@ -127,6 +127,13 @@ class History:
     estimates: Sequence[Estimate] = ()
 
     @property
+    def accepted(self) -> Array:
+        """The innovations (N, m) that changed the estimate: those of the gate's rejected channels are nan."""
+        return by_rows(
+            self.innovation.shape, lambda rows: np.where(self.gated[rows], np.nan, self.innovation[rows])
+        )
+
+    @property
     def log_likelihood(self) -> float:
         """Of all samples."""
         return float(self.likelihoods.sum())

@@ -70,6 +70,11 @@ class Imm(Estimator):
                 f"[estimate.options] filter = '{cls.name}' needs an unknown parameter, whose distribution it "
                 "parts; add one to [estimate] or choose 'ukf'"
             )
+        if asked.gate:
+            raise BadInput(
+                f"[estimate.options] filter = '{cls.name}' does not support gate: what each of its filters "
+                "leaves out is another sample, so that their likelihoods cannot be compared; leave it out"
+            )
         return cls.among(parts(start, len(joint.states)), None, joint, start, asked)
 
     @classmethod

@@ -65,6 +65,9 @@ class Iterated(Ukf):
         draw(x, checked(x, P, self.names, at.t), self._scale, X)
         expect(self.system.h(X, at.u, at.t, at.carried), self._Wm, self._Wc, Y, y, S)
         cross(Y, y, X, x, self._Wc, Psi)
-        H: Array = np.asarray(np.linalg.lstsq(P, Psi.T, rcond=None)[0].T, dtype=np.float64)
+        # over the deviations, since the rank of P must not depend on the units
+        size = np.sqrt(np.maximum(np.diag(P), 1e-300))
+        unit = np.linalg.lstsq(P / np.outer(size, size), (Psi / size).T, rcond=None)[0].T
+        H: Array = np.asarray(unit / size, dtype=np.float64)
         rest: Array = S - H @ P @ H.T
         return H, y, (rest + rest.T) / 2

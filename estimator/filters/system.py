@@ -46,8 +46,8 @@ class UnknownParameter:
         return self.transform.z(self.start)
 
     def in_z(self, std: float) -> float:
-        """A small deviation of the parameter from the prior mean, converted to the filter's coordinate."""
-        return std / self.transform.slope(self.z)
+        """A deviation of the parameter about the prior mean, converted to the filter's coordinate."""
+        return self.transform.deviation(self.z, std)
 
 
 @dataclass(frozen=True)

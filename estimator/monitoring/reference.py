@@ -22,11 +22,14 @@ LEAST_SCALE = 1e-9  # of a statistic that never changes
 
 @dataclass(frozen=True)
 class Reference:
-    """Mean (c,) and long-run scale (c,) of the statistics over a number of healthy blocks."""
+    """Mean (c,) and long-run scale (c,) of the statistics over healthy blocks; inf of one that is not tested.
+
+    blocks: (c,) number of the blocks in which there was the statistic.
+    """
 
     mean: Array
     scale: Array
-    blocks: int
+    blocks: Array
 
 
 def learned(values: Array, exponent: float) -> Reference | None:
@@ -35,19 +38,21 @@ def learned(values: Array, exponent: float) -> Reference | None:
     exponent: 2 k b of the test that uses it, see `cusum`. The long-run variance is the largest one of two
     kinds of estimate: by means of batches of 1, 2, 4, ... blocks (Kim, Alexopoulos, Tsui and Wilson, IIE
     Transactions 39 (2007) 317), and by the correlation of successive blocks as of an autoregression. None if
-    the blocks are so correlated that they tell less than the policy asks.
+    the blocks are so correlated that they tell less than the policy asks. A statistic that is there in less
+    than half of the blocks, as that of an input which rests, is not waited for; without enough of them it is
+    not tested.
     """
     rho = correlation(values)
     n = np.isfinite(values).sum(axis=0)
-    if np.min(n * (1 - rho) / (1 + rho), where=n > 0, initial=np.inf) < POLICY.independent:
+    used, usual = n * (1 - rho) / (1 + rho) >= POLICY.independent, n >= len(values) / 2
+    if not usual.any() or not used[usual].all():
         return None
-    used = n > 0
-    mean, scale = np.zeros(len(n)), np.full(len(n), np.inf)  # a statistic that was never there tells nothing
+    mean, scale = np.zeros(len(n)), np.full(len(n), np.inf)
     some = values[:, used]
     mean[used] = np.nanmean(some, axis=0)
     variance = np.fmax(_by_correlation(some, rho[used], exponent), _by_batches(some, exponent))
     scale[used] = np.maximum(np.sqrt(variance), LEAST_SCALE)
-    return Reference(mean, scale, len(values))
+    return Reference(mean, scale, np.where(used, n, len(values)))
 
 
 def correlation(values: Array) -> Array:

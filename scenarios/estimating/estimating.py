@@ -211,7 +211,7 @@ def result_of(
     s, h, joint = found.setup, found.history, found.joint
     reason = h.broken and f"{h.broken}; the estimate ends at this time"
     access = joint.access
-    tests = checks(h.nis, h.freedom, h.innovation, s.outputs)
+    tests = checks(h.nis, h.freedom, h.accepted, s.outputs)
     bounds = {name: ended.side for name, ended in standings(found).items() if ended.side}
     return EstimateResult(
         experiment=s.experiment.id,

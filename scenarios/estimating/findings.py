@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.filters.estimator import Diverged
-from estimator.filters.history import History, Samples, filtered
+from estimator.filters.estimator import Diverged, Estimate
+from estimator.filters.history import History, Samples, Steps, filtered
 from estimator.filters.identifiability import (
     Identifiability,
     afterwards,
@@ -18,6 +18,7 @@ from estimator.filters.smoother import smoothed
 from estimator.filters.system import Joint, UnknownParameter
 from estimator.record import Array
 from fmus.aside import all_set_aside, by_rows
+from fmus.errors import BadInput
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
 from scenarios.estimating.form import (
@@ -99,19 +100,42 @@ def _run(s: Setup, archive: Archive, tell: Tell) -> Findings:
         known = _before(s, archive, joint)
         start = joint.start(float(s.samples.t[0]))
         keep = s.options.smooth
-        filter = filter_of(s, joint, start)
+        filter = _begun(s, joint, start)
         history = filtered(filter, s.samples, lambda done: tell(f"filtering, {done:.0%} done"), keep)
-        if keep:
+        if keep and history.estimates:
             history = _smoothed(history)
         history = _with_accepted(s, history)
         value, std = all_set_aside(joint.values(history.x, history.std))
         n = len(joint.names) - len(joint.noises)
         unknown, P0, P = n - len(s.states), start.P[:n, :n], history.last.P[:n, :n]
         learnt = afterwards(joint.names[:n], P0, P, unknown) if unknown else None
+        learnt = learnt and _in_units(learnt, joint, std[-1:])
     except BaseException:
         joint.close()
         raise
     return Findings(s, joint, history, value, std, known, learnt, share)
+
+
+def _begun(s: Setup, joint: Joint, start: Estimate) -> Steps:
+    """The filter at its start; BadInput where the FMU cannot be simulated there."""
+    try:
+        return filter_of(s, joint, start)
+    except Diverged as error:
+        raise BadInput(
+            f"{s.experiment.file}: the filter cannot begin: {error}; change the start values of [estimate]"
+        ) from error
+
+
+def _in_units(found: Identifiability, joint: Joint, std: Array) -> Identifiability:
+    """With what is left of a parameter's deviation in its own unit, if that is less than in its coordinate.
+
+    Far nearer to its bound than it began, a parameter may be known a hundred times better in its unit though
+    its coordinate is as uncertain as before. std: (1, n) at the end, in the FMU's units; empty if none.
+    """
+    left, first = found.left.copy(), len(joint.states)
+    for i, p in enumerate(joint.parameters if len(std) else ()):
+        left[i] = min(left[i], float(std[0, first + i]) / p.std)
+    return replace(found, left=left)
 
 
 def prepared(s: Setup, archive: Archive, tell: Tell) -> tuple[Setup, float | None]:

@@ -123,7 +123,9 @@ def widened(histories: Sequence[History], best: int, among: Sequence[int], names
     h = histories[best]
     if len(among) < 2:
         return h
-    every = np.array([histories[i].x for i in among])
-    scatter = np.var(every, axis=0, ddof=1)
-    shared = np.isin(h.names, names).astype(float)
-    return replace(h, std=np.sqrt(h.std**2 + scatter * shared))
+    std = h.std.copy()
+    for name in set(names) & set(h.names):  # forms may differ in what else they estimate, as noise of inputs
+        every = [histories[i].x[:, histories[i].names.index(name)] for i in among]
+        k = h.names.index(name)
+        std[:, k] = np.sqrt(std[:, k] ** 2 + np.var(every, axis=0, ddof=1))
+    return replace(h, std=std)

@@ -72,7 +72,8 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
         layout = [[name, f"{name} memory"] for name in some]
         figure, axes = sheet(ROW * len(some) + 0.5, layout, width_ratios=[2.4, 1])
         for name in some:
-            e = h.innovation[:, found.setup.outputs.index(name)]
+            j = found.setup.outputs.index(name)
+            e = h.innovation[:, j]
             ax, memory = axes[name], axes[f"{name} memory"]
             seen = np.isfinite(e)
             ax.plot(*envelope(h.t[seen], e[seen]), color=AFTER, linewidth=0.5)
@@ -80,7 +81,7 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
                 ax.axhline(level, color=LAW, linewidth=0.8, linestyle="--")
             ax.set_xlim(float(h.t[0]), float(h.t[-1]))
             name_axes(ax, "", f"{name}\nover expected")
-            white = whiteness(e)
+            white = whiteness(np.where(h.gated[:, j], np.nan, e))
             lags = np.arange(1, len(white.correlation) + 1)
             memory.bar(lags, white.correlation, color=AFTER, width=0.6)
             if len(lags):

@@ -187,10 +187,10 @@ def estimated(
 
 
 def innovations(h: History, outputs: tuple[str, ...], noise: Array) -> dict[str, dict[str, float | None]]:
-    """How well the filter predicted each output."""
-    found = {}
+    """How well the filter predicted each output, where its gate accepted the measurement."""
+    found, accepted = {}, h.accepted
     for j, name in enumerate(outputs):
-        e = h.innovation[:, j]
+        e, measured = accepted[:, j], int(np.isfinite(h.innovation[:, j]).sum())
         seen = e[np.isfinite(e)]
         white = whiteness(e)
         found[name] = {
@@ -200,7 +200,7 @@ def innovations(h: History, outputs: tuple[str, ...], noise: Array) -> dict[str,
             "largest_correlation": finite(white.largest),
             "white_below": finite(white.limit),
             "p_white": finite(white.p_value),
-            "gated_share": finite(float(h.gated[:, j].sum()) / len(seen) if len(seen) else np.nan),
+            "gated_share": finite(float(h.gated[:, j].sum()) / measured if measured else np.nan),
         }
     return found
 

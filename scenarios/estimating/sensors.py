@@ -81,6 +81,11 @@ def noise_of(e: Experiment, o: Options, record: Record, dt: float) -> tuple[Sens
         seen = _seen(record, j)
         step = step_of([seen])
         if np.isnan(std):
+            if not np.ptp(seen):
+                raise BadInput(
+                    f"{e.file}: [outputs.{name}] is constant over the record, which does not show its noise; "
+                    "add noise_std, or leave the output out"
+                )
             rough = rounded_noise(seen) if step else _rough(seen)
             std = max(rough, FLOOR * float(np.std(seen)), least_std(step), 1e-300)
         noise = SensorNoise(name, std)

@@ -87,7 +87,7 @@ class Setup:
     @property
     def moving(self) -> bool:
         """Whether the share of the states' motion that is noise is to be found, for want of declarations."""
-        return set(self.options.process_std) < {state.name for state in self.states}
+        return any(state.name not in self.options.process_std for state in self.states)
 
     def sensing(self, sensors: tuple[SensorNoise, ...]) -> "Setup":
         """The same with other noise of the sensors, which leaves the start of a measured state no surer."""

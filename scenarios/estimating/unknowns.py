@@ -64,7 +64,7 @@ def parameters_of(e: Experiment, o: Options, d: FmuDescription) -> Iterator[Unkn
             transform.z(start)
         except BadInput as error:
             raise BadInput(f"{where}: start {error}") from error
-        yield UnknownParameter(name, start, std, transform, o.walk.get(name, 0.0))
+        yield UnknownParameter(name, start, min(std, transform.widest), transform, o.walk.get(name, 0.0))
 
 
 def _transform(wanted: EstimatedParameter, v: FmuVariable, clip: bool, where: str) -> Transform:
@@ -104,10 +104,13 @@ def states_of(
         if name in record.outputs:
             j = record.outputs.index(name)
             seen = y[np.isfinite(y[:, j]), j]
-            std = POLICY.measured_start * float(noise[j])
-            if len(seen):
+            near = POLICY.measured_start * float(noise[j])
+            if np.isfinite(y[0, j]):
                 start = e.initial.get(name, float(seen[0]))
-                std = max(std, abs(start - float(seen[0])))
+                std = max(near, abs(start - float(seen[0])))
+            elif len(seen):  # first measured later, until when the state moves by its usual size
+                start = e.initial.get(name, float(seen[0]))
+                std = max(near, std)
         yield UnknownState(name, start, o.initial_std.get(name, std))
 
 

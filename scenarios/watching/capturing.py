@@ -15,6 +15,7 @@ from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.validation import read_toml
 from scenarios.output import written, written_at_once
 from scenarios.watching.declaration import Trace
+from scenarios.watching.logging import seconds
 from scenarios.watching.policy import POLICY
 from scenarios.watching.windows import Window
 
@@ -50,22 +51,15 @@ class Capturing:
         self._gone: list[Piece] = []  # whose files go when a checkpoint no longer names them
 
     def add(self, window: Window) -> None:
-        """Keep a window."""
+        """Keep a window, as long as an alarm may date a change back to it."""
         number = self.pieces[-1].number + 1 if self.pieces else 0
         file = self._file(number)
         file.parent.mkdir(parents=True, exist_ok=True)
         write_at_once(file, _parquet(window.table(), window.units))
         pieces = (*self.pieces, Piece(number, window.begin, window.end))
-        since = min([w.since for w in self.waiting], default=window.end - self._trace.after)
-        since -= self._trace.before
-        since = max(since, window.end - self._longest)
+        since = window.end - POLICY.longest * (self._trace.before + self._trace.after)
         self._gone += [p for p in pieces if p.end < since]
         self.pieces = tuple(p for p in pieces if p.end >= since)
-
-    @property
-    def _longest(self) -> float:
-        """Of the record that is kept, s, also where a change is dated far back."""
-        return POLICY.longest * (self._trace.before + self._trace.after)
 
     def alarm(self, a: Alarm, event: int) -> None:
         """Wait for the record after an alarm."""
@@ -117,7 +111,7 @@ class Capturing:
 def sentence(a: Alarm) -> str:
     """What an alarm says."""
     like = f", most like {a.like[0][0]}" if a.like else ""
-    return f"at t = {a.t:.6g} s, since about {a.since:.6g} s: {a.statistic.sentence}{like}"
+    return f"at t = {seconds(a.t)} s, since about {seconds(a.since)} s: {a.statistic.sentence}{like}"
 
 
 def _parquet(table: pd.DataFrame, units: Mapping[str, str]) -> bytes:

@@ -13,6 +13,7 @@ from estimator.record import Array
 from scenarios.experiment.checks import GAP
 from scenarios.watching.checkpoint import Checkpoint, Counts
 from scenarios.watching.commission import Commissioned, Making
+from scenarios.watching.logging import seconds
 from scenarios.watching.triggers.trigger import Trigger
 from scenarios.watching.windows import Window
 
@@ -100,7 +101,9 @@ class Following:
         """The results of the filter over rows without a gap, and the alarms of the test."""
         t = float(rows.t[0])
         if self._begun and t - self.carried.until > self.gap:
-            notes.append(f"no data from {self.carried.until:.9g} to {t:.9g} s: the filter begins anew")
+            notes.append(
+                f"no data from {seconds(self.carried.until)} to {seconds(t)} s: the filter begins anew"
+            )
             self.counts = replace(self.counts, gaps=self.counts.gaps + 1)
             self._begun = False
         if not self._begun:

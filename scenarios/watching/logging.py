@@ -58,6 +58,11 @@ class Log:
             raise
 
 
+def seconds(t: float) -> str:
+    """A time in s to a tenth of a millisecond, also one that counts from 1970."""
+    return f"{round(t, 4):.15g}"
+
+
 def _line(cells: Sequence[object]) -> bytes:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(cells)

@@ -29,7 +29,7 @@ from scenarios.watching.declaration import Watched, load_watching
 from scenarios.watching.following import LEARNING, PAST, TESTED, Following, Outcome
 from scenarios.watching.health import Height, Status
 from scenarios.watching.joining import Joining
-from scenarios.watching.logging import FILE, OLD, Log
+from scenarios.watching.logging import FILE, OLD, Log, seconds
 from scenarios.watching.result import RESULT, WatchResult
 from scenarios.watching.serving import Serving
 from scenarios.watching.sources.folder import Folder
@@ -241,7 +241,8 @@ class Watcher:
         """The line of the log."""
         found: dict[str, object] = {"window": o.name, "state": o.state, "notes": "; ".join(o.notes)}
         if o.window is not None:
-            found |= {"begin": o.window.begin, "end": o.window.end, "rows": len(o.window.rows.t)}
+            found |= {"begin": seconds(o.window.begin), "end": seconds(o.window.end)}
+            found |= {"rows": len(o.window.rows.t)}
         if o.state in (TESTED, LEARNING):
             worst = max(self._heights(), key=lambda h: h.height)
             found |= {"nis": o.nis, "statistic": worst.name, "height": worst.height}

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag
 
 from estimator.filters import filters
-from estimator.filters.estimator import Estimate
+from estimator.filters.estimator import Estimate, Gate
 from estimator.filters.history import filtered, samples
 from estimator.filters.imm import Imm
 from estimator.filters.iterated import Iterated
@@ -21,6 +21,7 @@ from estimator.filters.named import Request
 from estimator.filters.rbpf import Rbpf, systematic
 from estimator.filters.square_root import SquareRoot, triangular
 from estimator.filters.ukf import USUAL, Ukf
+from estimator.filters.unknown_input import Wandering
 from fmus.errors import BadInput
 from tests.estimator.test_filters import DT, record, run, system
 from tests.estimator.test_filters_fmu import VDP_DT, VDP_NOISE, vdp_joint, vdp_record
@@ -64,6 +65,21 @@ def test_a_filter_of_parameters_needs_one(name, vdp):
             filters()[name].of(joint, joint.start(), asked)
 
 
+@pytest.mark.parametrize("name", ["imm", "rbpf", "dual"])
+def test_a_filter_whose_likelihoods_a_gate_would_spoil_refuses_it(name, vdp):
+    asked = Request(VDP_NOISE**2 * np.eye(1), VDP_DT, np.zeros(1), Gate(5.0), None, USUAL)
+    with vdp_joint(vdp) as joint, pytest.raises(BadInput, match="does not support gate"):
+        filters()[name].of(joint, joint.start(), asked)
+
+
+def test_a_filter_that_takes_inputs_for_constant_refuses_an_unknown_one(vdp):
+    asked = Request(VDP_NOISE**2 * np.eye(1), VDP_DT, np.zeros(1), None, None, USUAL)
+    with vdp_joint(vdp) as joint:
+        joint.unknown = (Wandering("u", 1.0, 1.0),)
+        with pytest.raises(BadInput, match=r"or leave out \[estimate.inputs\]"):
+            filters()["dual"].of(joint, joint.start(), asked)
+
+
 # ---- factors and iterations
 
 
@@ -77,6 +93,16 @@ def test_the_square_root_and_the_iterated_form_are_the_kalman_filter_where_all_i
         assert_allclose(a.P, b.P, atol=1e-8)
         assert_allclose(a.C, b.C, atol=1e-8)
     assert likelihood(found) == pytest.approx(likelihood(exact), abs=1e-6)
+
+
+def test_the_iterated_form_corrects_unknowns_of_any_unit():
+    start = Estimate(0.0, np.zeros(2), np.diag([1e12, 1e-6]))
+    still = np.zeros((2, 1))
+    made = Linear(np.eye(2), still, np.eye(2), still, ("a", "b"), ("a", "b"))
+    Q, R = np.zeros((2, 2)), np.diag([1e10, 1e-8])
+    iterated, plain = (k(made, start, Q, R, DT).step(np.zeros(1), np.ones(2)) for k in (Iterated, Ukf))
+    assert_allclose(iterated.x, plain.x, rtol=1e-6)
+    assert_allclose(np.diag(iterated.P), np.diag(plain.P), rtol=1e-6)
 
 
 def test_a_triangular_factor_is_one_of_the_same_matrix():

@@ -42,6 +42,24 @@ def test_a_coordinate_is_that_of_its_value_and_the_slope_its_derivative(bounds, 
     )
 
 
+@given(BOUNDS, st.floats(-8, 8), st.floats(-4, 3))
+def test_a_prior_has_the_deviation_that_was_asked_for_also_beside_a_bound(bounds, z, decades):
+    made = bounded(bounds)
+    std = 10**decades * made.slope(z)
+    found = made.deviation(z, std)
+    assert float(made.spread(np.array([z]), np.array([found]))[0]) == pytest.approx(
+        min(std, made.widest), rel=1e-4
+    )
+    if decades < -2:
+        assert found == pytest.approx(10**decades, rel=1e-3)
+
+
+def test_no_deviation_between_bounds_is_wider_than_even():
+    made = bounded((0.0, 1.0))
+    assert made.widest == pytest.approx(np.std(np.linspace(0, 1, 100_001)), rel=1e-4)
+    assert made.deviation(0.3, 5.0) == made.deviation(0.3, made.widest)
+
+
 def test_clipping_cuts_off_and_brings_the_coordinate_back():
     made = Transform("clip", 0.02, 0.8)
     z = np.array([-1.0, 0.5, 2.0])

@@ -114,6 +114,17 @@ def test_a_reference_waits_until_the_blocks_tell_enough():
     assert learned(autoregression(0.0)(np.random.default_rng(5), 200, 3), 20.0) is not None
 
 
+def test_a_statistic_that_is_rarely_there_holds_up_no_other():
+    values = autoregression(0.0)(np.random.default_rng(7), 2000, 3)
+    values[20:, 1], values[400:, 2] = np.nan, np.nan
+    found = learned(values, 20.0)
+    assert found is not None
+    assert_array_equal(np.isfinite(found.scale), [True, False, True])
+    assert found.blocks[0] == 2000
+    assert found.blocks[2] == 400
+    assert learned(values[:, [1]], 20.0) is None
+
+
 def test_the_scale_of_a_reference_is_the_one_of_long_sums():
     memory = 0.6
     values = autoregression(memory)(np.random.default_rng(6), 20000, 4)

@@ -278,6 +278,53 @@ def test_a_parameter_that_the_data_do_not_inform_is_reported_as_such(vdp, tmp_pa
     assert any("the record contains no information on 'fault'" in note for note in result.notes)
 
 
+def test_a_start_beside_its_bound_has_the_declared_prior(vdp, tmp_path):
+    """The half of a percent of the bounds is the distance of the start from one of them."""
+    file = write_vdp(tmp_path, vdp)
+    file.write_text(file.read_text().replace("start = 1.5, std = 0.5", "start = 0.05, std = 1.0"))
+    mu = estimate(file).estimated["mu"]
+    assert mu["value"] == pytest.approx(MU, abs=3 * mu["std_error"])
+    assert mu["std_error"] < 0.2
+    assert mu["prior"] == [0.05, 1.0]
+
+
+def test_a_parameter_that_the_data_bring_to_its_bound_is_informed(vdp, tmp_path):
+    file = write_vdp(tmp_path, vdp)
+    file.write_text(file.read_text().replace("start = 1.5, std = 0.5", "start = 9.9, std = 0.05"))
+    found = estimate(file)
+    mu = found.estimated["mu"]
+    left = found.identifiability["after"]["deviation_left"]["mu"]
+    assert left <= mu["std_error"] / 0.05 * (1 + 1e-9)
+
+
+def test_a_constant_column_without_noise_is_refused(vdp, tmp_path):
+    file = write_vdp(tmp_path, vdp)
+    file.write_text(file.read_text().replace("noise_std = 0.05\n", ""))
+    table = pd.read_csv(tmp_path / "data.csv")
+    table["x"] = 2.0
+    table.to_csv(tmp_path / "data.csv", index=False)
+    with pytest.raises(BadInput, match=r"\[outputs.x0\] is constant over the record"):
+        estimate(file)
+
+
+def test_noise_of_a_state_that_is_not_estimated_leaves_the_others_to_be_found(vdp, tmp_path):
+    found = estimate(write_vdp(tmp_path, vdp), options=Options(process_std={"x1": 1e-3}))
+    assert found.process_noise_share is not None
+
+
+def test_a_first_sample_that_is_empty_leaves_the_state_open(vdp, tmp_path):
+    """The first measurement comes after 4 s, when the state has moved on."""
+    file = write_vdp(tmp_path, vdp)
+    file.write_text(file.read_text().replace("[initial]\nx0 = 2.0\n", ""))
+    table = pd.read_csv(tmp_path / "data.csv")
+    table.loc[:80, "x"] = np.nan
+    table.to_csv(tmp_path / "data.csv", index=False)
+    found = estimate(file, tmp_path / "out")
+    first = np.genfromtxt(tmp_path / "out" / "estimate.csv", delimiter=",", names=True)[0]
+    assert first["x0_std"] > 0.9 > 10 * NOISE
+    assert found.estimated["mu"]["value"] == pytest.approx(MU, abs=3 * found.estimated["mu"]["std_error"])
+
+
 def test_smoothing_and_the_other_filters(vdp, tmp_path):
     file = write_vdp(tmp_path, vdp)
     known = {"process_std": {"x0": 1e-3, "x1": 1e-3}}

@@ -42,6 +42,20 @@ def test_each_check_rejects_what_it_is_for():
     assert [c.check for c in checks_of(coloured) if not c.passed] == ["whiteness of b"]
 
 
+def test_what_the_gate_has_left_out_is_in_no_check(vdp, tmp_path):
+    file = write_vdp(tmp_path, vdp)
+    text = (tmp_path / "data.csv").read_text().splitlines()
+    for k in (100, 101, 102, 250, 251, 252):
+        t, u, _ = text[k].split(",")
+        text[k] = f"{t},{u},9.0"
+    (tmp_path / "data.csv").write_text("\n".join(text) + "\n")
+    options = Options(gate=5.0, process_std={"x0": 1e-3, "x1": 1e-3})
+    result = estimate(file, options=options)
+    assert result.consistent, result.doubt
+    assert result.innovations["x0"]["rms_over_expected"] == pytest.approx(1.0, abs=0.12)
+    assert result.innovations["x0"]["gated_share"] == pytest.approx(6 / 400)
+
+
 def optimistic(folder, vdp):
     """An oscillator whose sensor is declared 2.5 times better than it is."""
     file = write_vdp(folder, vdp)

@@ -30,12 +30,14 @@ from scenarios.estimating.setup import set_up
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.record import load_record
 from scenarios.watching import checkpoint
+from scenarios.watching.capturing import Capturing
 from scenarios.watching.checkpoint import Checkpoint
 from scenarios.watching.commission import Making, commissioned
+from scenarios.watching.declaration import Trace
 from scenarios.watching.following import LEARNING, OUTSIDE, PAST, TESTED, Following
 from scenarios.watching.joining import Joining
 from scenarios.watching.logging import FILE as LOG
-from scenarios.watching.logging import Log
+from scenarios.watching.logging import Log, seconds
 from scenarios.watching.watching import watch
 from scenarios.watching.windows import Reading, follow_on
 from tests.helpers.streams import (
@@ -454,6 +456,25 @@ def test_memory_is_constant(tmp_path):
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as processes:
         sizes = processes.submit(memory, tmp_path).result()
     assert sizes[-1] - sizes[1] < 800_000
+
+
+def test_windows_are_kept_as_long_as_an_alarm_may_date_a_change_back(tmp_path):
+    """Two minutes back, of which the half minute before the change is part."""
+    capturing = Capturing(tmp_path, SimpleNamespace(), Trace(before=30.0, after=20.0))
+    for begin in np.arange(0.0, 1000.0, 5.0).tolist():
+        table = pd.DataFrame({"t": [begin, begin + 4.9]})
+        capturing.add(SimpleNamespace(table=lambda t=table: t, units={}, begin=begin, end=begin + 4.9))
+        capturing.tidy()
+    first, last = capturing.pieces[0].begin, capturing.pieces[-1].end
+    assert 195.0 < last - first < 206.0
+    assert len(list((tmp_path / "recent").iterdir())) == len(capturing.pieces)
+
+
+@pytest.mark.parametrize(
+    ("t", "text"), [(61.5, "61.5"), (0.1 + 0.2, "0.3"), (1767323045.37, "1767323045.37"), (1e-9, "0")]
+)
+def test_a_time_is_read_to_the_millisecond_also_in_seconds_since_1970(t, text):
+    assert seconds(t) == text
 
 
 def test_a_line_that_the_disk_takes_in_part_is_not_in_the_log(tmp_path):
