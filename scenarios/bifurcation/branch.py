@@ -42,10 +42,15 @@ class Branch:
 
 @dataclass(frozen=True)
 class Fold:
-    """Where a branch turns back in the parameter; error: by the steps of the integrator, nan if not known."""
+    """Where a branch turns back in the parameter; error: by the steps of the integrator, nan if not known.
+
+    stable: whether the branch is stable on one side. At the fold itself a multiplier is one, which rounding
+    puts inside or outside.
+    """
 
     cycle: Cycle
     error: float
+    stable: bool
 
     @property
     def parameter(self) -> float:
@@ -94,16 +99,17 @@ def folds(branch: Branch, shooting: Shooting) -> Iterator[Fold]:
     for now, after in pairwise(branch.cycles):
         if now.tangent[-1] * after.tangent[-1] < 0:
             stride = float(now.tangent @ (after.place - now.place))
+            stable = min(now.unstable, after.unstable) == 0
             try:
                 cycle = _fold(shooting, now, stride)
             except (Lost, ValueError):
-                yield Fold(now, abs(after.parameter - now.parameter))
+                yield Fold(now, abs(after.parameter - now.parameter), stable)
                 continue
             try:
                 error = abs(_fold(finer, now, stride).parameter - cycle.parameter)
             except (Lost, ValueError):
                 error = float("nan")
-            yield Fold(cycle, error)
+            yield Fold(cycle, error, stable)
 
 
 def changes(branch: Branch) -> Iterator[Change]:

@@ -43,6 +43,8 @@ def headline(found: Bifurcation) -> str:
             f"Rest is unstable from the beginning of the range of {found.parameter} on"
         )  # fmt: skip
     said = f"Rest is unstable from {found.parameter} = {found.of_parameter(found.linear[0])} on"
+    if found.stable_throughout:
+        return f"{said}; stable limit cycles exist down to the beginning of the range"
     if found.nonlinear is None:
         return said
     return f"{said}; stable limit cycles exist from {found.of_parameter(found.nonlinear[0])} on"

@@ -98,11 +98,24 @@ class Bifurcation:
 
     @property
     def nonlinear(self) -> tuple[float, float] | None:
-        """The nonlinear critical value, the least with a stable limit cycle, and its error."""
-        nothing = float("nan")
-        known = [(c.parameter, nothing) for limb in self.limbs for c in limb.branch.cycles if not c.unstable]
-        known += [(f.parameter, f.error) for limb in self.limbs for f in limb.folds if f.cycle.unstable <= 1]
+        """The nonlinear critical value, the least with a stable limit cycle, and its error.
+
+        None where there is no such cycle, or where they leave the range at its beginning.
+        """
+        if self.stable_throughout:
+            return None
+        known = [(c.parameter, float("nan")) for c in self._stable if c.parameter <= self.high]
+        known += [(f.parameter, f.error) for limb in self.limbs for f in limb.folds if f.stable]
         return min(known, default=None)
+
+    @property
+    def stable_throughout(self) -> bool:
+        """Whether stable limit cycles leave the range at its beginning, and the critical value with them."""
+        return any(c.parameter < self.low for c in self._stable)
+
+    @property
+    def _stable(self) -> list[Cycle]:
+        return [c for limb in self.limbs for c in limb.branch.cycles if not c.unstable]
 
     def write(self, folder: Path) -> None:
         """Write result.json, rest.csv and cycles.csv, in SI."""

@@ -27,7 +27,10 @@ def simulated(given: Mapping[str, Any], place: Place) -> Answer:
     and `isolation`. Raises the error of a reason that may pass.
     """
     try:
-        return {"verdict": "done", "values": _measured(given, place)}
+        values = _measured(given, place)
+        missing = [name for name, value in values.items() if value is None]
+        reason = f"not finite: {', '.join(missing)}" if missing else ""
+        return {"verdict": "done", "values": values, "reason": reason}
     except Exception as error:  # whatever one point does, it is one row
         if may_pass(error):
             raise

@@ -77,6 +77,7 @@ def _effect(e: Row) -> Row:
         "shown": len(e["shown"]),
         "absent": len(e["absent"]),
         "open": len(e["possible"]) + len(e["blind"]),
-        "share": f"{e['share_low_95']:.0%} to {e['share_high_95']:.0%}",
+        "untraced": len(e["untraced"]),
+        "share": "" if e["share"] is None else f"{e['share_low_95']:.0%} to {e['share_high_95']:.0%}",
         "vehicles": ", ".join(e["shown"][:10]) + (", …" if len(e["shown"]) > 10 else ""),
     }

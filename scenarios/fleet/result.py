@@ -122,11 +122,13 @@ def effect_words(e: Mapping[str, Any]) -> str:
     """An effect of a class, in words."""
     of = f" of class {e['class']}" if e["class"] else ""
     size = quantity(with_error(e["size"], e["std"]), e["unit"])
-    decided = len(e["shown"]) + len(e["absent"])
+    shown, decided = len(e["shown"]), len(e["shown"]) + len(e["absent"])
+    open_ = len(e["possible"]) + len(e["blind"])
+    band = "" if e["share"] is None else f" ({e['share_low_95']:.0%} to {e['share_high_95']:.0%})"
+    untraced = f", not traced in {len(e['untraced'])}" if e["untraced"] else ""
     return (
-        f"{e['kind']}@{e['location']}, {e['parameter']} = {size}: in {len(e['shown'])} of the {decided} "
-        f"vehicles{of} that would have shown it ({e['share_low_95']:.0%} to {e['share_high_95']:.0%}), "
-        f"not decided in {len(e['possible']) + len(e['blind'])}"
+        f"{e['kind']}@{e['location']}, {e['parameter']} = {size}: in {shown} of the {decided} "
+        f"vehicles{of} that would have shown it{band}, not decided in {open_}{untraced}"
     )
 
 

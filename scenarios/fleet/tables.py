@@ -32,7 +32,7 @@ EFFECT_COLUMNS = pa.schema(
         *((n, TEXT) for n in ("setup", "model", "class", "kind", "location", "parameter", "unit")),
         ("size", NUMBER), ("std", NUMBER), ("spread", NUMBER), ("share", NUMBER), ("share_low_95", NUMBER),
         ("share_high_95", NUMBER),
-        *((n, pa.list_(TEXT)) for n in ("shown", "possible", "absent", "blind")),
+        *((n, pa.list_(TEXT)) for n in ("shown", "possible", "absent", "blind", "untraced")),
     ]
 )  # fmt: skip
 Row = dict[str, Any]
@@ -76,7 +76,7 @@ def effect_row(x: Pooled) -> Row:
         "parameter": x.parameter, "unit": x.unit, "size": x.size.value, "std": x.size.std,
         "spread": x.size.spread, "share": x.share, "share_low_95": x.share_low,
         "share_high_95": x.share_high, "shown": x.shown, "possible": x.possible, "absent": x.absent,
-        "blind": x.blind,
+        "blind": x.blind, "untraced": x.untraced,
     }  # fmt: skip
 
 

@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Iterator, Mapping
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
 
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.outcome import Outcome
+from estimator.closeloop.question.problem import Unknown
+from estimator.closeloop.several.chart import chart
 from estimator.plant import PLANTS
 from fmus.errors import BadInput
 from fmus.export.builders.hypotheses import build_quick
@@ -18,12 +20,14 @@ from scenarios.closing.closing import Posed, closed, with_test_part
 from scenarios.closing.page.glossary import Glossary, glossary
 from scenarios.closing.result import Result, effects_of
 from scenarios.estimating.estimating import estimate
+from scenarios.estimating.policy import POLICY as OF_ESTIMATE
 from scenarios.estimating.result import EstimateResult
 from scenarios.estimating.setup import BAND
 from scenarios.experiment.declaration import Declaration
 from scenarios.experiment.experiment import Experiment, placed
 from scenarios.experiment.validation import of_file, read_table
 from scenarios.fleet.declaration import CALIBRATED
+from scenarios.fleet.policy import POLICY
 from scenarios.tasks.hashes import hash_of_data
 from scenarios.tasks.running import Passing, Place, may_pass
 from scenarios.tasks.store import FAILED, Answer
@@ -137,7 +141,7 @@ def _close_loop(given: Mapping[str, Any], place: Place) -> Answer:
         "policy": result.policy,
     }
     words = glossary(found.baseline.problem, found.judgement.members)
-    rows = [*_effects(found, result, words), *_calibrated(result, words)]
+    rows = [*_effects(found, result, words), *_calibrated(found, result, words)]
     return {
         "verdict": str(result.verdict),
         "rows": [{**row, **common} for row in rows],
@@ -159,13 +163,33 @@ def _effects(found: Outcome, result: Result, words: Glossary) -> Iterator[Row]:
             named = {
                 "kind": c.kind, "location": c.location, "probability": result.probability.get(h.label),
             }  # fmt: skip
+            machine = None if c.is_fault else {u.name.removeprefix(c.prefix) for u in chart([c]).machine}
             for parameter, (size, std) in effect.parameters.items():
-                yield {**named, **sized(parameter, size, std, words.unit_of_parameter(c, parameter))}
+                held = "" if machine is None or parameter in machine else "of the run"
+                unit = words.unit_of_parameter(c, parameter)
+                yield {**named, **sized(parameter, size, std, unit), "held": held}
 
 
-def _calibrated(result: Result, words: Glossary) -> Iterator[Row]:
+def _calibrated(found: Outcome, result: Result, words: Glossary) -> Iterator[Row]:
+    unknowns = {u.name: u for u in found.baseline.hypothesis.fit.unknowns}
     for name, (size, std) in result.calibrated.items():
-        yield {"kind": CALIBRATED, "location": name, **sized(name, size, std, words.unit(name))}
+        held = _holding(unknowns[name], size, std) if name in unknowns else ""
+        yield {
+            "kind": CALIBRATED, "location": name, **sized(name, size, std, words.unit(name)), "held": held,
+        }  # fmt: skip
+
+
+def _holding(u: Unknown, size: float, std: float) -> str:
+    """Why a calibrated value is not that of the record alone; empty if it is.
+
+    Between bounds that are declared, all that is believed before is an even distribution.
+    """
+    width = u.high - u.low
+    if not isfinite(width):
+        return ""
+    if min(size - u.low, u.high - size) <= OF_ESTIMATE.at_bound * width:
+        return "at a bound"
+    return "not in the record" if std >= POLICY.informed * width / sqrt(12) else ""
 
 
 def sized(parameter: str, size: float, std: float, unit: str) -> Row:

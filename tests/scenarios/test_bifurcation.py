@@ -73,6 +73,26 @@ def test_a_fold_is_sharp_and_is_the_nonlinear_critical_value(turned):
     assert turned.nonlinear == (fold.parameter, fold.error)
 
 
+def with_a_growing_state(x, p):
+    """The same with x3' = 0.05 x3, so that no limit cycle is stable."""
+    return np.column_stack([folded(x[:, :2], p), 0.05 * x[:, 2]])
+
+
+def test_a_fold_between_unstable_parts_is_no_critical_value():
+    answer = found(Known(with_a_growing_state, 3, size=10.0), -3.0, 0.1)
+    cycles = [c for limb in answer.limbs for c in limb.branch.cycles]
+    assert min(c.unstable for c in cycles) == 1
+    assert any(limb.folds for limb in answer.limbs)
+    assert answer.nonlinear is None
+
+
+def test_stable_motions_that_leave_the_range_at_its_beginning_have_no_least_value():
+    """A van der Pol oscillator over -p: its motions are stable from 0 downwards."""
+    answer = found(Known(lambda x, p: van_der_pol(x, -p), 2, size=10.0), -0.4, 0.3)
+    assert answer.stable_throughout
+    assert answer.nonlinear is None
+
+
 def test_motions_from_inside_decay_and_from_outside_grow(turned):
     inside, outside = turned.limbs[0].releases
     assert (inside.share < 1, outside.share > 1) == (True, True)

@@ -184,6 +184,13 @@ def test_a_table_without_its_columns_is_refused(tmp_path, table, missing):
         step_1(references(["A"])[0], tmp_path)
 
 
+@pytest.mark.parametrize("cells", ["1.0,x,0.1,0.2\n", ""], ids=["a word", "no rows"])
+def test_a_table_without_numbers_is_refused(tmp_path, cells):
+    (tmp_path / "WheelARailA_conicity.csv").write_text(f"amplitude_mm,conicity,low,high\n{cells}")
+    with pytest.raises(BadInput, match="has no rows, or a cell that is not a number"):
+        step_1(references(["A"])[0], tmp_path)
+
+
 def test_step_1_of_the_norms_own_tables():
     if not DATA.is_dir():
         pytest.skip(f"{DATA} is not there; the data come beside the repository")

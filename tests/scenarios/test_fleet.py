@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,8 @@ from scenarios.fleet.fleet import Assembled, assembled, rejected, write_tables
 from scenarios.fleet.page import write_page
 from scenarios.fleet.planning import Plan, plan_of
 from scenarios.fleet.pooling import pooled
+from scenarios.fleet.result import effect_words
+from scenarios.fleet.tables import effect_row
 from scenarios.fleet.work import answered
 from scenarios.tasks.running import Passing, Place
 from scenarios.tasks.store import Answer, Store
@@ -304,6 +307,44 @@ def test_an_effect_of_one_vehicle_is_tested_on_the_others(answered_fleet):
     assert found.share_low < 0.25 < found.share_high
     assert found.size.value == pytest.approx(0.5)
     assert found.size.std == pytest.approx(0.01)
+
+
+def test_vehicles_that_a_triage_left_out_take_the_share_away(answered_fleet):
+    """Those that were traced are no sample of the class."""
+    plan, store = answered_fleet
+    answers = {j.task.key: store.read(j.task.key) or {} for j in plan.jobs if j.task}
+    loops = [j for j in plan.jobs if j.command == "close-loop" and j.record]
+    for job in loops:
+        if job.record.vehicle in ("v2", "v3"):
+            del answers[job.task.key]
+    [left] = pooled(replace(plan, jobs=[replace(j, triaged=False) for j in plan.jobs]), answers)
+    assert (left.untraced, left.absent, left.share) == (["v2", "v3"], ["v0"], 0.5)
+    [found] = pooled(replace(plan, jobs=[replace(j, triaged=True) for j in loops]), answers)
+    assert (found.untraced, found.share, found.share_low) == (["v2", "v3"], None, None)
+    words = effect_words(effect_row(found))
+    assert "not traced in 2" in words
+    assert "%" not in words
+
+
+def test_a_discrepancy_that_nothing_explains_denies_no_effect(answered_fleet):
+    plan, store = answered_fleet
+    answers = {j.task.key: store.read(j.task.key) or {} for j in plan.jobs if j.task}
+    for job in plan.jobs:
+        if job.command == "close-loop" and job.record and job.record.vehicle == "v2":
+            answers[job.task.key] = loop("unexplained", None, 0.1)
+    [found] = pooled(plan, answers)
+    assert (found.absent, found.blind) == (["v0", "v3"], ["v2", "v4"])
+
+
+def test_an_effect_of_either_sign_is_as_large_as_its_magnitude(answered_fleet):
+    plan, store = answered_fleet
+    answers = {j.task.key: store.read(j.task.key) or {} for j in plan.jobs if j.task}
+    for job in plan.jobs:
+        if job.command == "close-loop" and job.record and job.record.vehicle == "v2":
+            answers[job.task.key] = loop("traced", -0.5, 0.1)
+    [found] = pooled(plan, answers)
+    assert (found.shown, found.absent) == (["v1", "v2"], ["v0", "v3"])
+    assert found.size.value == pytest.approx(0.0, abs=1e-9)
 
 
 def test_triage_traces_only_what_the_estimate_rejects(answered_fleet):

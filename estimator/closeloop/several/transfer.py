@@ -237,6 +237,8 @@ def _judged(
             return "surpassed", f"{label} accounts for {b}, but {t.explanation.label} fits better"
         if explains(t.baseline, held):
             return "confirmed", f"{label} with the values of {a} accounts for {b} too"
+        if not apart.unknowns:
+            return "open", f"{label} accounts for {b}, but no value of it is determined by both records"
         if apart.p_value >= t.baseline.policy.detection.level:
             return "agrees", f"{label} accounts for {b} with values that agree with those of {a}, {far}"
         return "differs", f"{label} accounts for {b} with other values only, {far}"

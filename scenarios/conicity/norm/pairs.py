@@ -120,4 +120,7 @@ def printed(folder: Path | None, pair: Reference, what: str) -> pd.DataFrame | N
     for column in COLUMNS[what]:
         if column not in table:
             raise BadInput(f"{file}: has no column '{column}'; give one with {', '.join(COLUMNS[what])}")
-    return table
+    numbers: pd.DataFrame = table.apply(pd.to_numeric, errors="coerce")
+    if not len(table) or not np.isfinite(numbers[[*COLUMNS[what]]].to_numpy(dtype=float)).all():
+        raise BadInput(f"{file}: has no rows, or a cell that is not a number; give the table as printed")
+    return numbers

@@ -84,7 +84,8 @@ def step_1(pair: Reference, folder: Path | None) -> ExactRow:
         low, high = given["low"].to_numpy(dtype=float), given["high"].to_numpy(dtype=float)
         inside, amplitudes = int(((found >= low) & (found <= high)).sum()), len(given)
         off = np.abs(found - given["conicity"].to_numpy(dtype=float))
-        largest, at = float(np.nanmax(off)), float(given["amplitude_mm"][int(np.nanargmax(off))])
+        if np.isfinite(off).any():
+            largest, at = float(np.nanmax(off)), float(given["amplitude_mm"][int(np.nanargmax(off))])
     close = points = dr_largest = dr_at = None
     if differences is not None:
         y = differences["y_mm"].to_numpy(dtype=float)
