@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from scenarios.fleet.policy import POLICY
-from scenarios.fleet.repeats import Repeats, Scatter, scatter_of, variance_of
+from scenarios.fleet.repeats import Repeats, Scatter, scatter_of, share_left, variance_of
 from scenarios.fleet.scatter import Array
 
 SIDES = 2  # tests of a series: line and change point
@@ -101,8 +101,10 @@ def line_through(p: Points, s: Scatter) -> Line:
     slope = float(np.sum(w * x * p.value)) / inside
     left = p.value - np.sum(w * p.value) / w.sum() - slope * x
     squares = float(np.sum(w * left**2))
-    variance = float(variance_of(np.sqrt(w) * x / inside, s.correlation)[-1])
-    std = float(np.sqrt(variance * s.scale(squares, own)))
+    root = np.sqrt(w)
+    variance = float(variance_of(root * x / inside, s.correlation)[-1])
+    taken = float(variance_of(root, s.correlation)[-1]) / w.sum() + variance * inside
+    std = float(np.sqrt(variance * s.scale(squares / share_left(taken, len(w), 2), own)))
     p_value = 2 * float(student.sf(abs(slope) / std, s.freedom(own))) if std > 0 else 1.0
     return Line(slope, std, squares, p_value)
 
@@ -148,7 +150,8 @@ def _jumps(p: Points, s: Scatter, places: Array, w: Array) -> tuple[Array, Array
     first, last = variance_of(root, s.correlation), variance_of(root[::-1], s.correlation)[::-1]
     both = first[-1] - first[places - 1] - last[places]  # twice the covariance of both sums
     variance = first[places - 1] / before**2 + last[places] / after**2 - both / (before * after)
-    std = np.sqrt(variance * s.scale(squares, len(w) - 2))
+    taken = first[places - 1] / before + last[places] / after
+    std = np.sqrt(variance * s.scale(squares / share_left(taken, len(w), 2), len(w) - 2))
     return jump, np.maximum(std, np.finfo(float).tiny), squares
 
 

@@ -9,10 +9,11 @@ import numpy as np
 from scipy.stats import false_discovery_control
 from scipy.stats import t as student
 
+from scenarios.fleet.beliefs import says_nothing
 from scenarios.fleet.declaration import CALIBRATED
 from scenarios.fleet.drift import Course, Points, courses
 from scenarios.fleet.policy import POLICY
-from scenarios.fleet.repeats import Repeats, Scatter, scatter_of, variance_of
+from scenarios.fleet.repeats import Repeats, Scatter, scatter_of, share_left, variance_of
 from scenarios.fleet.rows import Row
 from scenarios.fleet.scatter import Mean, mean_over
 from scenarios.tasks.store import FAILED
@@ -94,23 +95,16 @@ def _series(rows: Sequence[Row]) -> Series:
 
 
 def of_the_record(row: Row) -> Row:
-    """A row with the value and error that its record alone would give, without what was believed before it.
-
-    An estimate is the mean of both, weighted by one over their variances. Many estimates contain the same
-    belief, which would count as often as there are records. A value held at a bound has none.
-    """
-    start, believed = row["prior"], row["prior_std"]
-    if start is None or believed is None:
+    """A row with the value and error that its record alone gives, where it is known what was believed."""
+    if row["own"] is None or row["own_std"] is None:
         return row
-    left = 1 - (row["std"] / believed) ** 2
-    value = start + (row["size"] - start) / left
-    return {**row, "size": value, "std": row["std"] / np.sqrt(left)}
+    return {**row, "size": row["own"], "std": row["own_std"]}
 
 
 def _is_followed(row: Row) -> bool:
     if row["verdict"] in (FAILED, "diverged") or row["held"]:
         return False
-    if row["prior_std"] is not None and row["std"] >= POLICY.informed * row["prior_std"]:
+    if row["own_std"] is not None and says_nothing(row["own_std"], row["prior_std"]):
         return False
     return row["kind"] in FOLLOWED or (row["command"] == "close-loop" and row["verdict"] in SURE)
 
@@ -169,7 +163,8 @@ def _mean(x: Repeats, s: Scatter) -> tuple[float, float]:
     """The weighted mean of a vehicle with its standard error, which contains the scatter."""
     w = s.weights(x.std)
     variance = float(variance_of(np.sqrt(w) / w.sum(), s.correlation)[-1])
-    scale = float(s.scale(x.squares(s.beyond), x.freedom))
+    left = share_left(variance * w.sum(), len(w), 1)
+    scale = float(s.scale(x.squares(s.beyond) / left, x.freedom))
     return float(np.sum(w * x.value) / w.sum()), float(np.sqrt(variance * scale))
 
 

@@ -88,6 +88,16 @@ class Repeats:
         return float(np.sum(self.left(beyond)[0] ** 2))
 
 
+def share_left(taken: Array | float, n: int, p: int) -> Array:
+    """The share of the squares of n correlated records that a fit of p unknowns leaves, over n - p.
+
+    taken: sum of the variances of the records along the unit vectors of the fit, p if they are independent.
+    """
+    if n <= p:
+        return np.ones_like(np.asarray(taken, dtype=np.float64))
+    return np.minimum((n - np.asarray(taken, dtype=np.float64)) / (n - p), 1.0)
+
+
 class _Class:
     """The vehicles of a class that have degrees of freedom, those with as many records side by side."""
 

@@ -18,13 +18,14 @@ SCHEMA = pa.schema(
         ("mileage", NUMBER), ("model", TEXT), ("setup", TEXT), ("verdict", TEXT), ("kind", TEXT),
         ("location", TEXT), ("parameter", TEXT), ("size", NUMBER), ("std", NUMBER), ("low_95", NUMBER),
         ("high_95", NUMBER), ("unit", TEXT), ("probability", NUMBER), ("error_over_noise", NUMBER),
-        ("prior", NUMBER), ("prior_std", NUMBER), ("held", TEXT),
+        ("prior", NUMBER), ("prior_std", NUMBER), ("own", NUMBER), ("own_std", NUMBER), ("held", TEXT),
         ("reason", TEXT), ("railfmi", TEXT), ("policy", TEXT), ("program_sha256", TEXT),
         ("model_sha256", TEXT), ("record_sha256", TEXT), ("setup_sha256", TEXT), ("task", TEXT),
     ]
 )  # fmt: skip
 FOUND = ("verdict", "kind", "location", "parameter", "size", "std", "low_95", "high_95", "unit",
-         "probability", "error_over_noise", "prior", "prior_std", "held", "reason", "policy")  # fmt: skip
+         "probability", "error_over_noise", "prior", "prior_std", "own", "own_std", "held", "reason",
+         "policy")  # fmt: skip
 
 
 def rows_of(plan: Plan, answers: Mapping[str, Answer], reasons: Mapping[str, str]) -> list[Row]:

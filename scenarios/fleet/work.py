@@ -6,6 +6,8 @@ from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from estimator.closeloop.checkpoints import Stages
 from estimator.closeloop.outcome import Outcome
 from estimator.closeloop.question.problem import Unknown
@@ -26,6 +28,7 @@ from scenarios.estimating.setup import BAND
 from scenarios.experiment.declaration import Declaration
 from scenarios.experiment.experiment import Experiment, placed
 from scenarios.experiment.validation import of_file, read_table
+from scenarios.fleet.beliefs import alone
 from scenarios.fleet.declaration import CALIBRATED
 from scenarios.fleet.policy import POLICY
 from scenarios.tasks.hashes import hash_of_data
@@ -109,6 +112,7 @@ def _estimate(given: Mapping[str, Any], place: Place) -> Answer:
 
 
 def _estimated(found: EstimateResult) -> Iterator[Row]:
+    own = _own(found)
     for name, e in found.estimated.items():
         if e["kind"] == "noise":  # of a sensor at the last sample, of which nothing follows for the machine
             continue
@@ -116,8 +120,26 @@ def _estimated(found: EstimateResult) -> Iterator[Row]:
         yield {
             "kind": e["kind"], "location": name, "parameter": name, "size": finite(e["value"]),
             "std": finite(e["std_error"]), "low_95": finite(low), "high_95": finite(high),
-            "unit": e["unit"] or "", **_leaning(e),
+            "unit": e["unit"] or "", **_leaning(e), **own.get(name, {}),
         }  # fmt: skip
+
+
+def _own(found: EstimateResult) -> dict[str, Row]:
+    """What the record alone says of each constant parameter, by name; none where that is not known."""
+    after = found.identifiability.get("after", {"deviation_left": {}})
+    told = [*after["deviation_left"]]
+    names = [n for n in told if "prior" in found.estimated[n] and "at_bound" not in found.estimated[n]]
+    if not names or found.diverged:
+        return {}
+    at = [told.index(n) for n in names]
+    entries = [found.estimated[n] for n in names]
+    value, std = (np.array([e[key] for e in entries]) for key in ("value", "std_error"))
+    start, believed = np.array([e["prior"] for e in entries]).T
+    own, error = alone(value, std, np.array(after["correlation"])[np.ix_(at, at)], start, believed)
+    return {
+        n: {"own": finite(x), "own_std": finite(s)}
+        for n, x, s in zip(names, own.tolist(), error.tolist(), strict=True)
+    }
 
 
 def _leaning(e: Mapping[str, Any]) -> Row:

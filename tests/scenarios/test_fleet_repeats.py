@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import false_discovery_control
 
+from scenarios.fleet.beliefs import alone
 from scenarios.fleet.drift import Points, courses
-from scenarios.fleet.findings import findings_of, of_the_record
+from scenarios.fleet.findings import findings_of
 from scenarios.fleet.pooling import _mean_size
-from scenarios.fleet.repeats import Repeats, Scatter, _expected, scatter_of, variance_of
+from scenarios.fleet.repeats import Repeats, Scatter, _expected, scatter_of, share_left, variance_of
 from tests.scenarios.test_fleet_statistics import STD, made, rows_of
 
 SCATTER = 0.02
@@ -60,6 +61,16 @@ def test_expected_products_of_residuals_are_those_of_the_projection(n, correlati
     assert squares == pytest.approx(np.trace(V), abs=1e-9)
 
 
+@given(st.integers(3, 12), st.floats(0, 0.95), st.integers(0, 99))
+def test_the_share_that_a_fit_leaves_is_that_of_the_projection(n, correlation, seed):
+    rng = np.random.default_rng(seed)
+    basis, _ = np.linalg.qr(np.column_stack([np.ones(n), rng.normal(size=n)]))
+    M = np.eye(n) - basis @ basis.T
+    exact = np.trace(M @ correlation ** np.abs(np.subtract.outer(np.arange(n), np.arange(n))) @ M) / (n - 2)
+    taken = sum(variance_of(unit, correlation)[-1] for unit in basis.T)
+    assert share_left(taken, n, 2) == pytest.approx(min(exact, 1.0))
+
+
 @pytest.mark.parametrize(("correlation", "freedom"), [(0.0, np.inf), (0.5, np.inf), (0.0, 6.0)])
 def test_what_a_class_scatters_by_is_found(correlation, freedom):
     some = sound_class(np.random.default_rng(1), freedom=freedom, correlation=correlation)
@@ -86,8 +97,15 @@ def test_the_own_scatter_of_a_vehicle_counts_by_what_the_class_lends():
 
 @pytest.mark.parametrize(
     ("correlation", "freedom", "records", "times"),
-    [(0.0, np.inf, 8, 1), (0.0, 6.0, 8, 1), (0.5, np.inf, 8, 1), (0.5, 6.0, 8, 2), (0.0, 6.0, 4, 1)],
-    ids=["alike", "rough ones", "slow", "slow and rough", "few records"],
+    [
+        (0.0, np.inf, 8, 1),
+        (0.0, 6.0, 8, 1),
+        (0.5, np.inf, 8, 1),
+        (0.5, 6.0, 8, 2),
+        (0.0, 6.0, 4, 1),
+        (0.8, 6.0, 20, 2),
+    ],
+    ids=["alike", "rough ones", "slow", "slow and rough", "few records", "many slow records"],
 )
 def test_sound_vehicles_are_not_named_because_they_are_rough_or_slow(correlation, freedom, records, times):
     """With one scatter for all and independent records, 3 to 15 times as many had p below 0.01 as should.
@@ -127,19 +145,58 @@ def test_many_estimates_with_one_belief_do_not_count_it_as_often():
     measured = rng.normal(true, error, 400)
     std = (believed**-2 + error**-2) ** -0.5
     leaning = std**2 * (start / believed**2 + measured / error**2)
-    rows = [
-        of_the_record({"size": x, "std": std, "prior": start, "prior_std": believed}) for x in leaning
-    ]  # fmt: skip
-    np.testing.assert_allclose([r["size"] for r in rows], measured)
-    np.testing.assert_allclose([r["std"] for r in rows], error)
-    values = [(1.0, x) for x in leaning]
-    more = {"prior": start, "prior_std": believed, "std": std}
-    found = findings_of([{**r, **more} for r in rows_of({"v": values, "w": values})], 0.05)
+    one = np.ones(1)
+    own = [alone(x * one, std * one, np.eye(1), start * one, believed * one) for x in leaning]
+    np.testing.assert_allclose([x[0] for x, _ in own], measured)
+    np.testing.assert_allclose([s[0] for _, s in own], error)
+    rows = rows_of({"v": [(1.0, x) for x in leaning]})
+    more = [{"prior_std": believed, "own": float(x[0]), "own_std": float(s[0])} for x, s in own]
+    rows = [{**r, **m} for r, m in zip(rows, more, strict=True)]
+    found = findings_of([*rows, *({**r, "vehicle": "w"} for r in rows)], 0.05)
     assert abs(found.levels[0].value - true) < 3 * found.levels[0].std
     assert abs(np.mean(leaning) - true) > 5 * std / np.sqrt(len(leaning))  # as it was
 
 
-@pytest.mark.parametrize("more", [{"held": "at a bound"}, {"prior": 0.4, "prior_std": 1.05 * STD}])
+@given(st.integers(1, 4), st.integers(0, 99))
+def test_what_is_believed_is_taken_out_of_parameters_that_depend_on_one_another(p, seed):
+    """The estimate is the exact one of a linear record with normal noise and beliefs."""
+    rng = np.random.default_rng(seed)
+    J, start, believed = rng.normal(size=(8, p)), rng.normal(size=p), rng.uniform(0.5, 3.0, p)
+    says, seen = J.T @ J, J.T @ rng.normal(size=8)
+    P = np.linalg.inv(says + np.diag(believed**-2.0))
+    value, std = P @ (seen + start / believed**2), np.sqrt(np.diag(P))
+    own, error = alone(value, std, P / np.outer(std, std), start, believed)
+    np.testing.assert_allclose(own, np.linalg.solve(says, seen), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(error, np.sqrt(np.diag(np.linalg.inv(says))), rtol=1e-6)
+
+
+def test_a_drift_of_one_parameter_is_not_one_of_another_that_depends_on_it():
+    """Only b of the first vehicle drifts; the record hardly tells it from a."""
+    rng, J = np.random.default_rng(8), np.array([[1.0, 0.95], [0.0, 0.3]]) / 0.45
+    start, believed, one = np.zeros(2), np.ones(2), {"prior_std": 1.0, "std": 0.5}
+    P = np.linalg.inv(J.T @ J + np.eye(2))
+    std, rows, each = np.sqrt(np.diag(P)), [], []
+    for v in range(20):
+        for mileage in np.sort(rng.uniform(0, 1e4, 40)):
+            true = np.array([0.3, 6e-4 * mileage if v == 0 else 0.3])
+            value = P @ J.T @ (J @ true + rng.normal(size=2))
+            own, error = alone(value, std, P / np.outer(std, std), start, believed)
+            apart, apart_std = alone(value, std, np.eye(2), start, believed)
+            for k, name in enumerate("ab"):
+                [row] = rows_of({f"v{v}": [(mileage, value[k])]}, parameter=name)
+                rows.append({**row, **one, "own": own[k], "own_std": error[k]})
+                each.append({**row, **one, "own": apart[k], "own_std": apart_std[k]})
+
+    def named(some):
+        return {(d.vehicle, d.quantity[-1]) for d in findings_of(some, 0.05).drifts if d.drifts}
+
+    assert named(rows) == {("v0", "b")}
+    assert ("v0", "a") in named(each)  # the belief is taken out of each by itself
+
+
+@pytest.mark.parametrize(
+    "more", [{"held": "at a bound"}, {"own": 0.4, "own_std": STD, "prior_std": 0.3 * STD}]
+)
 def test_what_a_record_does_not_say_is_not_followed(more):
     rows = [{**r, **more} for r in rows_of(made(np.random.default_rng(6), 5))]
     assert findings_of(rows, 0.05).levels == []
