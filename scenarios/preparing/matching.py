@@ -12,6 +12,7 @@ from scenarios.preparing.quantities import (
     QUANTITIES,
     alike,
     meant_by,
+    numbers_of,
     quantities_of,
     shared_words,
     unit_in_name,
@@ -20,7 +21,10 @@ from scenarios.preparing.quantities import (
 from scenarios.preparing.survey import Channel
 
 SURE = 0.8  # from here on a match is not asked about
-DOUBTFUL = 0.75  # at most, if another variable looks the same
+DOUBTFUL = 0.75  # at most, if another variable or another column looks the same
+OTHER_NUMBER = 0.2  # taken off where names have other numbers, as those of two sensors
+SETPOINT = 0.02  # taken off where a column is what should be, and the variable what is
+SET = {"soll", "set", "setpoint", "ref", "reference", "cmd", "command", "target", "demand", "desired"}
 ENOUGH = 0.45  # below it a column and a variable are left apart
 
 
@@ -40,6 +44,22 @@ def fitting(v: FmuVariable) -> list[str]:
 
 def likeness(v: FmuVariable, channel: Channel) -> float:
     """How much a column looks like a variable: 1 for the same name, 0 if the units contradict each other.
+
+    Names with other numbers are those of other sensors, as acc1 and acc3.
+    """
+    score = _by_words(v, channel)
+    if v.name == channel.name or not score:
+        return score
+    mine, theirs = numbers_of(v.name), numbers_of(channel.name)
+    if mine and theirs and mine != theirs:
+        return min(score, DOUBTFUL) - OTHER_NUMBER
+    if v.causality == "output" and SET & {*words_of(channel.name)}:
+        score -= SETPOINT
+    return min(score, 0.99)
+
+
+def _by_words(v: FmuVariable, channel: Channel) -> float:
+    """The same by words, quantities and units.
 
     Where the file states no unit, the end of the column's name may tell it, as in n_wheel_rpm.
     """
@@ -79,14 +99,17 @@ def _at_the_end(name: str, also: str | None) -> str | None:
 def matches(variables: Sequence[FmuVariable], channels: Sequence[Channel]) -> list[Match]:
     """The assignment of columns to variables with the largest sum of likeness, each used once at most.
 
-    A column that looks as much like a variable that has none is not sure. If it shares no word with any of
-    these, as a speed of which there are many, it is left apart.
+    A column that looks as much like a variable that has none is not sure, nor is one beside an unused column
+    that looks as much like the variable. If it shares no word with any of the variables, as a speed of which
+    there are many, it is left apart.
     """
     if not variables or not channels:
         return []
     score = np.array([[likeness(v, c) for c in channels] for v in variables])
     rows, columns = linear_sum_assignment(score, maximize=True)
-    free = np.isin(np.arange(len(variables)), rows[score[rows, columns] >= ENOUGH], invert=True)
+    taken = score[rows, columns] >= ENOUGH
+    free = np.isin(np.arange(len(variables)), rows[taken], invert=True)
+    unused = np.isin(np.arange(len(channels)), columns[taken], invert=True)
     found = []
     for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
         v, c, s = variables[i], channels[j], float(score[i, j])
@@ -94,7 +117,8 @@ def matches(variables: Sequence[FmuVariable], channels: Sequence[Channel]) -> li
         if rivals and not any(_share_words(other, c) for other in (v, *rivals)):
             continue
         if s >= ENOUGH:
-            found.append(Match(v, c, min(s, DOUBTFUL) if rivals else s))
+            twins = np.any(unused & (score[i] >= s - SETPOINT)) and v.name != c.name
+            found.append(Match(v, c, min(s, DOUBTFUL) if rivals or twins else s))
     return found
 
 

@@ -33,6 +33,7 @@ QUANTITIES = (
     Quantity("pressure", "Pa", ("p", "pressure", "druck")),
 )  # fmt: skip
 _BRACKET = re.compile(r"[\[(].*?[\])]")
+_WORDS_IN_BRACKETS = re.compile(r"[\[(][^\])]*[^\d\s,\])][^\])]*[\])]")
 _SEPARATED = re.compile(r"[\W_]+")
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _SPLIT = re.compile(r"[^A-Za-z0-9]+|(?<=[a-z])(?=[A-Z])")
@@ -46,6 +47,11 @@ def words_of(name: str) -> list[str]:
 def numbered_words_of(name: str) -> list[str]:
     """The same with these digits."""
     return [word.lower() for word in _SPLIT.split(_BRACKET.sub(" ", name)) if word]
+
+
+def numbers_of(name: str) -> list[int]:
+    """The numbers in a name, also an index in brackets, but none of a unit in brackets."""
+    return [int(number) for number in re.findall(r"\d+", _WORDS_IN_BRACKETS.sub(" ", name))]
 
 
 def quantities_of(name: str, description: str = "") -> list[Quantity]:

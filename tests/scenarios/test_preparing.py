@@ -23,7 +23,7 @@ from scenarios.preparing.initialising import Initialised, init
 from scenarios.preparing.inspecting import bandwidth, inspect
 from scenarios.preparing.matching import ENOUGH, SURE, likeness, matches
 from scenarios.preparing.ports import port_remarks
-from scenarios.preparing.quantities import unit_in_name
+from scenarios.preparing.quantities import numbers_of, unit_in_name
 from scenarios.preparing.survey import Channel, survey
 from scenarios.preparing.text import toml_of
 from scenarios.preparing.trial import Trial, dry_run, duration
@@ -170,6 +170,39 @@ def test_one_column_for_many_variables_alike_is_left_apart():
     assert ENOUGH <= one.likeness < SURE
     [alone] = matches(rates[:1], [channel("speed", "km/h")])
     assert alone.likeness >= SURE
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        (["acc3"], ["acc1", "acc2", "acc3"]),
+        (["x1", "x2"], ["x2", "x1"]),
+        (["q[1]", "q[2]"], ["q[2]", "q[1]"]),
+        (["acc1", "acc2"], ["acc2_bogie", "acc1_bogie"]),
+        (["F_z1", "F_z2", "F_z3", "F_z4"], ["Fz_4", "Fz_3", "Fz_2", "Fz_1"]),
+        (["T", "t"], ["t", "T"]),
+    ],
+)
+def test_numbers_and_letters_that_are_alike_go_to_each_other(names, columns):
+    unit = "N" if names[0].startswith("F") else None
+    found = matches([variable(name, unit=unit) for name in names], [channel(c, unit) for c in columns])
+    assert [numbers_of(m.channel.name) for m in found] == [numbers_of(name) for name in names]
+    assert all(m.channel.name == m.variable.name for m in found if m.variable.name in columns)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "columns"),
+    [
+        ("v", "m/s", ["v_soll", "v_ist"]),
+        ("omega", "rad/s", ["speed_setpoint", "speed_actual"]),
+        ("i", "A", ["current_ref", "current_meas"]),
+    ],
+)
+def test_a_setpoint_is_not_taken_for_what_was_measured(name, unit, columns):
+    """Nor is the other one sure, since two columns look like it."""
+    [found] = matches([variable(name, unit=unit)], [channel(c, unit) for c in columns])
+    assert found.channel.name == columns[1]
+    assert found.likeness < SURE
 
 
 def test_g_of_an_acceleration_is_no_gram(tmp_path):
