@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from hashlib import sha256
 from json import loads
 from pathlib import Path
@@ -77,7 +77,10 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
         "duration": _duration(system, tell),
         "step": _step(system, ours, fmus),
     }
-    table["fmus"] = {names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, tell) for c in members}
+    led = {_place(link, names) for link in system.links}
+    table["fmus"] = {
+        names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, led, tell) for c in members
+    }
     links = [link for link in system.links if link.source[0] not in sources]
     late = [_place(link, names) for link in late_links(links, fmus)] if not ours else []
     for place in late:
@@ -141,9 +144,12 @@ def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
 
 
 def _member(
-    c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any], tell: Tell
+    c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any], led: Collection[str], tell: Tell
 ) -> dict[str, Any]:
-    """An FMU with its values; values of inputs are added to `inputs`, and those of no variable are told."""
+    """An FMU with its values; values of inputs are added to `inputs`, and those of no variable are told.
+
+    led: inputs to which a connection leads, which is what counts from the start of a simulation on.
+    """
     member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
     for variable, (value, unit) in c.start.items():
         known = fmu.variables.get(variable)
@@ -153,7 +159,9 @@ def _member(
         if unit is not None and known.unit is not None:
             factor, offset = conversion(unit, known.unit, f"parameter '{variable}' of '{c.name}'")
             value = factor * value + offset
-        if known.causality == "input":
+        if known.causality == "input" and f"{name}.{variable}" in led:
+            tell(f"the value of input '{variable}' of '{c.name}' is left out, since a connection leads to it")
+        elif known.causality == "input":
             inputs[f"{name}.{variable}"] = value
         else:
             kind = "parameters" if known.causality == "parameter" else "initial"

@@ -56,7 +56,8 @@ class RecordInspected(Inspected):
             for r in self.rasters
             for c in r.channels
         ]  # fmt: skip
-        return pd.DataFrame(rows).set_index("channel")
+        columns = ["channel", "unit", "rate", "least", "greatest", "noise", "bandwidth", "remarks"]
+        return pd.DataFrame(rows, columns=columns).set_index("channel")
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """All channels over time, one below the other, each from its least to its greatest value."""
@@ -90,7 +91,8 @@ class FmuInspected(Inspected):
             }
             for v in _shown(self.description)
         ]  # fmt: skip
-        return pd.DataFrame(rows).set_index("variable")
+        columns = ["variable", "kind", "unit", "start", "min", "max", "description"]
+        return pd.DataFrame(rows, columns=columns).set_index("variable")
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """How many variables of each kind it has."""

@@ -10,7 +10,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from fmus.errors import BadInput
+from fmus.host.apart.isolation import ISOLATED
 from fmus.host.archive import describe
+from fmus.host.fmu import Fmu
+from fmus.host.master.master import Master
 from fmus.host.master.recording import read_recording
 from scenarios.cli.app import run_safely
 from scenarios.comparing.comparing import compare
@@ -95,6 +98,26 @@ def test_a_scenario_and_its_package_run_alike(counted, tmp_path):
     again = run(import_ssp(package, tmp_path / "back"), tmp_path / "again")
     assert again.ok
     pd.testing.assert_frame_equal(recorded(tmp_path / "again"), data)
+
+
+def test_no_line_goes_through_whole_numbers_and_truths(kinds):
+    """Extrapolation changes nothing, and a table keeps its last entry."""
+    read = ["b.n", "b.on", "b.product"]
+    of_b = []
+    for extrapolation in ("hold", "linear"):
+        with Master(
+            {"a": kinds[2], "b": kinds[2]}, [("a.product", "b.n"), ("a.odd", "b.on")], step=0.125,
+            order="jacobi", extrapolation=extrapolation, refresh=False, record=read,
+            inputs={"a.n": ([0.0, 0.5, 1.0], [1, 4, 5]), "a.on": 1},
+        ) as master:  # fmt: skip
+            of_b.append(master.run(np.float64(1.0)).data[read].to_numpy())
+    assert_array_equal(*of_b)
+    assert [*dict.fromkeys(of_b[0][:, 0].tolist())] == [1.0, 4.0]
+
+
+def test_an_fmu_in_another_process_is_not_coupled(kinds):
+    with Fmu(kinds[2], ISOLATED) as apart, pytest.raises(BadInput, match="give its Archive"):
+        Master({"a": apart, "b": kinds[2]}, [("a.count", "b.n")], step=0.125)
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,7 @@ class Clock:
 
     def plan(self, duration: float, events: Sequence[Event]) -> Plan:
         """The instants of a run of `duration`, s; BadInput where a member cannot keep to a time in it."""
+        duration = float(duration)  # a number of NumPy has another text
         if not (isfinite(duration) and duration > 0):
             raise BadInput(f"a run of {duration:g} s has no length; give a positive duration")
         if duration / self.step > STEPS:
@@ -79,7 +80,7 @@ class Clock:
 
     def _place(self, time: float) -> Place:
         """A time in steps of the clock, a whole number where it is one but for rounding."""
-        place = Fraction(round(Fraction(repr(time)) / Fraction(repr(self.step)) * FINEST), FINEST)
+        place = Fraction(round(Fraction(repr(float(time))) / Fraction(repr(self.step)) * FINEST), FINEST)
         return place.numerator if place.denominator == 1 else place
 
     def _check(self, stop: Place) -> None:

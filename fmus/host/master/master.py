@@ -12,6 +12,7 @@ from fmus.errors import BadInput
 from fmus.host.apart.isolation import FmuEnded
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu, FmuError
+from fmus.host.instance import Instance
 from fmus.host.master.clock import Event, Plan, clock
 from fmus.host.master.connections import (
     Address,
@@ -161,7 +162,8 @@ class Master:
                 raise BadInput(
                     f"input '{name}': is connected to '{connected[address]}' too; keep one of them"
                 )
-            found[address] = signal(name, source)
+            whole = self._descriptions[address.fmu].variables[address.variable].whole
+            found[address] = signal(name, source, whole)
         return found
 
     def _recorded(self, names: Sequence[str] | None) -> list[Address]:
@@ -240,6 +242,10 @@ def _opened(fmus: Mapping[str, str | Path | Archive | Fmu], own: ExitStack) -> d
             if path not in files:
                 files[path] = own.enter_context(Archive(given))
             given = files[path]
+        if isinstance(given, Fmu) and not isinstance(given.instance, Instance):
+            raise BadInput(
+                f"FMU '{name}': is in a process of its own and cannot be coupled from here; give its Archive"
+            )
         if given in found.values() and (isinstance(given, Fmu) or given.description.once_per_process):
             raise BadInput(f"FMU '{name}': is in use under another name; give a file that allows two")
         found[name] = given

@@ -50,6 +50,7 @@ class Member:
         self._early, self._look = self._instance.puller(references[: layout.early])
         self._all, self._pull = self._instance.puller(references)
         self._step = self._instance.stepper()
+        self._held = {*self._instance.whole(fmu.references(layout.inputs))}  # no line goes through these
         self.wires: list[tuple[Samples, list[Wire]]] = []  # by source
         self.settled = Samples()  # by the inputs of their time
         self.raw = Samples() if layout.delayed else self.settled  # by those of the step that led there
@@ -95,7 +96,7 @@ class Member:
             a, b, w = self._line(samples, t, end)
             if w:
                 for i, j, gain, offset in wires:
-                    u[i] = gain * (a[j] + w * (a[j] - b[j])) + offset
+                    u[i] = gain * (a[j] if i in self._held else a[j] + w * (a[j] - b[j])) + offset
             else:
                 for i, j, gain, offset in wires:
                     u[i] = gain * a[j] + offset

@@ -49,8 +49,8 @@ class Signal:
             )
 
 
-def signal(name: str, source: Source) -> Signal:
-    """An input by its name from what the user gave for it."""
+def signal(name: str, source: Source, whole: bool = False) -> Signal:
+    """An input by its name from what the user gave for it; whole: whether it takes whole numbers only."""
     if isinstance(source, Real) and not isinstance(source, bool):
         value = float(source)
         if not np.isfinite(value):
@@ -61,12 +61,12 @@ def signal(name: str, source: Source) -> Signal:
     if callable(source):
         return Signal(name, source)
     if isinstance(source, tuple | list) and len(source) == 2:
-        return _table(name, source[0], source[1])
+        return _table(name, source[0], source[1], whole)
     raise BadInput(f"input '{name}': give a number, an expression in t, a function of t, or (times, values)")
 
 
-def _table(name: str, times: ArrayLike, values: ArrayLike) -> Signal:
-    """Linear between the entries."""
+def _table(name: str, times: ArrayLike, values: ArrayLike, whole: bool) -> Signal:
+    """Linear between the entries; whole numbers keep the entry before."""
     try:
         t, y = (np.array(a, dtype=np.float64) for a in (times, values))
     except (TypeError, ValueError) as error:
@@ -75,4 +75,7 @@ def _table(name: str, times: ArrayLike, values: ArrayLike) -> Signal:
         raise BadInput(f"input '{name}': its table has times {t.shape} and values {y.shape}; give one each")
     if not (np.isfinite(t).all() and np.isfinite(y).all() and (np.diff(t) > 0).all()):
         raise BadInput(f"input '{name}': its table must be finite, with times that increase; mend it")
-    return Signal(name, lambda at: np.interp(at, t, y), span=(float(t[0]), float(t[-1])))
+    span = float(t[0]), float(t[-1])
+    if whole:
+        return Signal(name, lambda at: y[np.maximum(np.searchsorted(t, at, "right") - 1, 0)], span=span)
+    return Signal(name, lambda at: np.interp(at, t, y), span=span)
