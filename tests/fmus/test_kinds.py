@@ -164,7 +164,7 @@ def test_a_coupled_run_of_whole_numbers_truths_and_elements(kinds, apart):
         found = master.run(1.0)
     assert found.ended == ""
     data = found.data
-    n = np.clip(np.round(data["time"] + 1), 1, 2)
+    n = np.where(data["time"] < 1, 1, 2)  # an entry of a table is kept until the next one
     assert_array_equal(data["three.m"], 2 * n + 1)
     assert_array_equal(data["two.product"], 2 * data["three.m"] - 1)
     assert_array_equal(data["three.count"], np.arange(9))
