@@ -67,7 +67,7 @@ def _band(ax: Axes, found: Findings, name: str, true: tuple[Array, Array] | None
 
 def innovation_plots(found: Findings) -> Iterator[Plot]:
     """Innovations (measured minus predicted outputs) over time, and their autocorrelation."""
-    h = found.history
+    h, accepted = found.history, found.history.accepted
     for ending, some in sheets(list(found.setup.outputs) if len(h.t) > 1 else []):
         layout = [[name, f"{name} memory"] for name in some]
         figure, axes = sheet(ROW * len(some) + 0.5, layout, width_ratios=[2.4, 1])
@@ -81,7 +81,7 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
                 ax.axhline(level, color=LAW, linewidth=0.8, linestyle="--")
             ax.set_xlim(float(h.t[0]), float(h.t[-1]))
             name_axes(ax, "", f"{name}\nover expected")
-            white = whiteness(np.where(h.gated[:, j], np.nan, e))
+            white = whiteness(accepted[:, j])
             lags = np.arange(1, len(white.correlation) + 1)
             memory.bar(lags, white.correlation, color=AFTER, width=0.6)
             if len(lags):

@@ -126,10 +126,12 @@ def _estimated(found: EstimateResult) -> Iterator[Row]:
 
 def _own(found: EstimateResult) -> dict[str, Row]:
     """What the record alone says of each constant parameter, by name; none where that is not known."""
-    after = found.identifiability.get("after", {"deviation_left": {}})
+    after = found.identifiability.get("after")
+    if after is None or found.diverged:
+        return {}
     told = [*after["deviation_left"]]
     names = [n for n in told if "prior" in found.estimated[n] and "at_bound" not in found.estimated[n]]
-    if not names or found.diverged:
+    if not names:
         return {}
     at = [told.index(n) for n in names]
     entries = [found.estimated[n] for n in names]

@@ -22,6 +22,7 @@ from scenarios.preparing.survey import Channel
 
 SURE = 0.8  # from here on a match is not asked about
 DOUBTFUL = 0.75  # at most, if another variable or another column looks the same
+OTHER_NAME = 0.99  # at most, if the name is not the same to the letter
 OTHER_NUMBER = 0.2  # taken off where names have other numbers, as those of two sensors
 SETPOINT = 0.02  # taken off where a column is what should be, and the variable what is
 SET = {"soll", "set", "setpoint", "ref", "reference", "cmd", "command", "target", "demand", "desired"}
@@ -52,10 +53,10 @@ def likeness(v: FmuVariable, channel: Channel) -> float:
         return score
     mine, theirs = numbers_of(v.name), numbers_of(channel.name)
     if mine and theirs and mine != theirs:
-        return min(score, DOUBTFUL) - OTHER_NUMBER
+        return max(min(score, DOUBTFUL) - OTHER_NUMBER, 0.0)
     if v.causality == "output" and SET & {*words_of(channel.name)}:
         score -= SETPOINT
-    return min(score, 0.99)
+    return min(score, OTHER_NAME)
 
 
 def _by_words(v: FmuVariable, channel: Channel) -> float:

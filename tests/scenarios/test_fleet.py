@@ -9,6 +9,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.dataset as ds
@@ -345,6 +346,13 @@ def test_an_effect_of_either_sign_is_as_large_as_its_magnitude(answered_fleet):
     [found] = pooled(plan, answers)
     assert (found.shown, found.absent) == (["v1", "v2"], ["v0", "v3"])
     assert found.size.value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_estimate_that_has_no_sample_has_no_value_of_the_record():
+    """The filter stopped at the first one; nothing is estimated, while the prior is known."""
+    after = {"deviation_left": {"mu0": 1.0}, "correlation": [[1.0]], "alike": []}
+    nothing = SimpleNamespace(estimated={}, identifiability={"after": after}, diverged=True)
+    assert work._own(nothing) == {}
 
 
 def test_triage_traces_only_what_the_estimate_rejects(answered_fleet):
