@@ -26,6 +26,7 @@ from estimator.closeloop.screening.missing_force import MissingForce
 from estimator.noise import Noise
 from estimator.weighting import Weighting
 from fmus import codec
+from fmus.aside import let_go
 from fmus.host.description import PortNames
 
 Result = TypeVar("Result")
@@ -70,6 +71,7 @@ class Stages:
             _remove(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self._keep(found, file)
+        let_go()
         return found
 
     def _kept(self, file: Path) -> object:

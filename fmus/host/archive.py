@@ -129,18 +129,21 @@ def _unpack(path: Path, folder: Path) -> None:
 
 
 def _description(path: Path, folder: Path) -> FmuDescription:
+    file = folder / "modelDescription.xml"
+    if why := _no_description(file):
+        raise BadInput(f"{path}: its modelDescription.xml {why}; export the FMU again")
     try:
         try:
             model = read_model_description(str(folder), validate=False)
         except Exception:
-            if not _mended(folder / "modelDescription.xml"):
+            if not _mended(file):
                 raise
             model = read_model_description(str(folder), validate=False)
     except Exception as error:
-        why = _why_not_read(folder / "modelDescription.xml", error)
-        raise BadInput(f"{path}: its modelDescription.xml {why}; export the FMU again") from error
-    if model.fmiVersion not in FMI_VERSIONS:
-        raise BadInput(f"{path}: is FMI {model.fmiVersion}; FMI {' and '.join(FMI_VERSIONS)} are read here")
+        said = " ".join(str(error).split())[:200]
+        raise BadInput(
+            f"{path}: its modelDescription.xml cannot be read ({said}); export the FMU again"
+        ) from error
     if model.coSimulation is None and model.modelExchange is None:
         raise BadInput(
             f"{path}: is neither for co-simulation nor for model exchange; export it again for one of them"
@@ -151,8 +154,8 @@ def _description(path: Path, folder: Path) -> FmuDescription:
         raise BadInput(f"{path}: its modelDescription.xml cannot be read ({error})") from error
 
 
-def _why_not_read(file: Path, error: Exception) -> str:
-    """Why a model description was not read, without words of Python where the reason shows."""
+def _no_description(file: Path) -> str:
+    """Why a file is no model description of a version that is read; empty if it is one."""
     try:
         root = ElementTree.parse(file).getroot()
     except ElementTree.ParseError as broken:
@@ -162,8 +165,8 @@ def _why_not_read(file: Path, error: Exception) -> str:
     if not (version := root.get("fmiVersion")):
         return "states no version of FMI"
     if version not in FMI_VERSIONS:
-        return f"is of FMI {version}; FMI {' and '.join(FMI_VERSIONS)} are read"
-    return f"cannot be read ({' '.join(str(error).split())[:200]})"
+        return f"is FMI {version}; FMI {' and '.join(FMI_VERSIONS)} are read here"
+    return ""
 
 
 def _mended(file: Path) -> bool:

@@ -118,7 +118,7 @@ def test_no_description(drive, tmp_path):
         (b"<a>", "is no XML"),
         (b'<?xml version="1.0"?><!-- -->', "is no XML"),
         (b"<fmiModelDescription/>", "states no version of FMI"),
-        (b'<fmiModelDescription fmiVersion="1.0"/>', "is of FMI 1.0"),
+        (b'<fmiModelDescription fmiVersion="1.0"/>', "is FMI 1.0"),
         (b'<fmiModelDescription fmiVersion="2.0"/>', "cannot be read"),
         (b"<other/>", "is none: it holds <other>"),
     ],

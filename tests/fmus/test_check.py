@@ -319,7 +319,8 @@ def test_a_version_that_is_not_read_here(tmp_path):
     with zipfile.ZipFile(tmp_path / "one.fmu", "w") as packed:
         packed.writestr("modelDescription.xml", FMI1)
     for use in (grade, describe, Fmu):
-        with pytest.raises(BadInput, match=r"one\.fmu: is FMI 1\.0; FMI 2\.0 and 3\.0 are read here"):
+        why = r"one\.fmu: its modelDescription\.xml is FMI 1\.0; FMI 2\.0 and 3\.0 are read here"
+        with pytest.raises(BadInput, match=why):
             use(tmp_path / "one.fmu")
 
 

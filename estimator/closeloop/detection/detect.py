@@ -18,7 +18,7 @@ from estimator.closeloop.fitting.slopes import STEP
 from estimator.closeloop.hypotheses.baseline import Baseline
 from estimator.closeloop.hypotheses.fitted import Fit, stacked
 from estimator.closeloop.hypotheses.hypothesis import Hypothesis, Part
-from estimator.closeloop.screening.regressors import Calibration, batches
+from estimator.closeloop.screening.regressors import Calibration, batches, divisors
 from estimator.noise_figures import figures_of, figures_of_noise
 from estimator.record import Array
 from fmus.aside import set_aside
@@ -83,7 +83,7 @@ def detect(
         lengths, cosines = found
         rest = Calibration.of(screened).without(screened.residual)
         along = np.concatenate([batch.along(rest) for batch in batches(regressors)])
-        observed[LIKENESS] = float(np.max((along / np.where(lengths > 0, lengths, np.inf)) ** 2))
+        observed[LIKENESS] = float(np.max((along / divisors(lengths)) ** 2))
         references[LIKENESS] = _likeness_of_noise(cosines, limits.replicates, rng)
     p_values, figures = [], {}
     for name, value in observed.items():

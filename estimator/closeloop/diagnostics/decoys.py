@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.screening.regressors import Batch, Calibration, Changes, batches, is_wave
 from estimator.record import Array
-from fmus.aside import set_aside
+from fmus.aside import let_go, set_aside
 
 FAMILIES = 12  # leading effects from which decoys are made
 BROAD = 8.0  # effective spectral lines, above which random phases give a different regressor
@@ -36,9 +36,15 @@ def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generato
         return 0.0
     best = []
     for _ in range(copies):
-        made = [decoy(spectrum, len(residual) // outputs, rng) for spectrum in spectra]
-        best.append(max(calibration.left(Batch([g]), residual).gain(slice(None)) for g in made))
+        made = (decoy(spectrum, len(residual) // outputs, rng) for spectrum in spectra)
+        best.append(max(_gain(calibration, g, residual) for g in made))
     return float(np.median(best))
+
+
+def _gain(calibration: Calibration, g: Array, residual: Array) -> float:
+    """That of a decoy (m, k), whose spectrum need not stay in memory any longer."""
+    let_go()
+    return calibration.left(Batch([g]), residual).gain(slice(None))
 
 
 def leading(base: Fit, change: Changes, outputs: int) -> list[Array]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from estimator.closeloop.hypotheses.candidate import Candidate
 from estimator.closeloop.hypotheses.fitted import BLOCKS, Fit
-from estimator.closeloop.screening.regressors import RIDGE, Batch, Changes, batches, lengths_left
+from estimator.closeloop.screening.regressors import RIDGE, Batch, Changes, batches, divisors, lengths_left
 from estimator.record import Array
 
 PAIRS = 25  # pairs of complementary halves
@@ -83,7 +83,7 @@ def _gains(c: Candidate, mine: _Pieces, own: _Pieces, across: Array, inverse: Ar
         along = along - np.einsum("hnk,hn->hk", taken, halves @ own.along)
     left, whole = np.einsum("hkk->hk", gram), halves @ np.einsum("bkk->bk", mine.gram)
     length = lengths_left(whole, left)
-    size = np.where(length > 0, length, np.inf)
+    size = divisors(length)
     scaled = gram / (size[:, :, None] * size[:, None, :]) + RIDGE * np.eye(gram.shape[1])
     z = along / size
     beta = np.linalg.solve(scaled, z[..., None])[..., 0]

@@ -15,7 +15,7 @@ import numpy as np
 
 from estimator.closeloop.hypotheses.fitted import Fit, information_of_bounds
 from estimator.record import Array
-from fmus.aside import blocks
+from fmus.aside import blocks, let_go
 
 NO_LENGTH = 1e-6  # noise units: a shorter response is none
 VARIANCES = np.geomspace(1e-4, 1e10, 281)  # of the factors, squared units of the noise, that are tried
@@ -54,6 +54,7 @@ def _split(seen: Fit, responses: Sequence[Array]) -> tuple[Array, Array, Array]:
         slopes = (column[rows] * s for column, s in zip(seen.slopes, scale, strict=True))
         part = np.column_stack([*slopes, *(g[rows] for g in responses), seen.residual[rows]])
         products += part.T @ part
+        let_go()
     own, length = products[:n, :n], np.sqrt(np.diag(products))
     some = n + np.flatnonzero(length[n:-1] > NO_LENGTH)
     unit = length[some]

@@ -23,7 +23,7 @@ NOTHING = 1e-6  # share of a regressor's length after projection, below which on
 RIDGE = 1e-9  # ridge of the normal equations, as share of a regressor's square
 COLUMNS_AT_ONCE = 64  # smallest number of columns per batch, if there are so many
 ROWS_AT_ONCE = 2000  # rows of a piece, and length of the random sketch of a long regressor
-READ_AT_ONCE = 1 << 26  # bytes that are read before their memory is released
+READ_AT_ONCE = 1 << 25  # bytes that are read before their memory is released
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Left:
 
     def gain(self, of: slice) -> float:
         """Reduction of the residual's sum of squares by regression on some of the columns."""
-        size = np.where(self.lengths[of] > 0, self.lengths[of], np.inf)
+        size = divisors(self.lengths[of])
         scaled = self.gram[of, of] / np.outer(size, size) + RIDGE * np.eye(len(size))
         z = self.along[of] / size
         return float(z @ np.linalg.solve(scaled, z))
@@ -90,7 +90,10 @@ class Batch:
         return columns_of(self.sets)
 
     def pieces(self, within: slice | None = None) -> Iterator[tuple[slice, Array]]:
-        """All columns in a few rows after the other, (n, K), with the slice of these; within: of all rows."""
+        """Successive pieces (n, K) of all columns, each with the slice of its rows.
+
+        within: the rows that are read, by default all.
+        """
         whole = within or slice(0, len(self.sets[0]))
         read = 0
         for first in range(whole.start, whole.stop, ROWS_AT_ONCE):
@@ -149,6 +152,11 @@ def is_wave(c: Candidate) -> bool:
 def lengths_left(before: Array, after: Array) -> Array:
     """Lengths of columns from their squares before and after a projection, 0 where only rounding is left."""
     return np.sqrt(np.where(after > NOTHING**2 * before, after, 0.0))
+
+
+def divisors(lengths: Array) -> Array:
+    """Lengths to divide by, infinite for a column of which nothing is left, so that it counts for nothing."""
+    return np.where(lengths > 0, lengths, np.inf)
 
 
 def alike(
