@@ -28,6 +28,10 @@ SPELLINGS = MappingProxyType(
         "RPM": "rpm", "r/min": "rpm", "rev/min": "rpm", "sec": "s", "msec": "ms", "Volt": "V", "Ampere": "A",
         "Sekunden": "s", "seconds": "s", "millis": "ms", "milliseconds": "ms", "usec": "us", "Grad": "deg",
         "Grad/s": "deg/s", "degrees": "deg", "dps": "deg/s", "kmh": "km/h", "kph": "km/h", "mps": "m/s",
+        "km/hr": "km/h", "kmph": "km/h", "Km/h": "km/h", "KM/H": "km/h", "m/sec": "m/s", "rad/sec": "rad/s",
+        "deg/sec": "deg/s", "°/sec": "deg/s", "degrees/s": "deg/s", "N-m": "N.m", "Ncm": "N.cm",
+        "Nmm": "N.mm", "mNm": "mN.m", "Nm/rad": "N.m/rad", "Sec": "s", "Sek": "s", "hr": "h", "hours": "h",
+        "days": "d", "Rpm": "rpm", "rps": "turn/s", "MPH": "mph", "C": "degC", "ºC": "degC",
     }
 )  # fmt: skip
 
@@ -35,9 +39,9 @@ SPELLINGS = MappingProxyType(
 # German 'Grad' as a gigaradian; it knows far more names, too ('Nm' is a yarn), and works out any power.
 _IN_USE = MappingProxyType(
     {
-        "% deg ° turn rpm min h t degC g_0 in ft mph lb lbf psi degF": "",
+        "% deg ° turn rpm min h d t cd degC g_0 in ft mph lb lbf psi degF": "",
         "m": "n u μ m c d k", "s rad T H": "n u μ m", "g": "n u μ m k M", "A mol": "n u μ m k",
-        "K Wb": "u μ m", "cd": "m", "Hz": "m k M G", "N": "n u μ m c d da k M G", "Pa": "u μ m h k M G",
+        "K Wb": "u μ m", "Hz": "m k M G", "N": "n u μ m c d da k M G", "Pa": "u μ m h k M G",
         "J W": "n u μ m k M G", "V S": "n u μ m k M", "Ohm Ω": "u μ m k M G", "F": "p n u μ m",
         "bar": "u μ m d k", "L l": "u μ m c d h",
     }

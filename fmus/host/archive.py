@@ -158,7 +158,7 @@ def _no_description(file: Path) -> str:
     """Why a file is no model description of a version that is read; empty if it is one."""
     try:
         root = ElementTree.parse(file).getroot()
-    except ElementTree.ParseError as broken:
+    except (ElementTree.ParseError, ValueError, LookupError) as broken:  # also of an unknown encoding
         return f"is no XML ({broken})"
     if root.tag != "fmiModelDescription":
         return f"is none: it holds <{root.tag[:40]}>"

@@ -27,10 +27,11 @@ LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of status that FMI 2.0 has of a
 
 @cache
 def _let_go_in_time(binary: str) -> None:
-    """Have PythonFMU 0.7 drop its interpreter once, before the process ends; see export/inside/common.py."""
-    release = getattr(CDLL(binary), "finalizePythonInterpreter", None)
-    if release is not None:
-        atexit.register(release)
+    """Have PythonFMU 0.7 drop its interpreter once, before the process ends; see export/inside/common.py.
+
+    The library stays loaded until then.
+    """
+    atexit.register(CDLL(binary).finalizePythonInterpreter)
 
 
 class Fmi2Instance(Instance):
@@ -42,7 +43,8 @@ class Fmi2Instance(Instance):
 
     def _started(self, **identity: str) -> Any:
         slave = self.SLAVE(**identity)
-        _let_go_in_time(slave.dll._name)
+        if hasattr(slave.dll, "finalizePythonInterpreter"):
+            _let_go_in_time(slave.dll._name)
         PAGE.calling(self.who, "fmi2Instantiate")
         slave.instantiate(callbacks=CALLBACKS, loggingOn=True)
         return slave

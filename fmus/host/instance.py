@@ -46,6 +46,7 @@ class Instance(ABC):
     def __init__(self, archive: Archive, name: str) -> None:
         unique = f"{name}_{next(NUMBERS)}"
         self._name, self.messages = unique, MESSAGES[unique]
+        self._closed = False
         self._fatal = ""  # why no call may be made any more, not even to free it
         self._asked = ""  # how it asked to end the simulation
         self._new, self._running = True, False  # instantiated and nothing else; initialised and not failed
@@ -257,10 +258,13 @@ class Instance(ABC):
         return loop.run(self, t, u, set_refs, get_refs)
 
     def close(self) -> None:
-        """Free the instance and unload the library; one that failed fatally stays where it is."""
+        """Free the instance and unload the library, once; one that failed fatally stays where it is."""
+        if self._closed:
+            return
         if self._running:
             with suppress(CallFailed):  # it is done with all the same
                 self._call(self._slave.terminate)
+        self._closed = True
         if not self._fatal:
             PAGE.calling(self.who, self._named("freeInstance"))
             self._slave.freeInstance()
@@ -308,7 +312,9 @@ class Instance(ABC):
         return f"fmi{3 if self.FMI3 else 2}{function[0].upper()}{function[1:]}"
 
     def _refuse_after_fatal(self) -> None:
-        """A call after a fatal status can end the process, so none is made."""
+        """A call after a fatal status, or of what was freed, can end the process, so none is made."""
+        if self._closed:
+            raise CallFailed("it is closed; open the FMU again")
         if self._fatal:
             raise CallFailed(f"cannot be used any more after a fatal failure ({self._fatal})")
 

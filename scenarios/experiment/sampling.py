@@ -69,6 +69,8 @@ def at_nearest(times: Array, t: Array, x: Array) -> Array:
 def between(times: Array, t: Array, x: Array) -> Array:
     """A slow channel x (N,) at other times (n,), straight between samples; nan where one is missing."""
     there = np.isfinite(x)
+    if there.sum() < 2:
+        return np.full(times.size, np.nan)
     found: Array = np.interp(times, t[there], x[there])
     found[~_beside(times, t, there)] = np.nan
     return found

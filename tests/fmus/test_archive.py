@@ -116,6 +116,8 @@ def test_no_description(drive, tmp_path):
     [
         (b"", "is no XML"),
         (b"<a>", "is no XML"),
+        (b'<?xml version="1.0" encoding="Shift_JIS"?><a/>', "is no XML"),
+        (b'<?xml version="1.0" encoding="nobodys"?><a/>', "is no XML"),
         (b'<?xml version="1.0"?><!-- -->', "is no XML"),
         (b"<fmiModelDescription/>", "states no version of FMI"),
         (b'<fmiModelDescription fmiVersion="1.0"/>', "is FMI 1.0"),

@@ -66,6 +66,17 @@ def test_step_holds_inputs_and_keeps_time(drive):
         assert_allclose(fmu.read(["q", "q_dot", "q_ddot"]), [0.5, 1.0, 1.0], rtol=1e-12)
 
 
+def test_an_fmu_is_closed_once_and_of_no_use_afterwards(drive):
+    with Fmu(drive) as fmu:
+        fmu.restart()
+        fmu.close()
+        fmu.close()
+        with pytest.raises(FmuError, match="it is closed"):
+            fmu.restart()
+        with pytest.raises(FmuError, match="it is closed"):
+            fmu.step(0.1)
+
+
 @pytest.mark.parametrize("inputs", [{}, {"F": 1.0}, {"F": 1.0, "F_ext": -0.5}])
 def test_simulate_is_step_by_step(drive, inputs):
     t = np.linspace(1.0, 2.0, 21) ** 2

@@ -156,6 +156,17 @@ def test_a_simulation_that_only_creeps_has_its_limit(foreign):
             fmu.simulate(T, {"u": WAVE}, ["x"], {"x": 1.0})
 
 
+def report_on(function):
+    while True:
+        time.sleep(0.05)
+        function(1.0)
+
+
+def test_progress_that_is_told_does_not_renew_the_limit_of_a_simulation():
+    with Room(Isolation(run=1.0)) as room, pytest.raises(FmuEnded, match="after 1 s"):
+        room.call(report_on, room.function(lambda _: None))
+
+
 def test_an_interrupt_ends_the_process_at_once():
     def interrupt(*_):
         raise KeyboardInterrupt

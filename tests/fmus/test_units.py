@@ -64,8 +64,8 @@ SI = {
     "m": 1, "s": 1, "g": 1e-3, "A": 1, "K": 1, "mol": 1, "cd": 1, "rad": 1, "Hz": 1, "N": 1, "Pa": 1, "J": 1,
     "W": 1, "V": 1, "F": 1, "Ohm": 1, "Ω": 1, "S": 1, "Wb": 1, "T": 1, "H": 1, "bar": 1e5, "L": 1e-3,
     "l": 1e-3, "%": 1e-2, "deg": math.pi / 180, "°": math.pi / 180, "turn": 2 * math.pi, "rpm": math.pi / 30,
-    "min": 60, "h": 3600, "t": 1e3, "degC": 1, "g_0": 9.80665, "in": 0.0254, "ft": 0.3048, "mph": 0.44704,
-    "lb": 0.45359237, "lbf": 4.4482216152605, "psi": 6894.757293168, "degF": 5 / 9,
+    "min": 60, "h": 3600, "d": 86400, "t": 1e3, "degC": 1, "g_0": 9.80665, "in": 0.0254, "ft": 0.3048,
+    "mph": 0.44704, "lb": 0.45359237, "lbf": 4.4482216152605, "psi": 6894.757293168, "degF": 5 / 9,
 }  # fmt: skip
 PREFIXES = {
     "p": 1e-12, "n": 1e-9, "u": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "da": 1e1, "h": 1e2,
@@ -93,6 +93,18 @@ def test_every_unit_has_the_factor_of_the_tables_and_of_pint(unit):
 @pytest.mark.parametrize("unit", IN_USE.split())
 def test_what_engineers_write_is_known(unit):
     assert base_exponents(unit).factor > 0
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("km/hr", "km/h"), ("kmph", "km/h"), ("m/sec", "m/s"), ("deg/sec", "deg/s"), ("N-m", "N.m"),
+        ("Nmm", "N.mm"), ("hours", "h"), ("days", "d"), ("rps", "turn/s"), ("C", "degC"), ("Sec", "s"),
+    ],
+)  # fmt: skip
+def test_spellings_of_loggers_are_those_of_units(word, meant):
+    assert SPELLINGS[word] == meant
+    assert base_exponents(meant).factor > 0
 
 
 @pytest.mark.parametrize("word", WORDS.split())

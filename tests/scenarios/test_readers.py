@@ -811,3 +811,35 @@ def test_a_record_tells_how_its_columns_are_converted(tmp_path):
     assert (found["omega_w"].unit, found["omega_w"].model_unit) == ("rpm", "rad/s")
     assert found["omega_w"].factor == pytest.approx(np.pi / 30)
     assert (found["T_P"].unit, found["T_P"].factor) == ("N.m", 1.0)
+
+
+# --- what files of other tools hold beside numbers
+
+
+def test_times_of_day_of_a_workbook_are_times(tmp_path):
+    file = tmp_path / "data.xlsx"
+    times = pd.date_range("2026-11-30 23:59:50", periods=20, freq="1s")
+    pd.DataFrame({"time": [t.time() for t in times], "n": range(20)}).to_excel(file, index=False)
+    assert_allclose(StatedUnits(read_sheet(file)).seconds("time", "time"), 86390.0 + np.arange(20))
+
+
+def test_days_of_a_parquet_file_are_dates(tmp_path):
+    file = tmp_path / "data.parquet"
+    days = pa.array(pd.date_range("2026-11-30", periods=5, freq="D").date)
+    pq.write_table(pa.table({"time": days, "n": pa.array(np.arange(5.0))}), file)
+    assert_allclose(StatedUnits(read_sheet(file)).seconds("time", "time"), 86400.0 * np.arange(5))
+
+
+def test_names_that_differ_in_blanks_occur_twice(tmp_path):
+    file = tmp_path / "data.xlsx"
+    pd.DataFrame({"time": [0.0, 1.0], "v": [1.0, 2.0], "v ": [3.0, 4.0]}).to_excel(file, index=False)
+    with pytest.raises(BadInput, match="row 1: column 'v' occurs twice; rename one"):
+        read_sheet(file)
+
+
+def test_an_array_in_each_row_does_not_keep_the_others_from_being_read(tmp_path):
+    bytes_ = np.zeros((10, 8), dtype=np.uint8)
+    mdf(tmp_path / "data.mf4", {"log": {"time": np.arange(10.0), "v": np.arange(10.0), "bytes": bytes_}})
+    sheet = read_sheet(tmp_path / "data.mf4")
+    assert_array_equal(sheet.numbers("v"), np.arange(10.0))
+    assert sheet.apart["bytes"].startswith("holds an array in each row")

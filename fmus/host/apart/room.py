@@ -105,8 +105,9 @@ class Room:
     def _result(self, keep: bool, function: Callable[..., Any], args: Any, kwargs: Any) -> Any:
         unused, self.unused = self.unused, []
         self._channel.send((unused, keep, function, args, kwargs))
+        begun = time.monotonic()
         while True:
-            how, value = self._answer()
+            how, value = self._answer(begun)
             if how == "ask":
                 self._channel.send(self._told(*value))
             elif how == "raised":
@@ -125,8 +126,9 @@ class Room:
         except Exception as error:
             return "raised", error
 
-    def _answer(self) -> tuple[str, Any]:
-        begun = seen = time.monotonic()
+    def _answer(self, begun: float) -> tuple[str, Any]:
+        """What comes next from the process; begun: s, time of the call, which may ask for several things."""
+        seen = time.monotonic()
         progress = b""
         while True:
             try:

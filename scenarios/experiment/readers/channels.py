@@ -57,8 +57,11 @@ def sheet_of(
             rows = f"{named[name][0].rows} rows of its own, '{axis.full_name}' has {axis.rows}"
             apart[name] = f"is not sampled at the times named ({rows}); resample it to them"
     check_record(file, NUMBER * axis.rows * len(found))
-    cells = pd.DataFrame({name: c.load() for name, c in found.items()})
-    return Sheet(file, cells, tuple(named), {name: c.unit for name, c in found.items() if c.unit}, apart)
+    loaded = {name: c.load() for name, c in found.items()}
+    single = {name: x for name, x in loaded.items() if x.ndim == 1 and x.dtype.names is None}
+    apart |= dict.fromkeys(loaded.keys() - single.keys(), "holds an array in each row, and no single number")
+    units = {name: c.unit for name, c in found.items() if c.unit}
+    return Sheet(file, pd.DataFrame(single), tuple(named), units, apart)
 
 
 def _by_name(channels: Sequence[Channel]) -> Named:

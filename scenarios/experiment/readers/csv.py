@@ -1,5 +1,6 @@
 """Text files of columns, as loggers and spreadsheets write them."""
 
+import io
 import json
 import re
 import warnings
@@ -90,7 +91,7 @@ def _cells(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
 
 def _table(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
     """What pandas makes of the lines below the names and units, which are not left to it."""
-    engine = options.get("engine") or ("python" if options.get("skipfooter") else "c")
+    engine = options.get("engine") or "c"
     ours: dict[str, Any] = {
         "names": list(layout.names),
         "index_col": False,
@@ -104,11 +105,15 @@ def _table(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
     found: dict[str, Any] = {"header": None, "sep": layout.separator, "decimal": layout.decimal}
     looked_for = ("delimiter", "skiprows", "encoding", "encoding_errors")
     theirs = {key: value for key, value in options.items() if key not in looked_for}
+    foot = int(
+        theirs.pop("skipfooter", 0)
+    )  # pandas' other engine, which takes it, reads a wrong decimal sign
     with opened(file, layout.encoding, options) as stream, warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)
         for _ in islice(stream, layout.first - 1):
             pass
-        table: pd.DataFrame = pd.read_csv(stream, **{**ours, **theirs, **found})
+        lines = io.StringIO("".join([*stream][:-foot]), newline="") if foot else stream
+        table: pd.DataFrame = pd.read_csv(lines, **{**ours, **theirs, **found})
     return table
 
 

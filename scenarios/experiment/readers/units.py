@@ -1,5 +1,6 @@
 """Compare the units that a file states for its columns with the units declared for them."""
 
+import datetime
 import re
 from math import isclose
 from types import MappingProxyType
@@ -187,7 +188,15 @@ def dates_apart(one: "pd.Timestamp | None", other: "pd.Timestamp | None") -> flo
 
 
 def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
-    """Dates that a file holds as text, as dates, in UTC if their offsets differ; all else unchanged."""
+    """Dates that a file holds as text, as dates, in UTC if their offsets differ; all else unchanged.
+
+    Dates and times of day of a workbook or a Parquet file are objects of Python.
+    """
+    first = next(iter(cells.dropna()), None) if cells.dtype == object else None
+    if isinstance(first, datetime.time):
+        cells = cells.map(str, na_action="ignore")
+    elif isinstance(first, datetime.date):
+        return pd.to_datetime(cells)
     if not pd.api.types.is_string_dtype(cells) or is_number(_first(cells)):
         return cells
     try:
