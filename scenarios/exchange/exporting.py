@@ -15,6 +15,7 @@ from fmus.export.ssp import (
     Component,
     Connector,
     Link,
+    Start,
     System,
     write_package,
 )
@@ -134,7 +135,7 @@ def _members(
             content.files[places[paths[name]]] = paths[name].read_bytes()
         known = fmus[name].variables
         values = {k.partition(".")[2]: v for k, v in fixed.items() if k.partition(".")[0] == name}
-        start = {v: (value, known[v].unit) for v, value in {**own[name], **values}.items()}
+        start = {v: Start(value, known[v].unit) for v, value in {**own[name], **values}.items()}
         connected = {link.target.variable for link in found if link.target.fmu == name}
         _refuse_elements(name, fmus[name], {*start, *connected, *(_sources(found, name))})
         connectors = _connectors(fmus[name], connected)

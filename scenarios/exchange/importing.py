@@ -151,14 +151,12 @@ def _member(
     led: inputs to which a connection leads, which is what counts from the start of a simulation on.
     """
     member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
-    for variable, (value, unit) in c.start.items():
+    for variable, given in c.start.items():
         known = fmu.variables.get(variable)
         if known is None:
             tell(f"parameter '{variable}' of component '{c.name}' is not in its FMU and is left out")
             continue
-        if unit is not None and known.unit is not None:
-            factor, offset = conversion(unit, known.unit, f"parameter '{variable}' of '{c.name}'")
-            value = factor * value + offset
+        value = given.within(known.unit, f"parameter '{variable}' of '{c.name}'")
         if known.causality == "input" and f"{name}.{variable}" in led:
             tell(f"the value of input '{variable}' of '{c.name}' is left out, since a connection leads to it")
         elif known.causality == "input":

@@ -27,7 +27,11 @@ def slower(t: Array, times: Array) -> bool:
 
 def filtered(t: Array, times: Array) -> bool:
     """Whether samples at t (N,) come so much more often than those at times (n,) that they are filtered."""
-    return step_of(times) > (1 + TRANSITION) * step_of(t)
+    return _thinned(t, step_of(times))
+
+
+def _thinned(t: Array, step: float) -> bool:
+    return step > (1 + TRANSITION) * step_of(t)
 
 
 def at_times(times: Array, t: Array, x: Array) -> Array:
@@ -38,21 +42,28 @@ def at_times(times: Array, t: Array, x: Array) -> Array:
     outputs pass through the same filter, which leaves a linear relation between them as it is (L. Ljung,
     System Identification, 2nd ed., 1999, sections 13.7 and 14.4). Between samples, the channel is taken as
     limited to its band, for the same reason. A time has no number if it is outside the channel, in a gap of
-    it, or beside a lost sample.
+    it, across which nothing is filtered, or beside a lost sample.
     """
     there = np.isfinite(x)
     if there.sum() < 2:
         return np.full(times.size, np.nan)
-    known, values = t[there], x[there]
-    inside = times.clip(known[0], known[-1])
-    if filtered(known, times):
-        found = _spline(*_low_passed(*_even(known, values), step_of(times)), inside)
-    elif np.isin(inside, known).all():
-        found = values[np.searchsorted(known, inside)]
-    else:
-        found = _spline(*_even(known, values), inside)
+    known, values, step = t[there], x[there], step_of(times)
+    gaps = np.flatnonzero(np.diff(known) > GAP * step_of(known)) + 1
+    found = np.full(times.size, np.nan)
+    for begin, end in zip([0, *gaps], [*gaps, known.size], strict=True):
+        rows = slice(np.searchsorted(times, known[begin]), np.searchsorted(times, known[end - 1], "right"))
+        found[rows] = _sampled(times[rows], step, known[begin:end], values[begin:end])
     found[~_beside(times, t, there)] = np.nan
     return found
+
+
+def _sampled(times: Array, step: float, t: Array, x: Array) -> Array:
+    """A channel x (N,) at t (N,) s, without a gap, at some (n,) of times that lie `step` s apart."""
+    if t.size > 1 and _thinned(t, step):
+        return _spline(*_low_passed(*_even(t, x), step), times)
+    if np.isin(times, t).all():
+        return np.asarray(x[np.searchsorted(t, times)])
+    return _spline(*_even(t, x), times)
 
 
 def at_nearest(times: Array, t: Array, x: Array) -> Array:

@@ -51,9 +51,10 @@ ONE = Lag(0.0, 1.0, 0.0)  # nothing was sought
 def with_clocks(made: Draft, isolation: Isolation | None) -> Draft:
     """The draft with the clocks of its files, as far as they can be found; isolation: of a foreign FMU.
 
-    Channels of one file have one clock, files with dates are put together by these, and others by a channel
-    that both have measured. Without one, the FMU is simulated with the inputs of their file, and the outputs
-    of the other files are sought in it: what the FMU does not know may then shift a clock by a few samples.
+    Files with dates are put together by these, channels of one file have one clock without them, and others
+    are put together by a channel that both have measured. Without one, the FMU is simulated with the inputs
+    of their file, and the outputs of the other files are sought in it: what the FMU does not know may then
+    shift a clock by a few samples.
     """
     driving = dict.fromkeys(s.raster for s in made.inputs)
     if not made.others or len(driving) != 1:
@@ -107,11 +108,9 @@ def _found(made: Draft, driven: Driven) -> Draft:
 
 def _known(one: Raster, other: Raster) -> tuple[Lag, str] | None:
     """The lag of a raster by its file or its dates; None if they do not tell."""
-    if one.file == other.file:
-        return ONE, "the same file, so that it is the same clock"
-    if one.begin is None or other.begin is None:
-        return None
-    return replace(ONE, seconds=dates_apart(other.begin, one.begin)), "by the dates of both files"
+    if one.begin is not None and other.begin is not None:
+        return replace(ONE, seconds=dates_apart(other.begin, one.begin)), "by the dates of both files"
+    return (ONE, "the same file, so that it is the same clock") if one.file == other.file else None
 
 
 def _followed(made: Draft, simulated: Mapping[str, Array], first: Raster, other: Raster) -> tuple[Lag, str]:

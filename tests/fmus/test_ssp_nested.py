@@ -6,7 +6,7 @@ import pytest
 
 from fmus.errors import BadInput
 from fmus.export.ssp import read_package
-from fmus.export.ssp.system import NAMESPACES, Link
+from fmus.export.ssp.system import NAMESPACES, Link, Start
 
 SPACES = " ".join(f'xmlns:{k}="{v}"' for k, v in NAMESPACES.items() if k in ("ssd", "ssc", "ssv", "ssm"))
 
@@ -102,8 +102,22 @@ def test_values_of_systems_reach_the_fmus_and_the_outermost_count(tmp_path):
     top = element("System", "top", values=bound(a__f__u=5.0, b__k=6.0, nowhere=1.0), inner=inner)
     system = read(tmp_path, top)
     starts = {c.name: dict(c.start) for c in system.components}
-    assert starts == {"a.f": {"u": (5.0, None), "k": (3.0, None)}, "b.f": {"k": (6.0, None)}}
+    assert starts == {"a.f": {"u": Start(5.0), "k": Start(3.0)}, "b.f": {"k": Start(6.0)}}
     assert any("'nowhere' of the system belongs to no component" in line for line in system.ignored)
+
+
+@pytest.mark.parametrize("unit", ["mm", None])
+def test_a_value_of_a_connector_is_in_its_unit_and_changed_behind_that(tmp_path, unit):
+    """2 m on a connector in mm, or in no unit, then 5 v + 7 in m on the way to the FMU."""
+    values = bound(v=2.0).replace('value="2.0"', 'value="2.0" unit="m"')
+    inner = fmu("f")
+    ends = connector("v", "input", unit)
+    wires = wire("v", "f.u", LINE.format(5, 7))
+    [f] = read(tmp_path, element("System", "top", ends, values, inner, wires)).components
+    assert f.start["u"].within("mm", "") == pytest.approx(5 * 2000 + 7)
+    plain = wire("v", "f.u", LINE.format(5, 7), 'suppressUnitConversion="true"')
+    [f] = read(tmp_path, element("System", "top", ends, values, inner, plain)).components
+    assert f.start["u"].within("mm", "") == pytest.approx(5 * (2000 if unit else 2) + 7)
 
 
 def test_entries_of_one_dictionary_are_one_place(tmp_path):

@@ -90,6 +90,13 @@ def test_there_is_no_number_in_a_gap_and_one_beside_it():
     assert np.abs(at_times(new, t, np.sin(t)) - np.sin(new))[~found][3:-3].max() < 0.05
 
 
+def test_a_time_before_a_clock_was_set_costs_nothing():
+    """A first row of 1970, as loggers write before they know the time."""
+    t = np.concatenate([[0.0], 1.7e9 + times(100.0)])
+    new = 1.7e9 + times(40.0)
+    assert_allclose(at_times(new, t, np.sin(t - 1.7e9)), np.sin(new - 1.7e9), atol=0.03)
+
+
 def test_a_slow_channel_has_a_number_at_the_nearest_times_alone():
     t, new = times(3.0), times(100.0)
     found = at_nearest(new, t, np.sin(t))
@@ -226,6 +233,25 @@ def test_a_file_may_have_several_clocks(tmp_path):
     (tmp_path / "experiment.toml").write_text(apart)
     with pytest.raises(BadInput, match=r"rows of its own.*or declare \[files.NAME\]"):
         load(tmp_path / "experiment.toml")
+
+
+def test_waveforms_of_one_file_are_put_together_by_their_start_times(tmp_path):
+    from nptdms import ChannelObject, TdmsWriter
+
+    noon, t, fast = datetime(2026, 3, 1, 12), table()["time"], np.arange(5001) / 500
+    step, columns = float(t[1] - t[0]), table()
+
+    def wave(begin, step, offset=0.0):
+        return {"wf_increment": step, "wf_start_offset": offset, "wf_start_time": noon + timedelta(0, begin)}
+
+    with TdmsWriter(str(tmp_path / "data.tdms")) as writer:
+        log = [ChannelObject("log", n, x, wave(1.0, step)) for n, x in columns.items() if n != "time"]
+        writer.write_segment([*log, ChannelObject("fast", "n", wheel(fast), wave(3.5, 0.002, -2.5))])
+    toml = TACHO.replace("data.csv", "data.tdms").replace('time = "time"', 'time = "log/time"')
+    toml = toml.replace('file = "tacho.csv"\ntime = "clock"\noffset = 3.0', 'time = "fast/time"')
+    (tmp_path / "experiment.toml").write_text(toml)
+    [run] = load(tmp_path / "experiment.toml").runs
+    assert_allclose(run.y[30:-30, 0], wheel(run.t[30:-30]) * np.pi / 30, atol=2e-3)
 
 
 def test_a_derivative_may_be_that_of_another_clock(tmp_path):

@@ -295,6 +295,50 @@ def test_a_few_printed_digits_are_no_jitter(tmp_path):
     assert kinds(read(write(tmp_path, columns=columns))) == ["unit"]
 
 
+WHOLE = GOOD.replace("[split]\nidentify = [0.0, 6.0]\ntest = [6.0, 10.0]\n", "")
+
+
+def write_exactly(folder, times):
+    """The table with other times, in all their digits, and an experiment without a split."""
+    file = write(folder, WHOLE)
+    pd.DataFrame(table() | {"time": times}).to_csv(folder / "data.csv", index=False)
+    return file
+
+
+EPOCHS = {
+    "ms": lambda t: 1.7e12 + 1e3 * t,
+    "us": lambda t: 1.7e15 + 1e6 * t,
+    "d": lambda t: 45000.5 + t / 86400,
+    "d, MATLAB": lambda t: 739000.5 + t / 86400,
+}
+
+
+@pytest.mark.parametrize("unit", EPOCHS)
+def test_times_that_look_like_dates_in_another_unit_are_noted(tmp_path, unit):
+    file, word = write_exactly(tmp_path, EPOCHS[unit](table()["time"])), unit.partition(",")[0]
+    said = [n.sentence for n in read(file).notes if n.column == "time"]
+    assert len(said) == 1
+    assert f'if these are dates in {word}, write time_unit = "{word}"' in said[0]
+    file.write_text(f'time_unit = "{word}"\n' + WHOLE)
+    assert not [n for n in read(file).notes if n.column == "time"]
+
+
+@pytest.mark.parametrize("begin", [0.0, 45000.0, 1.7e9])
+def test_times_in_seconds_are_not_noted(tmp_path, begin):
+    file = write_exactly(tmp_path, begin + table()["time"])
+    assert not [n for n in read(file).notes if n.column == "time"]
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("torque [kNx]", True), ("torque[0]", False), ("torque (front)", False)]
+)
+def test_a_word_in_square_brackets_that_is_no_known_unit_is_noted(tmp_path, name, told):
+    columns = {name if c == "torque" else c: x for c, x in table().items()}
+    file = write(tmp_path, GOOD.replace('"torque"', f'"{name}"'), columns)
+    said = [n.sentence for n in read(file).notes if "is no unit" in n.sentence]
+    assert [f"'{name}': [kNx] is no unit that is known here" in s for s in said] == [True] * told
+
+
 def test_a_constant_output_is_noted_a_constant_input_is_not(tmp_path):
     columns = table() | {"n_wheel": np.full(1001, 5.0), "torque": np.zeros(1001)}
     record = read(write(tmp_path, columns=columns))

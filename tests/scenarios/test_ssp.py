@@ -21,7 +21,7 @@ from numpy.testing import assert_allclose
 from fmus.errors import BadInput
 from fmus.export.builders.pythonfmu import build_python
 from fmus.export.provenance import PLACE
-from fmus.export.ssp import Component, Link, System, read_package, write_package
+from fmus.export.ssp import Component, Link, Start, System, read_package, write_package
 from fmus.export.ssp.source import signal_source
 from fmus.host.fmu import Fmu
 from fmus.host.master.recording import read_recording
@@ -251,9 +251,9 @@ def test_the_structure_says_what_the_scenario_does(loop):
     parts = {c.name: c for c in system.components}
     assert list(parts) == ["rig", "inputs_controller", "controller"]
     assert (system.stop, system.step, parts["controller"].step) == (0.3, 1e-3, 5e-3)
-    assert parts["rig"].start["mu0"] == (0.2, "1")  # wet
-    assert parts["rig"].start["omega_w"] == (12.16, "rad/s")
-    assert parts["rig"].start["f_sync"] == (7.5, "Hz")
+    assert parts["rig"].start["mu0"] == Start(0.2, "1")  # wet
+    assert parts["rig"].start["omega_w"] == Start(12.16, "rad/s")
+    assert parts["rig"].start["f_sync"] == Start(7.5, "Hz")
     assert {c.name: c.unit for c in parts["rig"].connectors if c.kind == "input"} == {"T_P": "N.m"}
     lines = {link.target: (link.source, link.gain, link.offset) for link in system.links}
     assert lines["rig", "T_P"] == (("controller", "T"), 0.5, 3.0)
@@ -409,6 +409,23 @@ MAPPING = """<ssm:ParameterMapping version="1.0"
   <ssm:MappingEntry source="set.omega_w" target="omega_r"/>
   <ssm:MappingEntry source="set.not_there" target="theta_w"/>
 </ssm:ParameterMapping>"""
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [("", 2 * np.pi * 0.5 + 1), (' suppressUnitConversion="true"', 60 * 0.5 + 1)],
+)
+def test_a_mapping_changes_a_value_behind_its_conversion(loop, tmp_path, more, expected):
+    value = r'(<ssv:Parameter name="omega_w">\s*<ssv:Real value=)"12.16" unit="rad/s"'
+    other = edited(loop, tmp_path / "other.ssp", value, r'\1"60" unit="rpm"', "resources/rig.ssv")
+    first = '<ssm:MappingEntry source="set.omega_w" target="omega_w"'
+    within = f">{MAPPING.replace(first, first + more)}</ssd:ParameterMapping></ssd:ParameterBinding>"
+    binding = '<ssd:ParameterBinding source="resources/rig.ssv" prefix="set."><ssd:ParameterMapping source=""'
+    pattern = r'<ssd:ParameterBinding source="resources/rig.ssv" />'
+    mapped = edited(other, tmp_path / "mapped.ssp", pattern, binding + within)
+    table = tomllib.loads(import_ssp(mapped, tmp_path / "back").read_text(encoding="utf-8"))
+    assert table["fmus"]["rig"]["initial"]["omega_w"] == pytest.approx(expected)
+    assert table["fmus"]["rig"]["initial"]["omega_r"] == pytest.approx(2 * np.pi)
 
 
 @pytest.mark.parametrize("inline", [False, True])
@@ -599,7 +616,9 @@ def test_a_package_whose_variables_have_brackets_is_imported_and_run(tmp_path):
         replacement = f'name="{new}"'.encode()
         with_description(plain, named, f'name="{old}"'.encode(), replacement)
         plain = named.rename(tmp_path / f"{old}.fmu")
-    fmu = Component("a", "resources/a.fmu", start={"body[1].mass of it": (50.0, "kg"), "F": (1.0, "N")})
+    fmu = Component(
+        "a", "resources/a.fmu", start={"body[1].mass of it": Start(50.0, "kg"), "F": Start(1.0, "N")}
+    )
     other = Component("b", "resources/b.fmu")
     system = System(
         name="brackets",

@@ -5,8 +5,9 @@ from fmus.export.ssp.system import (
     Component,
     Connector,
     Link,
+    Start,
     System,
 )
 from fmus.export.ssp.writing import write_package
 
-__all__ = ["Component", "Connector", "Link", "System", "read_package", "write_package"]
+__all__ = ["Component", "Connector", "Link", "Start", "System", "read_package", "write_package"]

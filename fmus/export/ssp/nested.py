@@ -6,8 +6,8 @@ from typing import Any
 
 from fmus.errors import BadInput
 from fmus.export.ssp.elements import every, number, one
-from fmus.export.ssp.system import Link
-from fmus.export.ssp.values import STARTS, Start, bound
+from fmus.export.ssp.system import Link, Start
+from fmus.export.ssp.values import STARTS, bound
 from fmus.units import conversion
 
 Path = tuple[str, ...]  # names from the outermost system, which is (), to an element
@@ -151,9 +151,10 @@ def _followed(leg: Leg, into: Mapping[End, Leg], level: Level) -> list[Link]:
     if path in level.components:
         return [Link((".".join(path), name), (".".join(target), inlet), gain, offset, plain)]
     if begin in level.fed:
-        value, unit = level.fed[begin]
-        end = (gain * value + offset, None) if plain or (gain, offset) != (1.0, 0.0) else (value, unit)
-        level.starts.setdefault(target, {})[inlet] = end
+        value, unit = level.fed[begin], level.units.get(begin)
+        if plain or unit:
+            value = Start(value.within(unit, str(legs[0])), None if plain else unit)
+        level.starts.setdefault(target, {})[inlet] = value.times(gain, offset)
     else:
         level.ignored.append(f"{legs[0]}: nothing here sets it, {'.'.join(target)}.{inlet} keeps its start")
     return []

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
+
+from fmus.units import conversion
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources"
@@ -24,6 +26,28 @@ NAMESPACES = {
 Kind = Literal["input", "output", "parameter", "calculatedParameter", "inout"]
 
 
+class Start(NamedTuple):
+    """A value before the start, in a unit if one is stated: in the unit of its variable it becomes
+    gain * value + offset."""
+
+    value: float
+    unit: str | None = None
+    gain: float = 1.0
+    offset: float = 0.0
+
+    def times(self, gain: float, offset: float) -> "Start":
+        """What one more change, behind all others, makes of it."""
+        return self._replace(gain=gain * self.gain, offset=gain * self.offset + offset)
+
+    def within(self, unit: str | None, where: str) -> float:
+        """The number in the unit of a variable; without one, the value is taken as it stands.
+
+        `where` begins the message of the BadInput for units that do not fit.
+        """
+        factor, shift = conversion(self.unit, unit, where) if self.unit and unit else (1.0, 0.0)
+        return self.gain * (factor * self.value + shift) + self.offset
+
+
 @dataclass(frozen=True)
 class Connector:
     """A variable of a component that can be connected, with its unit where one is stated."""
@@ -37,7 +61,7 @@ class Connector:
 class Component:
     """An FMU in a system.
 
-    source: its path in the package. start: values before the start by variable, each with its unit or None.
+    source: its path in the package. start: values before the start by variable.
     types: of variables that are not real: Integer, Boolean or Enumeration.
     step: s, where it has one of its own. feeds, data: of a source of signals, which component it feeds and
     the path of the same signals as CSV.
@@ -46,7 +70,7 @@ class Component:
     name: str
     source: str
     connectors: tuple[Connector, ...] = ()
-    start: Mapping[str, tuple[float, str | None]] = field(default_factory=dict)
+    start: Mapping[str, Start] = field(default_factory=dict)
     step: float | None = None
     feeds: str | None = None
     data: str | None = None

@@ -150,7 +150,7 @@ def _values(component: Component) -> Element:
     """Values of a component before the start; libraries look for the name 'initialValues'."""
     root = element(None, "ssv:ParameterSet", version="1.0", name="initialValues")
     parameters = element(root, "ssv:Parameters")
-    for name, (value, unit) in component.start.items():
+    for name, (value, unit, *_) in component.start.items():
         kind = component.types.get(name, REAL)
         parameter = element(parameters, "ssv:Parameter", name=name)
         if kind == "Boolean":
@@ -161,7 +161,7 @@ def _values(component: Component) -> Element:
             real = element(parameter, "ssv:Real", value=repr(float(value)))
             if unit is not None and known_unit(unit):
                 real.set("unit", unit)
-    _units(root, (unit for _, unit in component.start.values()))
+    _units(root, (unit for _, unit, *_ in component.start.values()))
     return root
 
 

@@ -18,6 +18,7 @@ class Channel:
     """A channel that is loaded only when it is needed.
 
     rasters: keys that are equal for channels with the same rows; group: empty if the file has no groups.
+    begin: of a time channel, the date of 0 s where the file tells it.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Channel:
     load: Callable[[], NDArray[Any]]  # (rows,)
     group: str = ""
     unit: str | None = None
+    begin: pd.Timestamp | None = None
 
     @property
     def full_name(self) -> str:
@@ -61,7 +63,8 @@ def sheet_of(
     single = {name: x for name, x in loaded.items() if x.ndim == 1 and x.dtype.names is None}
     apart |= dict.fromkeys(loaded.keys() - single.keys(), "holds an array in each row, and no single number")
     units = {name: c.unit for name, c in found.items() if c.unit}
-    return Sheet(file, pd.DataFrame(single), tuple(named), units, apart)
+    begins = {name: c.begin for name, c in found.items() if c.begin is not None}
+    return Sheet(file, pd.DataFrame(single), tuple(named), units, apart, begins)
 
 
 def _by_name(channels: Sequence[Channel]) -> Named:

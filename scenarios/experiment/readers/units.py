@@ -12,13 +12,18 @@ import pandas as pd
 from estimator.record import Array, Note
 from fmus.errors import BadInput
 from fmus.units import another_kind, base_exponents, column_conversion, conversion
-from scenarios.experiment.readers.header import is_number, is_unit, spelled
+from scenarios.experiment.readers.header import BRACKETS, is_number, is_unit, spelled
 from scenarios.experiment.readers.sheet import Sheet
 
 SAME = (1.0, 0.0)  # factor and offset
 ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
 CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d+)?)")  # hours, minutes, seconds
 HOUR, DAY = 3600.0, 86400.0  # s
+EPOCH_UNITS = ("ms", "us", "ns", "d")
+EPOCHS = (0.0, 25_569 * DAY, 719_529 * DAY)  # 1970 in dates of Unix, of spreadsheets, of MATLAB, s
+CENTURY = (978e6, 4.1e9)  # s, from 2001 to 2099 by Unix
+EPOCH_ROWS = 1000  # that tell the time step
+FINEST = 1e-5  # the shortest step of a record, s; in days, common rates are below
 FRACTION = r"(:\d{2}),(\d+)"  # of a second
 DOTTED = r"^(\d{1,2})\.(\d{1,2})\.(\d{4})(?!\S)"  # day, month and year, wherever dots stand between them
 OFFSET = r":\d{2}(?:[.,]\d+)? *(?:Z|[+-]\d{2}(?::?\d{2})?)\s*$"  # from UTC, behind a time of day
@@ -64,6 +69,7 @@ class StatedUnits:
         """
         stated = self.stated(column, where, derived)
         if stated is None:
+            self._note_brackets(column)
             return SAME
         place = f"{where}: column '{column}' of {self._file}"
         try:
@@ -80,8 +86,17 @@ class StatedUnits:
             self.notes.append(Note("unit", column, f"{said}, to {target}"))
         return found
 
+    def _note_brackets(self, column: str) -> None:
+        """Note a word in square brackets behind a name: a unit, perhaps, that is not known here."""
+        bracket = BRACKETS.fullmatch(column.strip())
+        if bracket and bracket.group(1).startswith("["):
+            said = f"{self._file.name}: column '{column}': {bracket.group(1)} is no unit that is known here"
+            self.notes.append(Note("unit", column, f"{said}; the numbers are taken without one"))
+
     def begin(self, column: str) -> "pd.Timestamp | None":
-        """The first date of a time column; None if it holds numbers or durations."""
+        """The date of 0 s; None if it holds numbers or durations and the file tells none."""
+        if column in self._sheet.begins:
+            return self._sheet.begins[column]
         cells = _dates(self._sheet.cells[column])
         return cells.min() if cells.dtype.kind == "M" else None
 
@@ -106,7 +121,21 @@ class StatedUnits:
         else:
             self.check(column, 0, unit, where)
             factor, offset = conversion(unit, "s", where)
-        return self._sheet.numbers(column) * factor + offset
+        numbers = self._sheet.numbers(column)
+        if unit is None and (factor, offset) == SAME:
+            self._note_epoch(column, numbers)
+        return numbers * factor + offset
+
+    def _note_epoch(self, column: str, numbers: Array) -> None:
+        """Note a time column (N,), taken in s, whose numbers are dates of this century in another unit."""
+        for unit in EPOCH_UNITS:
+            begin, step = numbers[0] * conversion(unit, "s", "")[0], np.median(np.diff(numbers[:EPOCH_ROWS]))
+            dates = [begin - shift for shift in (EPOCHS if unit == "d" else EPOCHS[:1])]
+            if (unit != "d" or step < FINEST) and any(CENTURY[0] < s < CENTURY[1] for s in dates):
+                said = f"{self._file.name}: column '{column}' is taken in s, but begins at {numbers[0]:.9g}"
+                way = f'if these are dates in {unit}, write time_unit = "{unit}"'
+                self.notes.append(Note("unit", column, f"{said}; {way}"))
+                return
 
     def _of_clock(self, column: str, cells: "pd.Series[Any]") -> Array:
         """Hours, minutes and seconds (N,) as seconds; a time of day that jumps back has passed midnight."""

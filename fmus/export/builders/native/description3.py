@@ -81,13 +81,13 @@ def _time(table: Table) -> dict[str, str]:
 
 def _add_structure(parent: Element, table: Table) -> None:
     structure = SubElement(parent, "ModelStructure")
-    for name, unknowns in (
-        ("Output", table.outputs),
-        ("ContinuousStateDerivative", table.derivatives),
-        ("InitialUnknown", table.initial),
+    for name, unknowns, kinds in (
+        ("Output", table.outputs, True),
+        ("ContinuousStateDerivative", table.derivatives, True),
+        ("InitialUnknown", table.initial, False),  # the words are of the time after the start
     ):
         for unknown in unknowns:
-            about = {"valueReference": str(FIRST + unknown.reference), **needs(unknown, FIRST)}
+            about = {"valueReference": str(FIRST + unknown.reference), **needs(unknown, FIRST, kinds)}
             SubElement(structure, name, about)
 
 
