@@ -53,12 +53,14 @@ def with_clocks(made: Draft, isolation: Isolation | None) -> Draft:
 
     Files with dates are put together by these, channels of one file have one clock without them, and others
     are put together by a channel that both have measured. Without one, the FMU is simulated with the inputs
-    of their file, and the outputs of the other files are sought in it: what the FMU does not know may then
-    shift a clock by a few samples.
+    of their file, if all lie in one, and the outputs of the other files are sought in it: what the FMU does
+    not know may then shift a clock by a few samples.
     """
     driving = dict.fromkeys(s.raster for s in made.inputs)
-    if not made.others or len(driving) != 1:
+    if not made.others:
         return made
+    if len(driving) != 1:  # no simulation before their clocks are known
+        return _found(made, None)
     [first] = driving
     try:
         with Fmu(made.fmu, isolation_of(made.fmu, isolation)) as fmu:
@@ -82,14 +84,15 @@ class Driven:
         return dict(zip(self.outputs, y.T, strict=True))
 
 
-def _found(made: Draft, driven: Driven) -> Draft:
+def _found(made: Draft, driven: Driven | None) -> Draft:
     """The draft with the clocks that can be found, and with the time after which the FMU is in step."""
-    simulated, first = driven(), driven.first
+    first, simulated = (driven.first, driven()) if driven else (made.raster, {})
     lags = {first: (ONE, "")}
     for r in (made.raster, *made.others):
         if r is not first:
-            found = _known(first, r) or _shared(first, r) or _followed(made, simulated, first, r)
-            lags |= {r: found} if found[0].sure else {}
+            found = _known(first, r) or _shared(first, r)
+            found = found or (_followed(made, simulated, first, r) if driven else None)
+            lags |= {r: found} if found and found[0].sure else {}
     if made.raster not in lags:
         return made
     places = max(0, 1 - floor(log10(made.raster.step)))
@@ -103,6 +106,8 @@ def _found(made: Draft, driven: Driven) -> Draft:
             said = f" (correlation {lag.likeness:.3f}, {max(lag.other, 0.0):.2f} at any other)"
             clocks[r] = Clock(offset, how + said if lag.other or lag.likeness < 1 else how)
     begun = replace(made, clocks=clocks)
+    if driven is None:
+        return begun
     return replace(begun, settling=settling(driven, simulated, begun.split[0] + own))
 
 

@@ -84,14 +84,16 @@ def meant_by(unit: str | None, fitting: Sequence[str]) -> str | None:
 def unit_in_name(name: str, fitting: Sequence[str]) -> str | None:
     """The unit that ends a name, as in v_kmh or speedRpm, if it can be converted into one of these units.
 
-    Capitals that make no unit are read as small letters, as in SPEED_KMH. The word 'in' at the end means that
-    something goes in, and no inches.
+    The last two words may be the unit together, as in v_km_h, acc_m_s2 and torque_N_m. Capitals that make no
+    unit are read as small letters, as in SPEED_KMH. The word 'in' at the end means that something goes in,
+    and no inches.
     """
-    last = [word for word in _SEPARATED.split(_BRACKET.sub(" ", name)) if word][-1:]
-    ends = [word[i:] for word in last for i in (0, *(m.start() for m in _CAPITAL.finditer(word)))]
-    units = [spelled(word) for end in ends for word in (end, end[:1].lower() + end[1:], end.lower())]
-    found = (u for u in units if not u.isdigit() and u != "in" and any(alike(u, other) for other in fitting))
-    return next(found, None)
+    words = [word for word in _SEPARATED.split(_BRACKET.sub(" ", name)) if word]
+    both = [sign.join(words[-2:]) for sign in "/." if len(words) > 2]
+    single = [word[i:] for word in words[-1:] for i in (0, *(m.start() for m in _CAPITAL.finditer(word)))]
+    ends = [spelled(w) for end in (*both, *single) for w in (end, end[:1].lower() + end[1:], end.lower())]
+    units = [u for end in ends if not end.isdigit() and end != "in" for u in (end, ALSO.get(end, end))]
+    return next((u for u in units if any(alike(u, other) for other in fitting)), None)
 
 
 def known(unit: str | None) -> bool:

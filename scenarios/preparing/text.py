@@ -109,8 +109,12 @@ def _signals(made: Draft) -> Iterator[str]:
         table = ", ".join([f"column = {_text(s.channel.name)}", *units])
         yield f"{_key(s.variable.name)} = {{{table}}}  # {_why(s)}" + (f"; unit is {guess}" if guess else "")
     for name, s in made.rates.items():
-        unit = f", unit = {_text(differentiated(s.unit, 1))}" if s.unit else ""
-        yield f"{_key(name)} = {{column = {_text(name)}{unit}}}  # the rate of {s.variable.name}, by its name"
+        unit = _text(differentiated(s.unit, 1)) if s.unit else ""
+        table = f"column = {_text(name)}" + (f", unit = {unit}" if unit else "")
+        if s.unit and not made.description.variables[name].unit:
+            own = s.variable.unit or s.model_unit or s.unit
+            table += f", model_unit = {_text(differentiated(own, 1))}"
+        yield f"{_key(name)} = {{{table}}}  # the rate of {s.variable.name}, by its name"
     for v in made.free_inputs:
         yield f"{_key(v.name)} = {v.start or 0.0!r}  # no column looks like it: constant at its start value"
     for name, s in made.rates.items():

@@ -253,6 +253,12 @@ UNITS_IN_NAMES = [
     ("p/mbar", "Pa", "mbar"),
     ("rpm", "rad/s", "rpm"),
     ("temp_degC", "K", "degC"),
+    ("v_km_h", "m/s", "km/h"),
+    ("gyro_z_deg_s", "rad/s", "deg/s"),
+    ("torque N.m", "N.m", "N.m"),
+    ("acc_x_m_s2", "m/s2", "m/s2"),
+    ("acc_x_g", "m/s2", "g_0"),
+    ("m_g", "kg", "g"),
     ("v_s", "m/s", None),  # of another kind
     ("phi_1", "rad", None),
     ("x_in", "m", None),  # what goes in
@@ -336,10 +342,12 @@ def test_a_port_has_the_motion_of_what_it_is_said_to_push(tmp_path):
     assert (port.velocity, port.displacement) == ("y_m_dot", "y_m")
 
 
-def test_the_rate_of_an_input_is_derived_from_its_column(tmp_path):
+@pytest.mark.parametrize("stated", [True, False])
+def test_the_rate_of_an_input_is_derived_from_its_column(tmp_path, stated):
+    """Also for an FMU that states no units, whose own ones are guessed as those of SI."""
     track = fmu(
-        variable("u_fl", "input", "m"),
-        *(variable(f"u_{c}_dot", "input", "m/s") for c in ("fl", "fr")),
+        variable("u_fl", "input", "m" if stated else None),
+        *(variable(f"u_{c}_dot", "input", "m/s" if stated else None) for c in ("fl", "fr")),
         variable("omega", unit="rad/s"),
     )
     made = drafted(tmp_path, track, text_of_units="s,mm,rpm,mA", names="time,u fl,speed,i")

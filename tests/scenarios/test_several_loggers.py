@@ -91,6 +91,20 @@ def test_dates_need_no_search(drive, truth, tmp_path):
     assert np.abs(run.u[30:-30, 0] - np.interp(run.t[30:-30] + LATER, truth[0], truth[1])).max() < 3
 
 
+def test_dates_count_where_inputs_lie_in_several_files(drive, truth, tmp_path):
+    files = logged(tmp_path, truth, dates=True)
+    noon, t = pd.Timestamp("2026-03-01 12:00"), np.arange(1.0, 39, 1 / 150)
+    other = tmp_path / "other.csv"
+    pd.DataFrame({"time": noon + pd.to_timedelta(t, unit="s"), "F_ext": np.cos(t)}).to_csv(other, index=False)
+    made = init(drive, [*files, other], tmp_path)
+    e = load_experiment(made.file)
+    assert {c.file for c in e.input_columns.values()} == {"force", "other"}
+    assert made.file.read_text().count("offset = 0.0  # s, by the dates of both files") == 2
+    [run] = load_record(e, describe(drive)).runs
+    assert np.abs(run.u[30:-30, 0] - np.interp(run.t[30:-30] + LATER, truth[0], truth[1])).max() < 3
+    assert np.abs(run.u[30:-30, 1] - np.cos(run.t[30:-30] + LATER)).max() < 1e-3
+
+
 def test_a_shift_that_the_fmu_may_cause_is_no_other_clock(drive, truth, tmp_path):
     files = logged(tmp_path, truth)
     table = pd.read_csv(files[1])
