@@ -6,13 +6,14 @@ No step depends on the solver's past, so that a simulation can go on from any st
 """
 
 from collections.abc import Callable
+from ctypes import byref, c_void_p
 from math import inf
 from typing import Any, ClassVar
 
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
-from fmpy.sundials import CVodeSolver
+from fmpy.sundials import CVodeSolver, cvode
 
 from fmus.host.fmi2 import Fmi2Instance
 from fmus.host.fmi3 import Fmi3Instance
@@ -23,6 +24,11 @@ from fmus.host.watch import PAGE
 TOLERANCE = 1e-9  # of a state and of its nominal value, of the integration
 MOST_EVENTS = 10_000  # within a step, or updates at one event
 MOST_STEPS = 100_000  # of the solver within a step
+ONE_STEP = 2  # CVODE's CV_ONE_STEP
+ROOT = 2  # what CVODE returns where an event indicator has changed its sign
+
+_stop_at: Any = cvode.sundials_cvode.CVodeSetStopTime
+_stop_at.argtypes = [c_void_p, cvode.sunrealtype]
 
 
 class Exchanged(Instance):
@@ -65,8 +71,8 @@ class Exchanged(Instance):
         if not dt > 0:
             raise CallFailed(f"a step of {dt:g} s is not positive")
         self._call(self._slave.enterContinuousTimeMode)
-        solver = self._begun(t)
-        for _ in range(MOST_EVENTS):
+        solver, events, steps = self._begun(t), 0, 0
+        while events < MOST_EVENTS and steps < MOST_STEPS:
             upto = min(end, self._next)
             roots = False
             if upto - now > least:
@@ -78,7 +84,9 @@ class Exchanged(Instance):
                 self._call(self._slave.enterEventMode)
                 return now
             due = now >= self._next - least
+            steps += 1
             if roots or at_step or due:
+                events += 1
                 self._call(self._slave.enterEventMode)
                 if self._update():
                     return now
@@ -86,18 +94,20 @@ class Exchanged(Instance):
                 solver.reset(now)
             if now >= end - least:
                 return None
+        if events < MOST_EVENTS:
+            raise CallFailed(f"more than {MOST_STEPS} steps of the solver in the step from t = {t:g} s")
         raise CallFailed(f"more than {MOST_EVENTS} events in the step from t = {t:g} s; its events chatter")
 
     def _advanced(self, solver: "_Solver", now: float, upto: float) -> tuple[bool, float]:
-        """Whether a state event came before `upto`, and the time reached, s."""
+        """One step of the solver: whether a state event came, and the time reached, at most `upto`, s."""
         PAGE.calling(self.who, "a step by model exchange", now)
         try:
-            roots, _, reached = solver.step(now, upto)
+            roots, reached = solver.step(now, upto)
         except Exception as error:  # FMPy raises no class of its own for the solver's failures
             why = solver.trouble or error
             raise CallFailed(self._reason(f"the integration from t = {now:g} s failed ({why})")) from error
         self._call(self._slave.setTime, reached)
-        return bool(roots), float(reached)
+        return roots, reached
 
     def _begun(self, t: float) -> "_Solver":
         """The solver, without a past, at the FMU's states and t, s."""
@@ -147,7 +157,7 @@ class _Held:
 
 
 class _Solver(CVodeSolver):  # type: ignore[misc]  # FMPy comes without types
-    """FMPy's CVODE, in which a refusal of the FMU becomes one of the step.
+    """FMPy's CVODE, step by step, in which a refusal of the FMU becomes one of the step.
 
     trouble: the last refusal.
     """
@@ -168,6 +178,20 @@ class _Solver(CVodeSolver):  # type: ignore[misc]  # FMPy comes without types
             relativeTolerance=TOLERANCE,
             maxNumSteps=MOST_STEPS,
         )
+
+    def step(self, t: float, tNext: float) -> tuple[bool, float]:  # FMPy's names
+        """One step from t s on to tNext at most: whether an event indicator changed, and the time reached, s.
+
+        The FMU has the states reached: it is told of each step that is complete, as FMI asks for.
+        """
+        reached = cvode.sunrealtype(t)
+        _stop_at(self.cvode_mem, tNext)
+        status = cvode.CVode(self.cvode_mem, tNext, self.x, byref(reached), ONE_STEP)
+        if status < 0:
+            raise RuntimeError("{0}: {3}".format(*self.error_info))
+        if not self.discrete:
+            self.set_x(self.px, self.nx)
+        return status == ROOT, reached.value
 
     def f(self, t: float, y: Any, ydot: Any, data: Any) -> int:
         """The derivatives, or that the solver shall try a shorter step, or give up."""

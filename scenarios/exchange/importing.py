@@ -17,6 +17,7 @@ from fmus.export.ssp import (
     read_package,
 )
 from fmus.export.ssp.system import RESOURCES
+from fmus.export.ssp.writing import known_unit
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription
 from fmus.host.master.recording import TIME
@@ -30,9 +31,11 @@ from scenarios.simulating.reading import load_scenario
 
 Tell = Callable[[str], None]
 Descriptions = Mapping[str, FmuDescription]
+Ends = Mapping[tuple[str, str], str | None]  # units by component and connector
 STEP = 1e-3  # s, if neither the package nor its FMUs declare a step
 SECONDS = 1.0  # simulated if the package states no end
 FILE = "scenario.toml"
+SAME = (1.0, 0.0)  # gain and offset
 KEPT = ("id", "question", "order", "extrapolation", "seed", "record", "sensors", "events", "expect", "figure")
 
 
@@ -85,7 +88,8 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
     late = [_place(link, names) for link in late_links(links, fmus)] if not ours else []
     for place in late:
         tell(f"connection to {place} is one step late, as FMUs in its loop state no dependencies")
-    table["connections"] = [_wire(link, fmus, names, ours.get("delayed", late)) for link in links]
+    delayed, stated = ours.get("delayed", late), _stated(members)
+    table["connections"] = [_wire(link, fmus, names, delayed, stated) for link in links]
     for link in system.links:
         if link.source[0] in sources:
             data = {"data": sources[link.source[0]], "time": TIME, "column": link.source[1]}
@@ -172,7 +176,14 @@ def _place(link: Link, names: Mapping[str, str]) -> str:
     return f"{names[link.target[0]]}.{link.target[1]}"
 
 
-def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: list[str]) -> dict[str, Any]:
+def _stated(components: list[Component]) -> Ends:
+    """The units that connectors state, as far as they are known, by component and name."""
+    return {(c.name, end.name): end.unit for c in components for end in c.connectors if known_unit(end.unit)}
+
+
+def _wire(
+    link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: list[str], stated: Ends
+) -> dict[str, Any]:
     """A connection as a scenario declares it, in which units are converted before gain and offset."""
     source, output = link.source
     to = _place(link, names)
@@ -181,8 +192,8 @@ def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: lis
         fmus[name].variables[v].unit if v in fmus[name].variables else None
         for name, v in (link.source, link.target)
     ]
-    gain, offset = link.gain, link.offset
-    if link.plain and units[0] != units[1] and None not in units:
+    gain, offset, plain = _line(link, units, stated, f"connection to {to}")
+    if plain and units[0] != units[1] and None not in units:
         wire["gain_unit"] = f"({units[1]})/({units[0]})"
         factor, shift = conversion(
             f"({units[0]})*{wire['gain_unit']}", units[1] or "1", f"connection to {to}"
@@ -191,6 +202,28 @@ def _wire(link: Link, fmus: Descriptions, names: Mapping[str, str], delayed: lis
     if (gain, offset) != (1.0, 0.0):
         wire |= {"gain": gain, "offset": offset}
     return wire | ({"delayed": True} if to in delayed else {})
+
+
+def _line(link: Link, units: list[str | None], stated: Ends, where: str) -> tuple[float, float, bool]:
+    """Gain, offset and whether no unit is converted before, between FMUs with variables in these units.
+
+    Connectors may state other units: numbers are converted to and from them at each end.
+    """
+    a, b = units
+    begin, end = stated.get(link.source) or a, stated.get(link.target) or b
+    if (begin, end) == (a, b):
+        return link.gain, link.offset, link.plain
+    across = SAME if link.plain else _converted(begin, end, where)
+    gain, offset = SAME
+    for factor, shift in (
+        _converted(a, begin, where), across, (link.gain, link.offset), _converted(end, b, where)
+    ):  # fmt: skip
+        gain, offset = factor * gain, factor * offset + shift
+    return gain, offset, True
+
+
+def _converted(unit: str | None, other: str | None, where: str) -> tuple[float, float]:
+    return conversion(unit, other, where) if unit and other else SAME
 
 
 def _finite(name: str, fmu: FmuDescription) -> dict[str, Any]:

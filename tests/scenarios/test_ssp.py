@@ -445,6 +445,32 @@ def test_parameters_go_where_a_mapping_says(loop, tmp_path, inline):
     assert not any("omega_w'" in line for line in left_out)
 
 
+@pytest.mark.parametrize(
+    ("name", "unit", "line"),
+    [("T_P", "kN.m", (500.0, 3000.0)), ("T", "kN.m", (0.0005, 3.0)), ("T", "N.m", (0.5, 3.0))],
+)
+def test_units_of_connectors_count_between_those_of_the_fmus(loop, tmp_path, name, unit, line):
+    """T_P = 0.5 T + 3 without conversion, in the numbers at the connectors."""
+    pattern = rf'(<ssd:Connector name="{name}" kind="\w+">\s*<ssc:Real unit=)"[^"]*"'
+    other = edited(loop, tmp_path / "other.ssp", pattern, rf'\1"{unit}"')
+    table = tomllib.loads(import_ssp(other, tmp_path / "back").read_text(encoding="utf-8"))
+    [wire] = [w for w in table["connections"] if w["to"] == "rig.T_P"]
+    assert (wire["gain"], wire["offset"]) == pytest.approx(line)
+
+
+@pytest.mark.parametrize("suppressed", [True, False])
+def test_a_connector_converts_where_fmus_have_the_same_unit(loop, tmp_path, suppressed):
+    """From rad/s through a connector in rpm into rad/s."""
+    pattern = r'(<ssd:Connector name="omega" kind="input">\s*<ssc:Real unit=)"[^"]*"'
+    other = edited(loop, tmp_path / "other.ssp", pattern, r'\1"rpm"')
+    if not suppressed:
+        words = r'(startConnector="omega_w"[^>]*) suppressUnitConversion="true"'
+        other = edited(other, tmp_path / "more.ssp", words, r"\1")
+    table = tomllib.loads(import_ssp(other, tmp_path / "back").read_text(encoding="utf-8"))
+    [wire] = [w for w in table["connections"] if w["to"] == "controller.omega"]
+    assert wire.get("gain", 1.0) == pytest.approx(2 * np.pi / 60 if suppressed else 1.0)
+
+
 def test_what_hangs_on_the_system_s_own_connectors_is_left_out_and_told(loop, tmp_path):
     outer = '<ssd:Connectors><ssd:Connector name="speed" kind="output"/></ssd:Connectors><ssd:Elements>'
     other = edited(loop, tmp_path / "other.ssp", "<ssd:Elements>", outer)
