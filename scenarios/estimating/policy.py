@@ -15,6 +15,12 @@ class EstimatePolicy(Limits):
         "fewest samples of a record, and fewest measurements from which an output's noise is found",
         "derivation: a standard deviation from ten samples is known to within a quarter",
     )
+    faster: float = limit(
+        0.01,
+        "of the record's rate",
+        "how much more than that a rate may be asked for and still means every sample",
+        "convention: as the jitter of a record of which no note is made",
+    )
     told_apart: float = limit(
         0.1,
         "standard deviations of the noise",

@@ -37,7 +37,6 @@ from scenarios.experiment.estimated import Alarm, Options
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.sampling import step_of
 
-UNEVEN = 0.01  # share by which a rate may exceed that of the record, whose times may jitter
 BAND = 1.959964  # half width of the 95 % band in standard deviations
 Bands = Mapping[str, Mapping[str, tuple[float, float]]]
 
@@ -167,7 +166,7 @@ def _every(e: Experiment, options: Options, step: float) -> int:
     if not e.estimate:
         return 1
     recorded, rate = 1 / step, e.estimate.rate
-    if rate and rate > recorded * (1 + UNEVEN):
+    if rate and rate > recorded * (1 + POLICY.faster):
         raise BadInput(
             f"{e.file}: [estimate] rate = {rate:g} Hz is above the {recorded:.6g} Hz of the record; "
             "leave it out to use every sample"
