@@ -157,6 +157,8 @@ def _source(
     t = stated.seconds(time[0], f"{e.file}: {named}", time[1])
     columns = {prefix + c: t if c == time[0] else sheet.numbers(c) for c in wanted}
     check_time(str(sheet.file), time[0], t, np.arange(t.size) + sheet.first, sheet.row)
+    if t.size < FEWEST:
+        raise BadInput(f"{sheet.file}: has only {t.size} {sheet.row} of numbers; a record needs more")
     return _Source(name, sheet.file, t, columns, stated)
 
 

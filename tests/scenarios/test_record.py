@@ -305,6 +305,16 @@ def write_exactly(folder, times):
     return file
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_record_of_one_row_is_refused_as_that(tmp_path):
+    file = write(tmp_path, WHOLE)
+    lines = (tmp_path / "data.csv").read_text().splitlines()[:2]
+    (tmp_path / "data.csv").write_text("\n".join(lines))
+    with pytest.raises(BadInput) as refused:
+        read(file)
+    assert_one_clear_line(refused, tmp_path / "data.csv", "has only 1 line of numbers; a record needs more")
+
+
 EPOCHS = {
     "ms": lambda t: 1.7e12 + 1e3 * t,
     "us": lambda t: 1.7e15 + 1e6 * t,

@@ -122,7 +122,7 @@ class StatedUnits:
             self.check(column, 0, unit, where)
             factor, offset = conversion(unit, "s", where)
         numbers = self._sheet.numbers(column)
-        if unit is None and (factor, offset) == SAME:
+        if unit is None and (factor, offset) == SAME and numbers.size > 1:
             self._note_epoch(column, numbers)
         return numbers * factor + offset
 
