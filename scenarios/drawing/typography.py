@@ -43,6 +43,18 @@ def with_error(value: float, error: float) -> str:
     return text if scale == 1.0 else f"({text}){HELD}×{HELD}{_power(exponent)}"
 
 
+def interval(low: float, high: float) -> str:
+    """An interval, whose ends are told to a tenth of its width's leading digit: 0.9970 to 1.0030.
+
+    A smaller end keeps its first digit, so that its sign is not lost.
+    """
+    if not (math.isfinite(high - low) and high > low):
+        return f"{number(low, 2)} to {number(high, 2)}"
+    place = math.floor(math.log10(high - low)) - 1
+    digits = {end: math.floor(math.log10(abs(end))) - place + 1 if end else 2 for end in (low, high)}
+    return " to ".join(number(end, max(1, n)) for end, n in digits.items())
+
+
 def percent(share: float) -> str:
     """A share in percent with one decimal; a share that rounds to 1 is 100 %."""
     return f"100{HELD}%" if share >= 0.9995 else f"{_fixed(round(100 * share, 1) + 0.0, 1)}{HELD}%"

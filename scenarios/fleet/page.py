@@ -5,7 +5,7 @@ from typing import Any
 
 from scenarios.closing.page.glossary import effect_words
 from scenarios.drawing.pages import rendered
-from scenarios.drawing.typography import NOTHING, number, quantity, short, unit, with_error
+from scenarios.drawing.typography import NOTHING, interval, number, quantity, short, unit, with_error
 from scenarios.fleet.figures import course_plots, level_plots, map_plot
 from scenarios.fleet.fleet import Assembled
 from scenarios.fleet.result import quantity_words
@@ -48,7 +48,7 @@ def _drift(d: Row, mileage_unit: str) -> Row:
         "vehicle": _placed(d),
         "quantity": f"{quantity_words(d)}, {at}",
         "course": f"{with_error(*size)} {of}",
-        "interval": f"{number(d[f'{ends}_low_95'], 2)} to {number(d[f'{ends}_high_95'], 2)}",
+        "interval": interval(d[f"{ends}_low_95"], d[f"{ends}_high_95"]),
         "q": f"{d['q_value']:.1g}",
     }
 
