@@ -73,10 +73,12 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
         figure, axes = sheet(ROW * len(some) + 0.5, layout, width_ratios=[2.4, 1])
         for name in some:
             j = found.setup.outputs.index(name)
-            e = h.innovation[:, j]
+            e, gated = accepted[:, j], h.gated[:, j]
             ax, memory = axes[name], axes[f"{name} memory"]
             seen = np.isfinite(e)
             ax.plot(*envelope(h.t[seen], e[seen]), color=AFTER, linewidth=0.5)
+            edge = np.where(h.innovation[gated, j] > 0, 0.97, 0.03)
+            ax.plot(h.t[gated], edge, ".", color=LAW, markersize=3, transform=ax.get_xaxis_transform())
             for level in (-BAND, BAND):
                 ax.axhline(level, color=LAW, linewidth=0.8, linestyle="--")
             ax.set_xlim(float(h.t[0]), float(h.t[-1]))
@@ -91,13 +93,13 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
             name_axes(memory, "", "correlation")
         name_axes(axes[some[-1]], "time in s", axes[some[-1]].get_ylabel())
         name_axes(axes[f"{some[-1]} memory"], "lag in samples", "correlation")
-        yield Plot(
-            f"innovations{ending}",
-            figure,
+        caption = (
             "Innovations divided by their expected standard deviation, each with its autocorrelation. If "
             "model and noise are right, 95 % of the innovations lie between the dashed lines and all "
-            "correlations lie within the grey band.",
+            "correlations lie within the grey band."
         )
+        out = " Dots at the edges: measurements that the gate left out." if h.gated.any() else ""
+        yield Plot(f"innovations{ending}", figure, caption + out)
 
 
 def correlation_plots(found: Findings) -> Iterator[Plot]:
