@@ -87,7 +87,8 @@ class EstimateResult(Shown):
         for name, found in self.estimated.items():
             if found["kind"] == "noise":
                 continue
-            spread, unit = found["std_error"], found["unit"] or ""
+            spread = found["std_error"]
+            unit = found["unit"] if found["unit"] not in (None, "1") else ""
             bound = f" (at its {found['at_bound']} bound)" if "at_bound" in found else ""
             yield f"{name} = {found['value']:.5g} ± {spread:.2g} {unit}".rstrip() + bound
         if self.doubt:
