@@ -158,8 +158,10 @@ def _no_description(file: Path) -> str:
     """Why a file is no model description of a version that is read; empty if it is one."""
     try:
         root = ElementTree.parse(file).getroot()
-    except (ElementTree.ParseError, ValueError, LookupError) as broken:  # also of an unknown encoding
+    except ElementTree.ParseError as broken:
         return f"is no XML ({broken})"
+    except (ValueError, LookupError):  # an encoding that this parser does not know; that of FMPy may
+        return ""
     if root.tag != "fmiModelDescription":
         return f"is none: it holds <{root.tag[:40]}>"
     if not (version := root.get("fmiVersion")):

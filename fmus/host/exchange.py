@@ -86,7 +86,7 @@ class Exchanged(Instance):
             due = now >= self._next - least
             steps += 1
             if roots or at_step or due:
-                events += 1
+                events += roots or due
                 self._call(self._slave.enterEventMode)
                 if self._update():
                     return now

@@ -98,7 +98,8 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
             "model and noise are right, 95 % of the innovations lie between the dashed lines and all "
             "correlations lie within the grey band."
         )
-        out = " Dots at the edges: measurements that the gate left out." if h.gated.any() else ""
+        left_out = h.gated[:, [found.setup.outputs.index(name) for name in some]].any()
+        out = " Dots at the edges: measurements that the gate left out." if left_out else ""
         yield Plot(f"innovations{ending}", figure, caption + out)
 
 

@@ -155,12 +155,16 @@ def _member(
     led: inputs to which a connection leads, which is what counts from the start of a simulation on.
     """
     member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
+    stated = _stated([c])
     for variable, given in c.start.items():
         known = fmu.variables.get(variable)
         if known is None:
             tell(f"parameter '{variable}' of component '{c.name}' is not in its FMU and is left out")
             continue
-        value = given.within(known.unit, f"parameter '{variable}' of '{c.name}'")
+        where = f"parameter '{variable}' of '{c.name}'"
+        own = _at_connector(known.unit, stated.get((c.name, variable)))
+        factor, shift = _converted(own, known.unit, where)
+        value = factor * given.within(own, where) + shift
         if known.causality == "input" and f"{name}.{variable}" in led:
             tell(f"the value of input '{variable}' of '{c.name}' is left out, since a connection leads to it")
         elif known.causality == "input":
@@ -210,7 +214,7 @@ def _line(link: Link, units: list[str | None], stated: Ends, where: str) -> tupl
     Connectors may state other units: numbers are converted to and from them at each end.
     """
     a, b = units
-    begin, end = stated.get(link.source) or a, stated.get(link.target) or b
+    begin, end = _at_connector(a, stated.get(link.source)), _at_connector(b, stated.get(link.target))
     if (begin, end) == (a, b):
         return link.gain, link.offset, link.plain
     across = SAME if link.plain else _converted(begin, end, where)
@@ -220,6 +224,11 @@ def _line(link: Link, units: list[str | None], stated: Ends, where: str) -> tupl
     ):  # fmt: skip
         gain, offset = factor * gain, factor * offset + shift
     return gain, offset, True
+
+
+def _at_connector(of_fmu: str | None, stated: str | None) -> str | None:
+    """The unit of the numbers at a connector; that of an FMU which nobody knows cannot be converted."""
+    return stated if stated and (of_fmu is None or known_unit(of_fmu)) else of_fmu
 
 
 def _converted(unit: str | None, other: str | None, where: str) -> tuple[float, float]:

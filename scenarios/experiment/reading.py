@@ -130,10 +130,14 @@ def _other(e: Experiment, name: str, record: Path, wanted: dict[str, str], first
     sheet = read_with_advice(file, declared.time, {**wanted, declared.time: ""}, options, f"[files.{name}]")
     where = f"[files.{name}] time"
     found = _source(e, name, sheet, wanted, where, (declared.time, declared.time_unit))
+    dates = [(s.stated.begin(c), s.stated.started(c)) for s, c in ((found, declared.time), (first, e.time))]
     try:
-        apart = dates_apart(found.stated.begin(declared.time), first.stated.begin(e.time))
+        apart = dates_apart(*(started if declared.file is None else begin for begin, started in dates))
     except BadInput as error:
         raise BadInput(f"{e.file}: {where}: {error}") from error
+    if apart and dates[0][0] is None:
+        said = f"{file.name}: '{declared.time}' begins {apart:g} s after '{e.time}' by their start times"
+        found.stated.notes.append(Note("file", declared.time, said))
     return replace(found, t=found.t + apart + declared.offset)
 
 
@@ -158,7 +162,7 @@ def _source(
     columns = {prefix + c: t if c == time[0] else sheet.numbers(c) for c in wanted}
     check_time(str(sheet.file), time[0], t, np.arange(t.size) + sheet.first, sheet.row)
     if t.size < FEWEST:
-        raise BadInput(f"{sheet.file}: has only {t.size} {sheet.row} of numbers; a record needs more")
+        raise BadInput(f"{sheet.file}: has {t.size or 'no'} {sheet.row} of numbers; a record needs more")
     return _Source(name, sheet.file, t, columns, stated)
 
 

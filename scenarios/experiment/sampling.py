@@ -42,13 +42,13 @@ def at_times(times: Array, t: Array, x: Array) -> Array:
     outputs pass through the same filter, which leaves a linear relation between them as it is (L. Ljung,
     System Identification, 2nd ed., 1999, sections 13.7 and 14.4). Between samples, the channel is taken as
     limited to its band, for the same reason. A time has no number if it is outside the channel, in a gap of
-    it, across which nothing is filtered, or beside a lost sample.
+    it, or beside a lost sample. Nothing is filtered across a gap that is longer than half the filter.
     """
     there = np.isfinite(x)
     if there.sum() < 2:
         return np.full(times.size, np.nan)
     known, values, step = t[there], x[there], step_of(times)
-    gaps = np.flatnonzero(np.diff(known) > GAP * step_of(known)) + 1
+    gaps = np.flatnonzero(np.diff(known) > max(GAP * step_of(known), LOBES * step)) + 1
     found = np.full(times.size, np.nan)
     for begin, end in zip([0, *gaps], [*gaps, known.size], strict=True):
         rows = slice(np.searchsorted(times, known[begin]), np.searchsorted(times, known[end - 1], "right"))

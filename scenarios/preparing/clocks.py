@@ -13,7 +13,6 @@ from fmus.host.apart.isolation import FmuEnded, Isolation
 from fmus.host.description import FmuVariable
 from fmus.host.fmu import Fmu, FmuError
 from fmus.units import column_conversion
-from scenarios.experiment.readers.units import dates_apart
 from scenarios.experiment.sampling import at_times, step_of
 from scenarios.preparing.draft import Clock, Draft, Signal
 from scenarios.preparing.quantities import alike, known, quantities_of, words_of
@@ -51,8 +50,8 @@ ONE = Lag(0.0, 1.0, 0.0)  # nothing was sought
 def with_clocks(made: Draft, isolation: Isolation | None) -> Draft:
     """The draft with the clocks of its files, as far as they can be found; isolation: of a foreign FMU.
 
-    Files with dates are put together by these, channels of one file have one clock without them, and others
-    are put together by a channel that both have measured. Without one, the FMU is simulated with the inputs
+    Channels of one file have one clock, files with dates are put together by these, and others by a channel
+    that both have measured. Without one, the FMU is simulated with the inputs
     of their file, if all lie in one, and the outputs of the other files are sought in it: what the FMU does
     not know may then shift a clock by a few samples.
     """
@@ -100,7 +99,7 @@ def _found(made: Draft, driven: Driven | None) -> Draft:
     for r in made.others:
         if r in lags:
             lag, how = min((lags[r], lags[made.raster]), key=lambda found: (found[0].likeness, not found[1]))
-            offset = round(float(lags[r][0].seconds - own - dates_apart(r.begin, made.raster.begin)), places)
+            offset = round(float(lags[r][0].seconds - own - r.after(made.raster)), places)
             if how == FOLLOWED and abs(offset) < NEAR * made.raster.step:
                 offset, how = 0.0, f"{how} as well as with {offset!r}, so that the clocks are taken as one"
             said = f" (correlation {lag.likeness:.3f}, {max(lag.other, 0.0):.2f} at any other)"
@@ -113,9 +112,11 @@ def _found(made: Draft, driven: Driven | None) -> Draft:
 
 def _known(one: Raster, other: Raster) -> tuple[Lag, str] | None:
     """The lag of a raster by its file or its dates; None if they do not tell."""
-    if one.begin is not None and other.begin is not None:
-        return replace(ONE, seconds=dates_apart(other.begin, one.begin)), "by the dates of both files"
-    return (ONE, "the same file, so that it is the same clock") if one.file == other.file else None
+    if one.file == other.file:
+        return replace(ONE, seconds=other.after(one)), "the same file, so that it is the same clock"
+    if one.begin is None or other.begin is None:
+        return None
+    return replace(ONE, seconds=other.after(one)), "by the dates of both files"
 
 
 def _followed(made: Draft, simulated: Mapping[str, Array], first: Raster, other: Raster) -> tuple[Lag, str]:

@@ -89,7 +89,7 @@ def unit_in_name(name: str, fitting: Sequence[str]) -> str | None:
     and no inches.
     """
     words = [word for word in _SEPARATED.split(_BRACKET.sub(" ", name)) if word]
-    both = [sign.join(words[-2:]) for sign in "/." if len(words) > 2]
+    both = [sign.join(words[-2:]) for sign in "/." if len(words) > 2 and words[-2] != "in"]
     single = [word[i:] for word in words[-1:] for i in (0, *(m.start() for m in _CAPITAL.finditer(word)))]
     ends = [spelled(w) for end in (*both, *single) for w in (end, end[:1].lower() + end[1:], end.lower())]
     units = [u for end in ends if not end.isdigit() and end != "in" for u in (end, ALSO.get(end, end))]

@@ -17,7 +17,7 @@ from scenarios.experiment.advice import check_colons, read_with_advice
 from scenarios.experiment.checks import GAP, check_time, output_notes, time_notes
 from scenarios.experiment.readers.header import is_unit, is_value, spelled
 from scenarios.experiment.readers.sheet import Sheet
-from scenarios.experiment.readers.units import StatedUnits
+from scenarios.experiment.readers.units import StatedUnits, dates_apart
 from scenarios.preparing.lines_above import lines_above
 from scenarios.preparing.lines_below import lines_below
 from scenarios.preparing.quantities import alike, unit_in_name
@@ -55,6 +55,8 @@ class Channel:
 class Raster:
     """Channels of a file that share their times t (N,), s; begin: the date of 0 s, if the times are dates.
 
+    started: the date of 0 s by the clock of the file, as of a waveform, if it tells one.
+
     time_unit: of the time column, if its name tells it and the file states none; time_guessed: whether no
     column is called the time, so that this one was taken because it increases; options: of the reader, with
     which the file was read; left_out: a sentence for each column that holds no numbers.
@@ -66,10 +68,17 @@ class Raster:
     channels: tuple[Channel, ...]
     remarks: tuple[str, ...]
     begin: pd.Timestamp | None = None
+    started: pd.Timestamp | None = None
     time_unit: str | None = None
     time_guessed: bool = False
     options: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+
+    def after(self, other: "Raster") -> float:
+        """How much later its 0 s is than that of another one by their dates, s; 0 if they do not tell."""
+        if self.file == other.file:
+            return dates_apart(self.started, other.started)
+        return dates_apart(self.begin, other.begin)
 
     @property
     def step(self) -> float:
@@ -198,7 +207,7 @@ def _seconds(stated: StatedUnits, sheet: Sheet, column: str) -> tuple[Array, str
     t = stated.seconds(column, f"{sheet.file}: time", unit)
     check_time(str(sheet.file), column, t, np.arange(t.size) + sheet.first, sheet.row)
     if t.size < 2:
-        raise BadInput(f"{sheet.file}: has only {t.size} row; a record needs more")
+        raise BadInput(f"{sheet.file}: has {t.size or 'no'} row of numbers; a record needs more")
     return t, unit
 
 
@@ -214,8 +223,8 @@ def _raster(sheet: Sheet, time: str, options: Mapping[str, Any], guessed: bool =
     notes += lines_left_out(options)
     channels = tuple(c for c in found if isinstance(c, Channel))
     left_out = tuple(c for c in found if isinstance(c, str) and c)
-    begin = stated.begin(time)
-    return Raster(sheet.file, time, t, channels, tuple(notes), begin, unit, guessed, dict(options), left_out)
+    dates = stated.begin(time), stated.started(time)
+    return Raster(sheet.file, time, t, channels, tuple(notes), *dates, unit, guessed, dict(options), left_out)
 
 
 def _channel(sheet: Sheet, name: str) -> Channel | str:

@@ -116,8 +116,8 @@ def test_no_description(drive, tmp_path):
     [
         (b"", "is no XML"),
         (b"<a>", "is no XML"),
-        (b'<?xml version="1.0" encoding="Shift_JIS"?><a/>', "is no XML"),
-        (b'<?xml version="1.0" encoding="nobodys"?><a/>', "is no XML"),
+        (b'<?xml version="1.0" encoding="Shift_JIS"?><a/>', "cannot be read"),
+        (b'<?xml version="1.0" encoding="nobodys"?><a/>', "cannot be read"),
         (b'<?xml version="1.0"?><!-- -->', "is no XML"),
         (b"<fmiModelDescription/>", "states no version of FMI"),
         (b'<fmiModelDescription fmiVersion="1.0"/>', "is FMI 1.0"),
@@ -130,6 +130,19 @@ def test_an_unreadable_description(drive, tmp_path, text, why):
     with pytest.raises(BadInput, match=rf"x\.fmu: its modelDescription.xml {why}") as refused:
         describe(path)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("encoding", ["Shift_JIS", "GBK", "ISO-8859-1"])
+def test_a_description_in_another_encoding_is_read(drive, tmp_path, encoding):
+    def encoded(name, data):
+        if name != "modelDescription.xml":
+            return name, data
+        return name, re.sub(
+            r"<\?xml.*?\?>", f'<?xml version="1.0" encoding="{encoding}"?>', data.decode()
+        ).encode(encoding)
+
+    path = repacked(drive, tmp_path / "x.fmu", encoded)
+    assert [*describe(path).variables] == [*describe(drive).variables]
 
 
 def test_binaries_for_another_platform(drive, tmp_path):

@@ -259,6 +259,7 @@ UNITS_IN_NAMES = [
     ("acc_x_m_s2", "m/s2", "m/s2"),
     ("acc_x_g", "m/s2", "g_0"),
     ("m_g", "kg", "g"),
+    ("x_in_mm", "1", None),
     ("v_s", "m/s", None),  # of another kind
     ("phi_1", "rad", None),
     ("x_in", "m", None),  # what goes in

@@ -471,6 +471,17 @@ def test_a_connector_converts_where_fmus_have_the_same_unit(loop, tmp_path, supp
     assert wire.get("gain", 1.0) == pytest.approx(2 * np.pi / 60 if suppressed else 1.0)
 
 
+@pytest.mark.parametrize("unit", ["rpm", "rad/s"])
+def test_a_value_without_a_unit_is_in_that_of_its_connector(loop, tmp_path, unit):
+    value = r'(<ssv:Parameter name="omega_w">\s*<ssv:Real value=)"12.16" unit="rad/s"'
+    other = edited(loop, tmp_path / "other.ssp", value, r'\1"60"', "resources/rig.ssv")
+    more = f'<ssd:Connector name="omega_w" kind="output"><ssc:Real unit="{unit}"/></ssd:Connector>'
+    text = r'<ssd:Connector name="omega_w" kind="output">\s*<ssc:Real unit="rad/s" />\s*</ssd:Connector>'
+    other = edited(other, tmp_path / "named.ssp", text, more)
+    table = tomllib.loads(import_ssp(other, tmp_path / "back").read_text(encoding="utf-8"))
+    assert table["fmus"]["rig"]["initial"]["omega_w"] == pytest.approx(2 * np.pi if unit == "rpm" else 60)
+
+
 def test_what_hangs_on_the_system_s_own_connectors_is_left_out_and_told(loop, tmp_path):
     outer = '<ssd:Connectors><ssd:Connector name="speed" kind="output"/></ssd:Connectors><ssd:Elements>'
     other = edited(loop, tmp_path / "other.ssp", "<ssd:Elements>", outer)

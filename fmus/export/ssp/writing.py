@@ -150,7 +150,11 @@ def _values(component: Component) -> Element:
     """Values of a component before the start; libraries look for the name 'initialValues'."""
     root = element(None, "ssv:ParameterSet", version="1.0", name="initialValues")
     parameters = element(root, "ssv:Parameters")
-    for name, (value, unit, *_) in component.start.items():
+    for name, (value, unit, *line) in component.start.items():
+        if line and tuple(line) != (1.0, 0.0):
+            raise BadInput(
+                f"the value of '{name}' of '{component.name}' has a gain or an offset; apply it first"
+            )
         kind = component.types.get(name, REAL)
         parameter = element(parameters, "ssv:Parameter", name=name)
         if kind == "Boolean":

@@ -105,7 +105,9 @@ def _table(file: Path, layout: Layout, options: dict[str, Any]) -> pd.DataFrame:
     found: dict[str, Any] = {"header": None, "sep": layout.separator, "decimal": layout.decimal}
     looked_for = ("delimiter", "skiprows", "encoding", "encoding_errors")
     theirs = {key: value for key, value in options.items() if key not in looked_for}
-    foot = int(theirs.pop("skipfooter", 0))  # the engine of pandas that takes it reads a wrong decimal sign
+    foot = theirs.pop("skipfooter", 0)  # the engine of pandas that takes it reads a wrong decimal sign
+    if type(foot) is not int or foot < 0:
+        raise ValueError("skipfooter must be a whole number from 0 on")
     with opened(file, layout.encoding, options) as stream, warnings.catch_warnings():
         warnings.simplefilter("error", pd.errors.ParserWarning)
         for _ in islice(stream, layout.first - 1):

@@ -28,7 +28,8 @@ class Excel(Reader):
         cells: pd.DataFrame = pd.read_excel(file, **{"engine": "openpyxl", **options})
         cells.columns = pd.Index([str(name).strip() for name in cells.columns])
         names = [str(name) for name in cells.columns]
-        if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        wanted = {*names} if columns is None else {time, *columns}
+        if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1 and name in wanted]:
             raise BadInput(f"{file} row {above + 1}: column '{twice[0]}' occurs twice; rename one")
         if cells.dropna(how="all").empty:
             raise BadInput(f"{file}: has no data below row {above + 1}; record some")

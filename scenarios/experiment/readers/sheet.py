@@ -20,7 +20,7 @@ class Sheet:
     known: the names of all columns of the file.
     units: units by column, for columns with a unit in the file.
     apart: for columns of the file that are not among the cells, the reason.
-    begins: the date of 0 s, for columns of times for which the file tells it.
+    begins: the date of 0 s by the clock of the file, for columns of times for which it tells that.
     row, first: the word for a row in this format, and the number of the first row.
     remarks: on how the file was read, where a user should know.
     signs: the decimal sign and that between thousands, empty if none, of numbers that stand there as text;

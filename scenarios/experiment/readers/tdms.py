@@ -20,7 +20,7 @@ class Tdms(Reader):
     """Channels of a group with equal length share their rows, and so do waveforms with equal times.
 
     The times of waveforms become the column 'time' of their group, in s, unless the group already has one.
-    Where a waveform has a start time, that is the date of 0 s, in UTC.
+    Where a waveform has a start time, that is the date of 0 s, by which those of one file are put together.
     """
 
     kind: ClassVar[str] = "TDMS"

@@ -23,7 +23,7 @@ EPOCH_UNITS = ("ms", "us", "ns", "d")
 EPOCHS = (0.0, 25_569 * DAY, 719_529 * DAY)  # 1970 in dates of Unix, of spreadsheets, of MATLAB, s
 CENTURY = (978e6, 4.1e9)  # s, from 2001 to 2099 by Unix
 EPOCH_ROWS = 1000  # that tell the time step
-FINEST = 1e-5  # the shortest step of a record, s; in days, common rates are below
+FINEST = 2e-5  # s, steps of a record are longer, and in days shorter, if there is one a second or more
 FRACTION = r"(:\d{2}),(\d+)"  # of a second
 DOTTED = r"^(\d{1,2})\.(\d{1,2})\.(\d{4})(?!\S)"  # day, month and year, wherever dots stand between them
 OFFSET = r":\d{2}(?:[.,]\d+)? *(?:Z|[+-]\d{2}(?::?\d{2})?)\s*$"  # from UTC, behind a time of day
@@ -90,15 +90,20 @@ class StatedUnits:
         """Note a word in square brackets behind a name: a unit, perhaps, that is not known here."""
         bracket = BRACKETS.fullmatch(column.strip())
         if bracket and bracket.group(1).startswith("["):
-            said = f"{self._file.name}: column '{column}': {bracket.group(1)} is no unit that is known here"
-            self.notes.append(Note("unit", column, f"{said}; the numbers are taken without one"))
+            known = is_unit(bracket.group(1))
+            why = "is in its name alone" if known else "is no unit that is known here"
+            said = f"{self._file.name}: column '{column}': {bracket.group(1)} {why}"
+            way = f'; if they are in it, write unit = "{spelled(bracket.group(1))}"' * known
+            self.notes.append(Note("unit", column, f"{said}; the numbers are taken without a unit{way}"))
 
     def begin(self, column: str) -> "pd.Timestamp | None":
-        """The date of 0 s; None if it holds numbers or durations and the file tells none."""
-        if column in self._sheet.begins:
-            return self._sheet.begins[column]
+        """The first date of a time column; None if it holds numbers or durations."""
         cells = _dates(self._sheet.cells[column])
         return cells.min() if cells.dtype.kind == "M" else None
+
+    def started(self, column: str) -> "pd.Timestamp | None":
+        """The date of 0 s by the clock of the file, so that its time columns can be put together; or None."""
+        return self._sheet.begins.get(column, self.begin(column))
 
     def seconds(self, column: str, where: str, unit: str | None = None) -> Array:
         """The time column (N,) s: dates count from the first one, numbers are in the unit stated, else s.
@@ -221,10 +226,10 @@ def _dates(cells: "pd.Series[Any]") -> "pd.Series[Any]":
 
     Dates and times of day of a workbook or a Parquet file are objects of Python.
     """
-    first = next(iter(cells.dropna()), None) if cells.dtype == object else None
-    if isinstance(first, datetime.time):
+    kinds = set(map(type, cells.dropna())) if cells.dtype == object else set[type]()
+    if kinds == {datetime.time}:
         cells = cells.map(str, na_action="ignore")
-    elif isinstance(first, datetime.date):
+    elif kinds and all(issubclass(kind, datetime.date) for kind in kinds):
         return pd.to_datetime(cells)
     if not pd.api.types.is_string_dtype(cells) or is_number(_first(cells)):
         return cells
