@@ -7,6 +7,7 @@ import casadi as cs
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 from numpy.testing import assert_allclose, assert_array_equal
@@ -15,6 +16,7 @@ from fmus.export.builders.native.build import build_native
 from fmus.export.builders.pythonfmu import build_python
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
+from fmus.host.status import DISCARD
 from fmus.model import Model, equations
 from fmus.models import MODELS
 from fmus.variables import (
@@ -227,6 +229,19 @@ def test_model_exchange_shows_the_equations(name, fmi):
         get = fmu.getReal if fmi == 2 else fmu.getFloat64
         found = get([v for n, v in refs.items() if n in names(model, Output)])
         assert_array_equal(found, values(equations(model).h, x, u, p))
+
+
+@every_version
+def test_states_that_are_no_numbers_are_discarded_so_that_a_solver_may_go_on(fmi):
+    model = MODELS["drive"]()
+    point = near_start(model, np.random.default_rng(3))
+    with exchanged(native("drive", fmi=fmi), fmi, start_of(model, point)) as (fmu, _):
+        n = len(model.of(State))
+        bad = (c_double * n)(*[np.nan] * n)
+        with pytest.raises(FMICallException) as refused:
+            getattr(fmu, f"fmi{fmi}SetContinuousStates")(fmu.component, bad, n)
+        assert refused.value.status == DISCARD
+        assert_array_equal(states(fmu, fmi, "GetContinuousStates", n), point[0])
 
 
 def states(fmu, fmi, function, n):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import zipfile
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -159,7 +160,9 @@ def _described(card: dict[str, Any], description: FmuDescription) -> bytes:
     for i, v in enumerate(card["variables"]):
         keys = ("name", "causality", "variability", "initial", "description")
         about = {k: v[k] for k in keys if v[k]} | {"valueReference": str(i)}
-        numbers = {k: repr(float(v[k])) for k in ("min", "max", "nominal") if v[k] is not None}
+        numbers = {
+            k: repr(float(v[k])) for k in ("min", "max", "nominal") if v[k] is not None and isfinite(v[k])
+        }
         start = {"start": repr(v["start"])} if v["starts"] else {}
         unit = {"unit": v["unit"]} if v["unit"] else {}
         SubElement(SubElement(variables, "ScalarVariable", about), "Real", unit | numbers | start)

@@ -251,7 +251,7 @@ def complete(node: Element, v: dict[str, Any], shown: dict[str, str] | None) -> 
     if shown:
         real.set("displayUnit", shown["name"])
     for key in ("min", "max", "nominal", "start"):
-        if v[key] is not None and (key != "start" or v["starts"]):
+        if v[key] is not None and math.isfinite(v[key]) and (key != "start" or v["starts"]):
             real.set(key, repr(float(v[key])))
 
 

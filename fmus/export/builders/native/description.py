@@ -1,6 +1,7 @@
 """Parts of the model description that FMI 2.0 and 3.0 write alike."""
 
 from importlib.metadata import version
+from math import isfinite
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmus.export.builders.native.table import Entry, Table, Unknown
@@ -60,7 +61,7 @@ def add_experiment(parent: Element, table: Table) -> None:
 def numbers(entry: Entry) -> dict[str, str]:
     """Unit, limits, nominal and start of a variable, as attributes."""
     values = {"min": entry.min, "max": entry.max, "nominal": entry.nominal, "start": entry.start}
-    given = {k: repr(float(v)) for k, v in values.items() if v is not None}
+    given = {k: repr(float(v)) for k, v in values.items() if v is not None and isfinite(v)}
     units = {"unit": entry.unit} | ({"displayUnit": entry.display_unit} if entry.display_unit else {})
     return units | given
 

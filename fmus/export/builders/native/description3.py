@@ -98,6 +98,7 @@ def _build(table: Table) -> bytes:
         configuration,
         "SourceFileSet",
         language="C99",
+        compiler="gcc",
         compilerOptions=OPTIONS,
     )
     SubElement(files, "SourceFile", name="fmu.c")

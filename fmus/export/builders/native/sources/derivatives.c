@@ -26,11 +26,10 @@ static Status unknowns_fit(const Instance *m, const char *call, const unsigned *
 }
 
 static Status derivative_call_fits(const Instance *m, const char *call, const unsigned *unknowns, size_t n_unknown,
-                                   const unsigned *knowns, size_t n_known, const double *in, double *out) {
+                                   const unsigned *knowns, size_t n_known) {
     if (!allowed(m, call, COMPUTABLE)) return ERROR;
-    if (n_unknown && n_known)
-        if (!(given(m, call, unknowns) && given(m, call, knowns) && given(m, call, in) && given(m, call, out)))
-            return ERROR;
+    if (n_unknown && !given(m, call, unknowns)) return ERROR;
+    if (n_known && !given(m, call, knowns)) return ERROR;
     if (knowns_fit(m, call, knowns, n_known) != OK) return ERROR;
     return unknowns_fit(m, call, unknowns, n_unknown);
 }
@@ -38,7 +37,8 @@ static Status derivative_call_fits(const Instance *m, const char *call, const un
 /* out[unknown] = sum over knowns of d unknown/d known * in[known] */
 static Status forward_derivative(Instance *m, const char *call, const unsigned *unknowns, size_t n_unknown,
                                  const unsigned *knowns, size_t n_known, const double *in, double *out) {
-    if (derivative_call_fits(m, call, unknowns, n_unknown, knowns, n_known, in, out) != OK) return ERROR;
+    if (derivative_call_fits(m, call, unknowns, n_unknown, knowns, n_known) != OK) return ERROR;
+    if ((n_known && !given(m, call, in)) || (n_unknown && !given(m, call, out))) return ERROR;
     memset(m->seed, 0, sizeof m->seed);
     for (size_t k = 0; k < n_known; k++) m->seed[index_of(knowns[k])] += in[k];
     bind(m, m->now.values);
@@ -56,7 +56,8 @@ static Status forward_derivative(Instance *m, const char *call, const unsigned *
 /* out[known] = sum over unknowns of in[unknown] * d unknown/d known */
 static Status adjoint_derivative(Instance *m, const char *call, const unsigned *unknowns, size_t n_unknown,
                                  const unsigned *knowns, size_t n_known, const double *in, double *out) {
-    if (derivative_call_fits(m, call, unknowns, n_unknown, knowns, n_known, in, out) != OK) return ERROR;
+    if (derivative_call_fits(m, call, unknowns, n_unknown, knowns, n_known) != OK) return ERROR;
+    if ((n_unknown && !given(m, call, in)) || (n_known && !given(m, call, out))) return ERROR;
     memset(m->tangent, 0, sizeof m->tangent);
     for (size_t k = 0; k < n_unknown; k++) {
         int place = place_of(unknowns[k]);

@@ -122,7 +122,7 @@ static Status states_fit(const Instance *m, const char *call, const void *array,
 static Status set_states(Instance *m, const char *call, const double *x, size_t n) {
     if (!allowed(m, call, CONTINUOUS) || states_fit(m, call, x, n) != OK) return ERROR;
     for (unsigned i = 0; i < N_STATES; i++)
-        if (acceptable(m, call, i, x[i]) != OK) return ERROR;
+        if (acceptable(m, call, i, x[i]) != OK) return DISCARD; /* a solver may try a shorter step */
     memcpy(m->now.values, x, N_STATES * sizeof(double));
     forget_results(m);
     return OK;
