@@ -6,10 +6,12 @@ with the same code. `python -m benchmarks.challenge.code RECORD` prints the file
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from pathlib import Path
 
@@ -23,13 +25,13 @@ def read_for(records: Iterable[Path]) -> list[str]:
 
     Each record is closed again, in a process of its own. Raises CalledProcessError where that fails.
     """
-    found: set[str] = set()
-    for record in records:
-        own = [sys.executable, "-m", "benchmarks.challenge.code", str(record)]
-        found |= set(
-            subprocess.run(own, cwd=ROOT, check=True, text=True, capture_output=True).stdout.split("\n")
-        )
-    return sorted(found - {""})
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return sorted(set().union(*pool.map(_read, records)) - {""})
+
+
+def _read(record: Path) -> set[str]:
+    own = [sys.executable, "-m", "benchmarks.challenge.code", str(record)]
+    return set(subprocess.run(own, cwd=ROOT, check=True, text=True, capture_output=True).stdout.split("\n"))
 
 
 def digests(files: Iterable[str], root: Path = ROOT) -> dict[str, str]:
