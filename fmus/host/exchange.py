@@ -95,7 +95,9 @@ class Exchanged(Instance):
             if now >= end - least:
                 return None
         if events < MOST_EVENTS:
-            raise CallFailed(f"more than {MOST_STEPS} steps of the solver in the step from t = {t:g} s")
+            raise CallFailed(
+                f"more than {MOST_STEPS} steps of the solver in the step from t = {t:g} s; step less far"
+            )
         raise CallFailed(f"more than {MOST_EVENTS} events in the step from t = {t:g} s; its events chatter")
 
     def _advanced(self, solver: "_Solver", now: float, upto: float) -> tuple[bool, float]:
@@ -179,7 +181,7 @@ class _Solver(CVodeSolver):  # type: ignore[misc]  # FMPy comes without types
             maxNumSteps=MOST_STEPS,
         )
 
-    def step(self, t: float, tNext: float) -> tuple[bool, float]:  # FMPy's names
+    def step(self, t: float, tNext: float) -> tuple[bool, float]:  # by the names of FMPy
         """One step from t s on to tNext at most: whether an event indicator changed, and the time reached, s.
 
         The FMU has the states reached: it is told of each step that is complete, as FMI asks for.

@@ -71,8 +71,8 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
     for ending, some in sheets(list(found.setup.outputs) if len(h.t) > 1 else []):
         layout = [[name, f"{name} memory"] for name in some]
         figure, axes = sheet(ROW * len(some) + 0.5, layout, width_ratios=[2.4, 1])
-        for name in some:
-            j = found.setup.outputs.index(name)
+        places = [found.setup.outputs.index(name) for name in some]
+        for name, j in zip(some, places, strict=True):
             e, gated = accepted[:, j], h.gated[:, j]
             ax, memory = axes[name], axes[f"{name} memory"]
             seen = np.isfinite(e)
@@ -98,7 +98,7 @@ def innovation_plots(found: Findings) -> Iterator[Plot]:
             "model and noise are right, 95 % of the innovations lie between the dashed lines and all "
             "correlations lie within the grey band."
         )
-        left_out = h.gated[:, [found.setup.outputs.index(name) for name in some]].any()
+        left_out = h.gated[:, places].any()
         out = " Dots at the edges: measurements that the gate left out." if left_out else ""
         yield Plot(f"innovations{ending}", figure, caption + out)
 

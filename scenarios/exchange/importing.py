@@ -13,6 +13,7 @@ from fmus.export.provenance import PLACE as PROVENANCE
 from fmus.export.ssp import (
     Component,
     Link,
+    Start,
     System,
     read_package,
 )
@@ -81,14 +82,15 @@ def _scenario(system: System, files: Mapping[str, bytes], folder: Path, tell: Te
         "step": _step(system, ours, fmus),
     }
     led = {_place(link, names) for link in system.links}
+    stated = _stated(members)
     table["fmus"] = {
-        names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, led, tell) for c in members
+        names[c.name]: _member(c, fmus[c.name], names[c.name], inputs, led, stated, tell) for c in members
     }
     links = [link for link in system.links if link.source[0] not in sources]
     late = [_place(link, names) for link in late_links(links, fmus)] if not ours else []
     for place in late:
         tell(f"connection to {place} is one step late, as FMUs in its loop state no dependencies")
-    delayed, stated = ours.get("delayed", late), _stated(members)
+    delayed = ours.get("delayed", late)
     table["connections"] = [_wire(link, fmus, names, delayed, stated) for link in links]
     for link in system.links:
         if link.source[0] in sources:
@@ -148,14 +150,14 @@ def _step(system: System, ours: Mapping[str, Any], fmus: Descriptions) -> float:
 
 
 def _member(
-    c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any], led: Collection[str], tell: Tell
-) -> dict[str, Any]:
+    c: Component, fmu: FmuDescription, name: str, inputs: dict[str, Any], led: Collection[str], stated: Ends,
+    tell: Tell,
+) -> dict[str, Any]:  # fmt: skip
     """An FMU with its values; values of inputs are added to `inputs`, and those of no variable are told.
 
     led: inputs to which a connection leads, which is what counts from the start of a simulation on.
     """
     member: dict[str, Any] = {"fmu": c.source, "parameters": {}, "initial": {}, "step": c.step}
-    stated = _stated([c])
     for variable, given in c.start.items():
         known = fmu.variables.get(variable)
         if known is None:
@@ -163,8 +165,7 @@ def _member(
             continue
         where = f"parameter '{variable}' of '{c.name}'"
         own = _at_connector(known.unit, stated.get((c.name, variable)))
-        factor, shift = _converted(own, known.unit, where)
-        value = factor * given.within(own, where) + shift
+        value = Start(given.within(own, where), own).within(known.unit, where)
         if known.causality == "input" and f"{name}.{variable}" in led:
             tell(f"the value of input '{variable}' of '{c.name}' is left out, since a connection leads to it")
         elif known.causality == "input":

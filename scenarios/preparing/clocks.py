@@ -51,9 +51,9 @@ def with_clocks(made: Draft, isolation: Isolation | None) -> Draft:
     """The draft with the clocks of its files, as far as they can be found; isolation: of a foreign FMU.
 
     Channels of one file have one clock, files with dates are put together by these, and others by a channel
-    that both have measured. Without one, the FMU is simulated with the inputs
-    of their file, if all lie in one, and the outputs of the other files are sought in it: what the FMU does
-    not know may then shift a clock by a few samples.
+    that both have measured. Without one, the FMU is simulated with the inputs of their file, if all lie in
+    one, and the outputs of the other files are sought in it: what the FMU does not know may then shift a
+    clock by a few samples.
     """
     driving = dict.fromkeys(s.raster for s in made.inputs)
     if not made.others:

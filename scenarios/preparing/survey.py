@@ -53,10 +53,10 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Channels of a file that share their times t (N,), s; begin: the date of 0 s, if the times are dates.
+    """Channels of a file that share their times t (N,), s.
 
-    started: the date of 0 s by the clock of the file, as of a waveform, if it tells one.
-
+    begin: the date of 0 s, if the times are dates; started: that or, for numbers, the date of 0 s that the
+    file tells beside them, such as the start time of a waveform, which counts within the file alone.
     time_unit: of the time column, if its name tells it and the file states none; time_guessed: whether no
     column is called the time, so that this one was taken because it increases; options: of the reader, with
     which the file was read; left_out: a sentence for each column that holds no numbers.
