@@ -65,6 +65,7 @@ _FMI_BASE = MappingProxyType(
         "radian": "rad",
     }
 )
+SAME = (1.0, 0.0)  # factor and offset of a number that is not converted
 LONGEST = 100  # characters of a unit
 _NOT_PARSED = (pint.PintError, TokenError, ValueError, TypeError, AssertionError, ArithmeticError)
 
@@ -122,7 +123,7 @@ def conversion(unit: str, target_unit: str, where: str) -> tuple[float, float]:
     The same name on both sides passes even if it is nobody's unit, as 'ticks'.
     """
     if unit == target_unit:
-        return 1.0, 0.0
+        return SAME
     try:
         source = base_exponents(unit)
     except BadInput as error:
@@ -158,7 +159,7 @@ def model_unit(stated: str | None, declared: str | None, variable: str, where: s
         return stated
     try:
         base_exponents(declared)
-        alike = stated is None or conversion(declared, stated, where) == (1.0, 0.0)
+        alike = stated is None or conversion(declared, stated, where) == SAME
     except BadInput as error:
         said = str(error).removeprefix(f"{where}: ")
         raise BadInput(f'{where} model_unit = "{declared}": {said}') from error

@@ -22,7 +22,7 @@ from fmus.export.ssp.writing import known_unit
 from fmus.host.archive import describe
 from fmus.host.description import FmuDescription
 from fmus.host.master.recording import TIME
-from fmus.units import conversion
+from fmus.units import SAME, conversion
 from scenarios.exchange.loops import late_links
 from scenarios.exchange.settings import PLACE
 from scenarios.exchange.toml_text import toml_text
@@ -36,7 +36,6 @@ Ends = Mapping[tuple[str, str], str | None]  # units by component and connector
 STEP = 1e-3  # s, if neither the package nor its FMUs declare a step
 SECONDS = 1.0  # simulated if the package states no end
 FILE = "scenario.toml"
-SAME = (1.0, 0.0)  # gain and offset
 KEPT = ("id", "question", "order", "extrapolation", "seed", "record", "sensors", "events", "expect", "figure")
 
 
@@ -204,7 +203,7 @@ def _wire(
             f"({units[0]})*{wire['gain_unit']}", units[1] or "1", f"connection to {to}"
         )
         gain, offset = gain / factor, offset - gain / factor * shift
-    if (gain, offset) != (1.0, 0.0):
+    if (gain, offset) != SAME:
         wire |= {"gain": gain, "offset": offset}
     return wire | ({"delayed": True} if to in delayed else {})
 

@@ -10,6 +10,7 @@ from estimator.noise import white_noise
 from estimator.record import Array, Note
 from fmus.errors import BadInput
 
+FEWEST = 2  # times; with fewer there is no step
 JITTER = 0.01  # standard deviation of the time steps over their median
 LOST_SAMPLE = 1.5  # a step over the median step that must come from a lost sample
 GAP = 5.0  # a step over the median step that no simulation should bridge
@@ -18,8 +19,10 @@ CLIPPED_SAMPLES = 8  # equal values in a row; chance and slow turning points mak
 Lines = NDArray[np.integer[Any]]
 
 
-def check_time(file: str, column: str, t: Array, lines: Lines, row: str = "line") -> None:
-    """Raise BadInput unless the times increase from row to row.
+def check_time(
+    file: str, column: str, t: Array, lines: Lines, row: str = "line", fewest: int = FEWEST
+) -> None:
+    """Raise BadInput unless the times increase from row to row, and are as many as needed.
 
     t: (N,) s; lines: (N,) number of each row in the file; row: the word for a row in this format.
     """
@@ -39,6 +42,8 @@ def check_time(file: str, column: str, t: Array, lines: Lines, row: str = "line"
             f"{file} {row} {lines[i + 1]}: time column '{column}' goes from {t[i]:.9g} to {t[i + 1]:.9g} s; "
             f"times must increase from row to row: {way}"
         )
+    if t.size < fewest:
+        raise BadInput(f"{file}: has {t.size or 'no'} {row} of numbers; at least {fewest} are needed")
 
 
 def check_gaps(file: str, t: Array) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from estimator.record import Array, Note
 from fmus.errors import BadInput, did_you_mean
 from scenarios.experiment.advice import check_colons, named_below, read_with_advice
-from scenarios.experiment.checks import check_time
+from scenarios.experiment.checks import FEWEST, check_time
 from scenarios.experiment.experiment import Experiment
 from scenarios.experiment.readers.sheet import Sheet
 from scenarios.experiment.readers.units import StatedUnits, dates_apart
@@ -22,8 +22,6 @@ from scenarios.experiment.sampling import (
     slower,
     step_of,
 )
-
-FEWEST = 2  # common times; with fewer there is no step
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +159,6 @@ def _source(
     t = stated.seconds(time[0], f"{e.file}: {named}", time[1])
     columns = {prefix + c: t if c == time[0] else sheet.numbers(c) for c in wanted}
     check_time(str(sheet.file), time[0], t, np.arange(t.size) + sheet.first, sheet.row)
-    if t.size < FEWEST:
-        raise BadInput(f"{sheet.file}: has {t.size or 'no'} {sheet.row} of numbers; a record needs more")
     return _Source(name, sheet.file, t, columns, stated)
 
 

@@ -16,7 +16,7 @@ from estimator.record import (
 )
 from fmus.errors import BadInput
 from fmus.host.description import FmuDescription
-from fmus.units import column_conversion, model_unit
+from fmus.units import SAME, column_conversion, model_unit
 from scenarios.experiment.checks import (
     check_cells,
     check_gaps,
@@ -25,7 +25,6 @@ from scenarios.experiment.checks import (
 )
 from scenarios.experiment.experiment import Experiment, check_names
 from scenarios.experiment.parts import MIN_SAMPLES, masks
-from scenarios.experiment.readers.units import SAME
 from scenarios.experiment.reading import Channels, base_of, read_channels
 
 LARGEST = 1e100  # of a measured number

@@ -206,8 +206,6 @@ def _seconds(stated: StatedUnits, sheet: Sheet, column: str) -> tuple[Array, str
     unit = None if column in sheet.units or stated.begin(column) is not None else unit_in_name(column, ["s"])
     t = stated.seconds(column, f"{sheet.file}: time", unit)
     check_time(str(sheet.file), column, t, np.arange(t.size) + sheet.first, sheet.row)
-    if t.size < 2:
-        raise BadInput(f"{sheet.file}: has {t.size or 'no'} row of numbers; a record needs more")
     return t, unit
 
 

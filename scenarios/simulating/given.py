@@ -92,7 +92,7 @@ def _column(c: Column, key: str, name: str, fmus: Descriptions, folder: Path) ->
     check_colons(sheet, c.time)
     stated = StatedUnits(sheet)
     times, values = stated.seconds(c.time, f"key '{key}.time'"), sheet.numbers(c.column)
-    check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row)
+    check_time(str(sheet.file), c.time, times, np.arange(times.size) + sheet.first, sheet.row, fewest=1)
     fmu, _, variable = name.partition(".")
     described = fmus[fmu].variables.get(variable) if fmu in fmus else None
     if described is None:  # the master reports it with the known names

@@ -25,7 +25,7 @@ from fmus.host.master.recording import Recording
 from fmus.units import base_exponents
 from scenarios.experiment.experiment import load_experiment
 from scenarios.experiment.readers import READERS, read_sheet
-from scenarios.experiment.readers.header import units_of
+from scenarios.experiment.readers.header import units_in_names
 from scenarios.experiment.readers.layout import layout_of
 from scenarios.experiment.readers.mat import Mat
 from scenarios.experiment.readers.sheet import Sheet
@@ -312,15 +312,32 @@ def test_the_time_may_be_declared_in_seconds_that_the_file_writes_as_siemens(tmp
     [
         ("q[1]", None), ("q(12)", None), ("q [1]", "1"), ("phi [Grad]", "deg"), ("w (Grad/s)", "deg/s"),
         ("x [μm]", "μm"), ("Q [l/min]", "l/min"), ("n (mean)", None), ("v [Gs]", None), ("a[m/s2]", "m/s2"),
+        ("F [kN](:,1)", "kN"), ("set(:,1)", None),
     ],
 )  # fmt: skip
 def test_what_stands_in_brackets(name, unit):
-    assert units_of([name]) == ({name: unit} if unit else {})
+    assert units_in_names([name]) == ({name: unit} if unit else {})
+
+
+@pytest.mark.parametrize("kind", [kind for kind in WRITERS if not kind.startswith("mat")])
+def test_a_unit_in_brackets_behind_a_name_counts_in_every_format(tmp_path, kind):
+    """A channel of a recorder and a frame of pandas keep the names of the CSV; MATLAB allows none such."""
+    writer, name = WRITERS[kind]
+    columns = {c if c in ("time", "omega") else f"{c}[{UNITS[c]}]": x for c, x in table().items()}
+    writer(tmp_path / name, columns, {})
+    units = read_sheet(tmp_path / name, "time").units
+    assert {c: u for c, u in units.items() if c != "time"} == {"torque[N.m]": "N.m", "n_wheel[rpm]": "rpm"}
+
+
+def test_a_unit_that_the_format_states_counts_before_the_one_in_a_name(tmp_path):
+    for stated, counts in (("kN.m", "kN.m"), ("", "N.m"), (" ", "N.m")):
+        write_parquet(tmp_path / "data.parquet", {"M [Nm]": np.arange(3.0)}, {"M [Nm]": stated})
+        assert read_sheet(tmp_path / "data.parquet").units == {"M [Nm]": counts}
 
 
 @given(st.sampled_from(BEHIND.split()), st.sampled_from(["x [{}]", "x ({})", "x({})"]))
 def test_no_word_in_brackets_is_a_huge_unit(word, name):
-    for unit in units_of([name.format(word)]).values():
+    for unit in units_in_names([name.format(word)]).values():
         assert base_exponents(unit).factor <= 1e6  # MW, which is a German mean, too
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from fmus.units import conversion
+from fmus.units import SAME, conversion
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources"
@@ -39,12 +39,17 @@ class Start(NamedTuple):
         """What one more change, behind all others, makes of it."""
         return self._replace(gain=gain * self.gain, offset=gain * self.offset + offset)
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether there is no such change."""
+        return (self.gain, self.offset) == SAME
+
     def within(self, unit: str | None, where: str) -> float:
         """The number in the unit of a variable; without one, the value is taken as it stands.
 
         `where` begins the message of the BadInput for units that do not fit.
         """
-        factor, shift = conversion(self.unit, unit, where) if self.unit and unit else (1.0, 0.0)
+        factor, shift = conversion(self.unit, unit, where) if self.unit and unit else SAME
         return self.gain * (factor * self.value + shift) + self.offset
 
 

@@ -150,22 +150,22 @@ def _values(component: Component) -> Element:
     """Values of a component before the start; libraries look for the name 'initialValues'."""
     root = element(None, "ssv:ParameterSet", version="1.0", name="initialValues")
     parameters = element(root, "ssv:Parameters")
-    for name, (value, unit, *line) in component.start.items():
-        if line and tuple(line) != (1.0, 0.0):
+    for name, start in component.start.items():
+        if not start.is_plain:
             raise BadInput(
                 f"the value of '{name}' of '{component.name}' has a gain or an offset; apply it first"
             )
         kind = component.types.get(name, REAL)
         parameter = element(parameters, "ssv:Parameter", name=name)
         if kind == "Boolean":
-            element(parameter, "ssv:Boolean", value="true" if value else "false")
+            element(parameter, "ssv:Boolean", value="true" if start.value else "false")
         elif kind != REAL:
-            element(parameter, "ssv:Integer", value=str(round(value)))
+            element(parameter, "ssv:Integer", value=str(round(start.value)))
         else:
-            real = element(parameter, "ssv:Real", value=repr(float(value)))
-            if unit is not None and known_unit(unit):
-                real.set("unit", unit)
-    _units(root, (unit for _, unit, *_ in component.start.values()))
+            real = element(parameter, "ssv:Real", value=repr(float(start.value)))
+            if start.unit is not None and known_unit(start.unit):
+                real.set("unit", start.unit)
+    _units(root, (start.unit for start in component.start.values()))
     return root
 
 

@@ -2,12 +2,14 @@
 
 import sys
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from fmus.errors import BadInput
 from fmus.registry import classes_in
 from fmus.taken import check_columns, check_file
+from scenarios.experiment.readers.header import spelled, units_in_names
 from scenarios.experiment.readers.reader import NO_OPTIONS, Reader
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -42,6 +44,7 @@ def read_sheet(
     time: the column that determines the rows, required if a file has several time rasters.
     columns: the columns to read, by default all; columns that are not in the file are left out.
     options: of the library that reads the format, by name.
+    A unit that the format does not state may stand in brackets behind a name.
     Raises BadInput if the file has no known format or cannot be read, or if a name in it is ambiguous.
     """
     endings = [suffix.lower() for suffix in file.suffixes]
@@ -52,4 +55,5 @@ def read_sheet(
     check_file(file)
     sheet = reader.read(file, time, columns, options)
     check_columns(file, len(sheet.cells.columns))
-    return sheet
+    stated = {column: unit for column, unit in sheet.units.items() if spelled(unit)}
+    return replace(sheet, units={**units_in_names(map(str, sheet.cells)), **stated})

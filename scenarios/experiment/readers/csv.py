@@ -14,7 +14,7 @@ import pandas as pd
 
 from fmus.errors import BadInput
 from fmus.taken import check_gzip, check_text
-from scenarios.experiment.readers.header import units_of
+from scenarios.experiment.readers.header import units_in_line
 from scenarios.experiment.readers.layout import Layout, layout_of, no_text
 from scenarios.experiment.readers.reader import Reader
 from scenarios.experiment.readers.records import BLANKS, WINDOWS, opened
@@ -46,7 +46,7 @@ class Csv(Reader):
             check_gzip(file)
         layout = layout_of(file, options)
         cells = _cells(file, layout, options)
-        units = {**units_of(layout.names, layout.units), **_units(file)}
+        units = {**units_in_line(layout.names, layout.units), **_units(file)}
         taken = (
             f"{file.name}: is not UTF-8; its names and units are read as {WINDOWS}, as Windows writes them"
         )

@@ -10,7 +10,7 @@ import pandas as pd
 
 from fmus.errors import BadInput
 from fmus.taken import NUMBER, check_packed, check_record
-from scenarios.experiment.readers.header import is_line_of_units, units_of
+from scenarios.experiment.readers.header import is_line_of_units, units_in_line
 from scenarios.experiment.readers.reader import Reader, library
 from scenarios.experiment.readers.sheet import Sheet
 
@@ -38,7 +38,7 @@ class Excel(Reader):
         if units:
             cells = cells.iloc[1:].infer_objects()
         last = int(cells.notna().any(axis=1).to_numpy().nonzero()[0][-1]) + 1
-        known = units_of(names, units)
+        known = units_in_line(names, units)
         return Sheet(file, cells.iloc[:last], tuple(names), known, first=above + 2 + bool(units))
 
 

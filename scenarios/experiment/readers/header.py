@@ -1,13 +1,13 @@
 """The lines above the numbers of a table of text: names of columns, and units in brackets or in a line."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from fmus.errors import BadInput
 from fmus.units import SPELLINGS, base_exponents, plain
 
-# a unit behind a name; digits alone in brackets directly at it are an index, as in q[1]
-BRACKETS = re.compile(r".*\S(?![\[(]\d+[\])])\s*(\[[^\]]+\]|\([^)]+\))")
+# a unit behind a name; digits alone in brackets directly at it are an index, as in q[1], and so is a column
+BRACKETS = re.compile(r".*\S(?![\[(](?::,)?\d+[\])])\s*(\[[^\]]+\]|\([^)]+\))(?:\(:,\d+\))?")
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?")
 GROUPED = re.compile(r"[+-]?\d{1,3}([.,']\d{3})+([.,]\d+)?")  # thousands apart
 DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T ]+\d.*)?|\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?")
@@ -62,12 +62,12 @@ def _in_brackets(cell: str) -> bool:
     return cell[:1] + cell[-1:] in ("[]", "()")
 
 
-def units_of(names: Sequence[str], line: Sequence[str] = ()) -> Mapping[str, str]:
-    """Units by column: from the line of units, else known units in brackets behind a name."""
-    found = {}
-    for name in names:
-        bracket = BRACKETS.fullmatch(name.strip())
-        if bracket and is_unit(bracket.group(1)):
-            found[name] = spelled(bracket.group(1))
-    stated = {name: spelled(cell) for name, cell in zip(names, line, strict=False) if cell.strip()}
-    return found | stated
+def units_in_names(names: Iterable[str]) -> Mapping[str, str]:
+    """Known units in brackets behind a name, by column."""
+    brackets = {name: BRACKETS.fullmatch(name.strip()) for name in names}
+    return {name: spelled(b.group(1)) for name, b in brackets.items() if b and is_unit(b.group(1))}
+
+
+def units_in_line(names: Sequence[str], line: Sequence[str]) -> Mapping[str, str]:
+    """Units by column from the line of units."""
+    return {name: spelled(cell) for name, cell in zip(names, line, strict=False) if cell.strip()}

@@ -11,11 +11,10 @@ import pandas as pd
 
 from estimator.record import Array, Note
 from fmus.errors import BadInput
-from fmus.units import another_kind, base_exponents, column_conversion, conversion
+from fmus.units import SAME, another_kind, base_exponents, column_conversion, conversion
 from scenarios.experiment.readers.header import BRACKETS, is_number, is_unit, spelled
 from scenarios.experiment.readers.sheet import Sheet
 
-SAME = (1.0, 0.0)  # factor and offset
 ALSO = MappingProxyType({"g": "g_0", "S": "s"})  # what a word may mean where the kind fits: gravity, seconds
 CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d+)?)")  # hours, minutes, seconds
 HOUR, DAY = 3600.0, 86400.0  # s
@@ -35,6 +34,7 @@ class StatedUnits:
     def __init__(self, sheet: Sheet) -> None:
         self._sheet = sheet
         self._file = sheet.file
+        self._dated: dict[str, pd.Series[Any]] = {}
         self.notes = [Note("file", "", remark) for remark in sheet.remarks]
 
     def check(self, column: str, derived: int, declared: str, where: str) -> None:
@@ -90,27 +90,25 @@ class StatedUnits:
         """Note a word in square brackets behind a name: a unit, perhaps, that is not known here."""
         bracket = BRACKETS.fullmatch(column.strip())
         if bracket and bracket.group(1).startswith("["):
-            known = is_unit(bracket.group(1))
-            why = "is in its name alone" if known else "is no unit that is known here"
-            said = f"{self._file.name}: column '{column}': {bracket.group(1)} {why}"
-            way = f'; if they are in it, write unit = "{spelled(bracket.group(1))}"' * known
-            self.notes.append(Note("unit", column, f"{said}; the numbers are taken without a unit{way}"))
+            said = f"{self._file.name}: column '{column}': {bracket.group(1)} is no unit that is known here"
+            self.notes.append(Note("unit", column, f"{said}; the numbers are taken without a unit"))
 
     def begin(self, column: str) -> "pd.Timestamp | None":
         """The first date of a time column; None if it holds numbers or durations."""
-        cells = _dates(self._sheet.cells[column])
+        cells = self._cells(column)
         return cells.min() if cells.dtype.kind == "M" else None
 
     def started(self, column: str) -> "pd.Timestamp | None":
         """The date of 0 s by the clock of the file, so that its time columns can be put together; or None."""
-        return self._sheet.begins.get(column, self.begin(column))
+        begins = self._sheet.begins
+        return begins[column] if column in begins else self.begin(column)
 
     def seconds(self, column: str, where: str, unit: str | None = None) -> Array:
         """The time column (N,) s: dates count from the first one, numbers are in the unit stated, else s.
 
         unit: declared for numbers; None if none is.
         """
-        cells = _dates(self._sheet.cells[column])
+        cells = self._cells(column)
         if cells.dtype.kind == "M":
             said = f"{self._file.name}: column '{column}' holds dates; 0 s is {cells.min()}"
             self.notes.append(Note("unit", column, said))
@@ -130,6 +128,12 @@ class StatedUnits:
         if unit is None and (factor, offset) == SAME and numbers.size > 1:
             self._note_epoch(column, numbers)
         return numbers * factor + offset
+
+    def _cells(self, column: str) -> "pd.Series[Any]":
+        """A column with its dates, which are read once; see `_dates`."""
+        if column not in self._dated:
+            self._dated[column] = _dates(self._sheet.cells[column])
+        return self._dated[column]
 
     def _note_epoch(self, column: str, numbers: Array) -> None:
         """Note a time column (N,), taken in s, whose numbers are dates of this century in another unit."""
