@@ -16,7 +16,7 @@ from typing import ClassVar
 import casadi as cs
 
 from fmus.effects.effect import Effect
-from fmus.effects.site import Law, Site
+from fmus.effects.site import WAY, Law, Site
 from fmus.effects.switch import Switch
 from fmus.integrators import integrator
 from fmus.integrators.integrator import Integrator
@@ -65,6 +65,8 @@ class Model(Site, ABC):
         )
         self.effects = tuple(effects)
         self.motions: dict[str, Expr] = {}  # outputs of the probes
+        if self.switched:
+            self._know_first()
         self.build(self.effects)
         if probes:
             self._probe()
@@ -126,6 +128,13 @@ class Model(Site, ABC):
         """What can be set, in the order of the equations' arguments: states, inputs, parameters."""
         return [*self.of(State), *self.of(Input), *self.of(Parameter)]
 
+    def _know_first(self) -> None:
+        """Add what effects ask for before the states of laws, since it moves whether these are on or off."""
+        asked = {quantity for effect, _ in self.effects for quantity in effect.asks}
+        by_way = self.has_way and any(effect.of_way for effect, _ in self.effects)
+        for quantity in sorted(asked | ({WAY.name} if by_way else set())):
+            self.known(quantity)
+
     def _probe(self) -> None:
         """Open each location by a force input and by outputs of its motion."""
         for location, port in self.ports().items():
@@ -180,6 +189,11 @@ def equations(model: Model) -> Equations:
     h = cs.Function("h", [x, u, p], [cs.cse(cs.vertcat(*y.values()))], names, ["y"])
     f, h = _own([f, h])
     return Equations(f, h, _method(model).step(f, _tolerated(model), calls=model.switched))
+
+
+def step_alone(model: Model, made: Equations, moving: int) -> cs.Function:
+    """The step while only the first `moving` states change: those of the model, where no law moves others."""
+    return _method(model).step(made.f, _tolerated(model), calls=model.switched, moving=moving)
 
 
 def joins(model: Model) -> bool:

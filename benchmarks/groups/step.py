@@ -9,6 +9,7 @@ from benchmarks.group import Group, Row, Work, agreed
 from benchmarks.peers.generated_c import Loops, begin, start_of
 from benchmarks.timing import Run, in_turns
 from fmus.contact.forces.laws import LAWS
+from fmus.export.builders.hypotheses import ModelBuilder
 from fmus.host.archive import Archive
 from fmus.host.fmu import Fmu
 from fmus.models import MODELS
@@ -42,6 +43,7 @@ class StepGroup(Group):
                 if name == "wheelset":
                     yield from _laws(fmu, loops, work.of(2000, 100), work.of(9, 3))
                 yield _rows(name, fmu, loops, steps)
+            yield _laws_off(name, work, steps)
             yield _restarts(name, loops, work)
 
 
@@ -115,6 +117,29 @@ def _rows(name: str, fmu: Fmu, loops: Loops, steps: int) -> Row:
     return times.row(
         f"{name}: row and step", "ours", "one instance", "µs", how, factor=1e6 / steps / fmu.at_once,
         peer_factor=1e6 / steps,
+    )  # fmt: skip
+
+
+def _laws_off(name: str, work: Work, steps: int) -> Row:
+    """Rows of the library in which close-loop looks for effects, all of them off, beside the model alone."""
+    build = ModelBuilder(name, work.folder / f"laws_{name}")
+    start, t = start_of(MODELS[name]()), DT * np.arange(steps + 1)
+    with Fmu(build(())) as alone, Fmu(build(build.offers[:1])) as library:
+        asked = [v.name for v in MODELS[name]().of(State)]
+        rows = [start] * alone.at_once
+        found = [fmu.simulate_rows(t[:101], {}, asked, rows) for fmu in (library, alone)]
+        agreed(np.array(found[0]), np.array(found[1]), SAME, f"{name}, laws off")
+        times = in_turns(
+            {
+                "ours": lambda: library.simulate_rows(t, {}, asked[:1], rows),
+                "without effects": lambda: alone.simulate_rows(t, {}, asked[:1], rows),
+            },
+            9,
+        )
+    how = f"{len(rows)} rows through {steps} steps of 1 ms; the library with effects that are off, and none"
+    return times.row(
+        f"{name}: row with effects that are off", "ours", "without effects", "µs", how,
+        factor=1e6 / steps / len(rows),
     )  # fmt: skip
 
 

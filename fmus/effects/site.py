@@ -90,6 +90,8 @@ class Site:
         for name, force in acting.items():
             self.symbols[name] = self.symbols[name] + force
         self._pressed.clear()
+        if WAY.name in self.rates:
+            self.rates[WAY.name] = self.symbols[SPEED]  # as effects have left it
 
     def _build(self, effect: type[Effect], location: str, known: dict[str, Any]) -> None:
         place = self._place_of(effect, location, known)
@@ -129,7 +131,7 @@ class Site:
         """The state that an effect asks for, made when first asked for: "clock" or "way"."""
         if quantity not in self.brought:
             self.add(CLOCK if quantity == "clock" else WAY)
-            self.rates[quantity] = cs.SX(1) if quantity == "clock" else self.symbols[SPEED]
+            self.rates[quantity] = cs.SX(1) if quantity == CLOCK.name else self.symbols[SPEED]
         return self.symbols[quantity]
 
     @property

@@ -27,7 +27,7 @@ LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of status that FMI 2.0 has of a
 
 @cache
 def _let_go_in_time(binary: str) -> None:
-    """Have PythonFMU 0.7 drop its interpreter once, before the process ends; see export/inside/common.py.
+    """Have PythonFMU 0.7 drop its interpreter once, before the process ends; see export/runtime/common.py.
 
     The library stays loaded until then.
     """

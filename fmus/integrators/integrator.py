@@ -30,10 +30,14 @@ class Integrator(ABC):
         shorter one (`fmus.export.runtime.stepping`). It is 0.0 where the method does not estimate it.
         """
 
-    def step(self, f: cs.Function, tolerated: Sequence[float], calls: bool = False) -> cs.Function:
+    def step(
+        self, f: cs.Function, tolerated: Sequence[float], calls: bool = False, moving: int | None = None
+    ) -> cs.Function:
         """The CasADi function step(x, u, p, dt) -> (x after dt, error) for f(x, u, p) -> x'.
 
-        calls: whether the step calls f at each stage; otherwise it contains its equations instead.
+        calls: whether the step calls f at each stage; otherwise it contains its equations instead. moving:
+        number of states, the first ones, that may change; the function `step_alone` gives these only. By
+        default all do.
         """
         kind: Expr = cs.SX if f.is_a("SXFunction") else cs.MX
         x, u, p = (kind.sym(f.name_in(i), f.size1_in(i)) for i in range(3))
@@ -41,10 +45,12 @@ class Integrator(ABC):
         graph = f.wrap() if calls else f
 
         def rates(states: Expr) -> Expr:
-            return graph.call([states, u, p], False, calls)[0]
+            every = states if moving is None else cs.vertcat(states, x[moving:])
+            return graph.call([every, u, p], False, calls)[0][:moving]
 
-        x1, error = self.advance(rates, x, dt, tolerated)
+        x1, error = self.advance(rates, x[:moving], dt, tolerated[:moving])
         if kind is cs.SX:
             both: Expr = cs.cse(cs.vertcat(x1, error))
             x1, error = both[:-1], both[-1]
-        return cs.Function("step", [x, u, p, dt], [x1, error], ["x", "u", "p", "dt"], ["x1", "error"])
+        name = "step" if moving is None else "step_alone"
+        return cs.Function(name, [x, u, p, dt], [x1, error], ["x", "u", "p", "dt"], ["x1", "error"])

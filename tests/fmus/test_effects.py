@@ -252,6 +252,15 @@ def test_a_harmonic_force_may_be_locked_to_the_way_where_there_is_a_speed():
     assert not any("n_x" in n or n == "way" for n in wheel.variables)
 
 
+@pytest.mark.parametrize(
+    "made", [MODELS["wheelset"], MODELS["wheelset"].with_switches()], ids=["own", "many"]
+)
+def test_the_way_is_that_of_the_speed_as_effects_have_changed_it(made):
+    effects = [(EFFECTS["actuator_gain"], "V"), (EFFECTS["harmonic_excitation"], "wheelset_lateral")]
+    for chosen in (effects, effects[::-1]):
+        assert "actuator_gain_V_gain" in {s.name() for s in cs.symvar(made(chosen).rates["way"])}
+
+
 def test_time_and_way_are_there_only_for_those_who_ask():
     assert "clock" not in Bench([(EFFECTS["viscous_damping"], "mass")]).variables
     model = Bench([(EFFECTS["step_force"], "mass"), (EFFECTS["parameter_drift"], "m")])

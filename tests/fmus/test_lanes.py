@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fmus.effects import EFFECTS
 from fmus.export.builders.native import code as source_code
 from fmus.export.builders.native import lanes
 from fmus.export.builders.native.lanes import BINARY, CALLED, ONE_BY_ONE, UNARY, lanes_of, widest
@@ -200,6 +201,50 @@ def test_a_row_is_the_same_whatever_its_neighbours_are(name):
                 compared += 1
                 assert_array_equal(both[0], alone)
         assert compared > 0
+
+
+LAWS = {  # one that asks the clock, one without states, one with a state: what switches it on
+    "wheelset": {
+        ("parameter_step", "mu0"): {"delta": -0.1},
+        ("cubic_stiffness", "primary_lateral"): {"k_3": 1e11},
+        ("hysteresis", "primary_lateral"): {"F_h": 300.0},
+    },
+    "vehicle7dof": {
+        ("parameter_step", "m1"): {"delta": 1000.0},
+        ("cubic_stiffness", "primary_fl"): {"k_3": 1e11},
+        ("hysteresis", "primary_fl"): {"F_h": 300.0},
+    },
+}
+
+
+@pytest.fixture(scope="module", params=LAWS)
+def laws(request, tmp_path_factory):
+    """A model without laws, the same with laws that may be off, and what switches each of them on."""
+    folder, chosen = tmp_path_factory.mktemp("laws"), LAWS[request.param]
+    model, effects = MODELS[request.param], [(EFFECTS[kind], at) for kind, at in chosen]
+    bare = build_working(model(), folder / "bare.fmu", in_rows=True)
+    many = build_working(model.with_switches()(effects), folder / "many.fmu", in_rows=True)
+    on = [
+        {EFFECTS[kind].name_at(at, name): value for name, value in given.items()}
+        for (kind, at), given in chosen.items()
+    ]
+    with Fmu(bare) as one, Fmu(many) as other:
+        yield model(), one, other, on
+
+
+def test_a_row_is_the_same_whether_steps_pass_over_the_states_of_laws_or_not(laws):
+    """They do where no law of a group of rows moves one."""
+    model, bare, many, on = laws
+    t, inputs, starts = record(model, 5, 1)
+    asked, off = bare.description.outputs, dict.fromkeys((n for given in on for n in given), 0.0)
+    rows = [{**starts[0], **off, **given} for given in ({}, *on)]
+    alone = [many.simulate_rows(t, inputs, asked, [row])[0] for row in rows]
+    assert_array_equal(many.simulate_rows(t, inputs, asked, rows), alone)
+    assert_array_equal(bare.simulate_rows(t, inputs, asked, starts)[0], alone[0])
+    for row, found in zip(rows, alone, strict=True):
+        expected = many.simulate(t, inputs, asked, row)
+        assert_allclose(found, expected, rtol=0, atol=ALONG * np.abs(expected).max())
+    assert all(np.abs(found - alone[0]).max() > 0 for found in alone[1:])
 
 
 def test_a_function_with_an_operation_without_lanes_has_none():

@@ -9,6 +9,7 @@ import textwrap
 import zipfile
 from pathlib import Path
 
+import casadi as cs
 import fmpy
 import numpy as np
 import pytest
@@ -205,6 +206,27 @@ class Decay(Model):
 
     def derivatives(self):
         return {"x": -self.x / self.time}
+
+
+class Jumps(Springs):
+    """Dependences that derivatives do not see."""
+
+    name = "Jumps"
+    F = Output("N", doc="force that a comparison switches")
+    s = Output("1", doc="sign of the force outside")
+    r = Output("1", doc="what is left of a rounding, and a constant share")
+
+    def outputs(self):
+        force = cs.if_else(self.x > self.c, self.u, 2 * self.u)
+        return {"F": force, "s": cs.sign(self.u), "r": self.u - cs.floor(self.u) + 3 * self.x}
+
+
+def test_what_a_comparison_decides_is_no_constant_dependence():
+    found = dependencies(equations(Jumps()), Jumps())
+    x, u, c = ([v.name for v in Jumps().settable()].index(name) for name in ("x", "u", "c"))
+    assert found[2] == {x: "dependent", u: "dependent", c: "dependent"}
+    assert found[3] == {u: "dependent"}
+    assert found[4] == {x: "constant", u: "dependent"}
 
 
 class Open(Springs):

@@ -43,7 +43,7 @@ from {package} import Slave
 
 
 class {name}(Slave):
-    """{description}"""
+    {description}
 
     def do_step(self, current_time, step_size):
         return Slave.do_step(self, current_time, step_size)
@@ -73,6 +73,8 @@ class Content:
     files: dict[str, bytes]
     page: str  # documentation/index.html
     saves_state: bool = True
+    once: bool = False  # whether a process can have one instance alone
+    variable_step: bool = True  # whether steps may have any length
     provenance: dict[str, Any] = field(default_factory=dict)  # beside what every build says of itself
 
 
@@ -128,6 +130,8 @@ def pack(content: Content, out: Path) -> Path:
                 needsExecutionTool=True,
                 canGetAndSetFMUstate=content.saves_state,
                 canSerializeFMUstate=content.saves_state,
+                canBeInstantiatedOnlyOncePerProcess=content.once,
+                canHandleVariableCommunicationStepSize=content.variable_step,
             )
         final = Path(folder) / "final.fmu"
         _repack(packed, final, about)
@@ -151,7 +155,7 @@ def _write_sources(content: Content, folder: Path) -> tuple[Path, Path]:
     for name, data in files.items():
         (place / name).write_bytes(data)
     script = folder / f"{place.name}_entry.py"
-    text = ENTRY.format(name=content.name, package=place.name, description=card["description"])
+    text = ENTRY.format(name=content.name, package=place.name, description=repr(card["description"]))
     script.write_text(text, encoding="utf-8")
     return script, place
 

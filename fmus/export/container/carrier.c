@@ -3,6 +3,7 @@
    It takes the coupling steps of the slave in Python (runtime/coupled.py): read the motion at the ports, set
    what the laws give for the middle of the step, step, update the memory of the laws. */
 
+#include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -12,11 +13,9 @@
 
 #ifdef _WIN32
 #include <windows.h>
-#define OPEN(path) ((void *)LoadLibraryA(path))
 #define SYMBOL(library, name) ((void *)GetProcAddress((HMODULE)(library), name))
 #else
 #include <dlfcn.h>
-#define OPEN(path) dlopen(path, RTLD_NOW | RTLD_LOCAL)
 #define SYMBOL(library, name) dlsym(library, name)
 #endif
 
@@ -80,8 +79,9 @@ typedef struct {
     char name[128];
     double values[N_VALUES];
     bool touched[N_VALUES]; /* settable variables whose value the carried FMU must be told */
-    bool failed, running, entered, stepped, seen; /* seen: the motion is that of now */
+    bool failed, running, ended, entered, stepped, seen; /* ended: terminated; seen: the motion is that of now */
     double start, time; /* s, beginning of the simulation and of its last step */
+    double tolerance, stop; /* of the carried FMU, and s; below 0 and HUGE_VAL where the importer states none */
     double last, since; /* s, length of the last step; time from `earlier` to `motion`, HUGE_VAL for none */
     double earlier[AT_LEAST_1(N_MOTION)], before[AT_LEAST_1(N_MOTION)], motion[AT_LEAST_1(N_MOTION)];
     double told[AT_LEAST_1(N_TOLD)];
@@ -154,11 +154,12 @@ static int leave_base(Instance *m) { return (int)m->leave(m->base); }
 #endif
 
 static int enter_base(Instance *m) {
+    bool exact = m->tolerance >= 0, ends = m->stop < HUGE_VAL;
 #if BASE_FMI == 2
-    int status = (int)m->setup(m->base, fmi2False, 0.0, m->start, fmi2False, 0.0);
+    int status = (int)m->setup(m->base, exact, exact ? m->tolerance : 0.0, m->start, ends, ends ? m->stop : 0.0);
     return status > WARNING ? status : (int)m->enter(m->base);
 #else
-    return (int)m->enter(m->base, fmi3False, 0.0, m->start, fmi3False, 0.0);
+    return (int)m->enter(m->base, exact, exact ? m->tolerance : 0.0, m->start, ends, ends ? m->stop : 0.0);
 #endif
 }
 
@@ -174,14 +175,21 @@ static void heard(fmi3InstanceEnvironment environment, fmi3Status status, fmi3St
 /* The folder of the carried FMU from the URI of the resources; false where it is too long. */
 static bool folder_of(const char *uri, char *folder) {
     size_t n = 0;
-    const char *from = strncmp(uri, "file://", 7) ? uri : uri + 7;
+    const char *from = strncmp(uri, "file:", 5) ? uri : uri + 5;
 #ifdef _WIN32
+    if (!strncmp(from, "//localhost/", 12)) from += 11;
+    if (!strncmp(from, "///", 3)) from += 2;
+    if (!strncmp(from, "//", 2) && from[2] && from[3] == ':') from += 2; /* as some importers write a drive */
     if (from != uri && from[0] == '/' && from[1] && from[2] == ':') from++;
+#else
+    if (from != uri && !strncmp(from, "//", 2)) /* an authority, which may be empty */
+        for (from += 2; *from && *from != '/';) from++;
 #endif
     for (; *from && n < PATH - 1; from++) {
-        unsigned code;
-        if (*from == '%' && sscanf(from + 1, "%2x", &code) == 1) {
-            folder[n++] = (char)code;
+        char code[3] = {0};
+        if (*from == '%' && isxdigit((unsigned char)from[1]) && isxdigit((unsigned char)from[2])) {
+            memcpy(code, from + 1, 2);
+            folder[n++] = (char)strtol(code, NULL, 16);
             from += 2;
         } else {
             folder[n++] = *from;
@@ -189,6 +197,19 @@ static bool folder_of(const char *uri, char *folder) {
     }
     folder[n] = '\0';
     return !*from && n + sizeof "/base/" BASE_LIBRARY + sizeof "/base/resources/" < PATH;
+}
+
+/* The library at a path in UTF-8. */
+static void *opened(const char *path) {
+#ifdef _WIN32
+    WCHAR wide[PATH];
+    if (!MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, PATH)) return NULL;
+    for (WCHAR *c = wide; *c; c++)
+        if (*c == L'/') *c = L'\\';
+    return (void *)LoadLibraryExW(wide, NULL, LOAD_WITH_ALTERED_SEARCH_PATH); /* with what lies beside it */
+#else
+    return dlopen(path, RTLD_NOW | RTLD_LOCAL);
+#endif
 }
 
 /* ---- the laws ---- */
@@ -257,7 +278,7 @@ static void begin(Instance *m) {
     memset(m->earlier, 0, sizeof m->earlier);
     memset(m->motion, 0, sizeof m->motion);
     m->since = HUGE_VAL;
-    m->failed = m->running = m->stepped = m->seen = false;
+    m->failed = m->running = m->ended = m->stepped = m->seen = false;
 #if BASE_EXCHANGE
     *m->why = '\0';
     m->over = false;
@@ -285,7 +306,7 @@ static bool carried(Instance *m, const char *uri) {
     snprintf(resources, sizeof resources, "%s/base/resources/", path);
 #endif
     snprintf(path + n, sizeof path - n, "/base/%s", BASE_LIBRARY);
-    if (!(LIBRARY = OPEN(path)))
+    if (!(LIBRARY = opened(path)))
         return refuse(m, fmi2Error, "the carried FMU cannot be loaded: %s", path), false;
     if (!found(m)) return false;
 #if BASE_FMI == 2
@@ -315,6 +336,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     Instance *m = calloc(1, sizeof(Instance));
     if (!m) return NULL;
     m->host = functions;
+    m->tolerance = -1.0;
+    m->stop = HUGE_VAL;
     snprintf(m->name, sizeof m->name, "%s", name);
     begin(m);
     bool fits = type == fmi2CoSimulation && !strcmp(guid, TOKEN);
@@ -328,8 +351,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean stop_defined, fmi2Real stop) {
-    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
     ME(c)->start = start;
+    ME(c)->tolerance = tolerance_defined ? tolerance : -1.0;
+    ME(c)->stop = stop_defined ? stop : HUGE_VAL;
     return fmi2OK;
 }
 
@@ -365,6 +389,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 
 fmi2Status fmi2Terminate(fmi2Component c) {
     Instance *m = c;
+    m->ended = true;
     return m->running && !m->failed ? answer(m, (int)m->terminate(m->base), __func__) : fmi2OK;
 }
 
@@ -477,8 +502,9 @@ static int advance(Instance *m, double t, double duration) {
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real duration, fmi2Boolean no_state_before) {
     Instance *m = c;
     (void)no_state_before;
-    if (m->failed) return refuse(m, fmi2Discard, "it failed before; reset it");
-    if (!(duration > 0 && duration < HUGE_VAL)) return refuse(m, fmi2Discard, "step size %g s is not positive", duration);
+    if (m->failed) return refuse(m, fmi2Error, "it failed before; reset it");
+    if (!m->running || m->ended) return refuse(m, fmi2Error, "it is not initialised, or terminated; reset it");
+    if (!(duration > 0 && duration < HUGE_VAL)) return refuse(m, fmi2Error, "step size %g s is not positive", duration);
     int status = advance(m, t, duration);
     m->stepped = true;
     m->time = t;
@@ -534,7 +560,7 @@ NOT_HERE(fmi2GetStringStatus, const fmi2StatusKind kind, fmi2String *value)
 fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(ME(c), fmi2Error, "there is no step to cancel"); }
 
 /* A carried PythonFMU drops its interpreter when the host says so. */
-void finalizePythonInterpreter(void) {
+FMI2_Export void finalizePythonInterpreter(void) {
     if (LIBRARY) {
         void (*release)(void) = (void (*)(void))SYMBOL(LIBRARY, "finalizePythonInterpreter");
         if (release) release();

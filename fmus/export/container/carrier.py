@@ -21,7 +21,7 @@ from jinja2 import Environment, FileSystemLoader
 
 from fmus.export.around.outside import Laws, laws
 from fmus.export.builders.native.build import NO_TOKEN, identified, packed
-from fmus.export.builders.native.code import STANDARD, Work
+from fmus.export.builders.native.code import STANDARD, Work, quoted
 from fmus.export.builders.native.compilers import host
 from fmus.export.builders.native.description import flag, text
 from fmus.export.builders.native.libraries import library
@@ -80,7 +80,7 @@ def _sources(card: dict[str, Any], made: Laws, description: FmuDescription, libr
     settable = n_states + n_inputs + n_parameters
     told, references = set(base["told"]), base["references"]
     facts = {
-        "c": _c,
+        "c": quoted,
         "token": NO_TOKEN,
         "fmi": description.fmi_version[0],
         "exchange": description.exchange,
@@ -121,12 +121,6 @@ def _is_state(description: FmuDescription, motion: Sequence[str], made: Laws) ->
     """
     depends = [description.dependencies.get(name, ("unknown",)) for name in motion]
     return bool(made.told) and {*made.told} <= {*description.inputs} and not any(depends)
-
-
-def _c(words: str) -> str:
-    """A string of C; what the carried FMU's description says may hold any character."""
-    plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in words.encode())
-    return f'"{"".join(plain)}"'
 
 
 def _limit(row: dict[str, Any], key: str, without: float) -> str:

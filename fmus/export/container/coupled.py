@@ -54,7 +54,13 @@ def build_coupled(
     page = documentation(title, card, names, needs)
     values = {r["name"]: (r["start"], r["unit"]) for r in table if r["causality"] == "parameter"}
     about = record_around(source or base, [(EFFECTS[kind], at) for kind, at in effects], values, origin)
-    return pack(Content(title, card, ("coupled", "carried", *EVALUATED), files, page, False, about), out)
+    able = {
+        "saves_state": False,
+        "once": description.once_per_process,
+        "variable_step": description.variable_step,
+    }
+    modules = ("coupled", "carried", *EVALUATED)
+    return pack(Content(title, card, modules, files, page, **able, provenance=about), out)
 
 
 def carrying(

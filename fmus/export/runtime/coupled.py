@@ -9,6 +9,7 @@ import tempfile
 from array import array
 from collections.abc import Sequence
 from functools import cache
+from itertools import count
 from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,7 @@ PASSED = {i for i in range(common.SETTABLE) if REFERENCES[i] >= 0} - set(TOLD)  
 FOLDER = tempfile.mkdtemp(prefix="railfmi_base_")
 Finalize(None, shutil.rmtree, (FOLDER, True), exitpriority=0)  # worker processes skip atexit
 fmpy.extract(str(common.HERE / "base.fmu"), FOLDER)
+NUMBERS = count()  # so that no two carried instances share a name
 IDLE: list[carried.Carried] = []  # carried instances whose slave is gone, for reuse
 
 
@@ -189,7 +191,10 @@ def _instance() -> carried.Carried:
         return IDLE.pop()
     path = sys.path.copy()
     base = carried.CARRIED[BASE["fmi"]](
-        guid=BASE["guid"], modelIdentifier=BASE["identifier"], unzipDirectory=FOLDER, instanceName="base"
+        guid=BASE["guid"],
+        modelIdentifier=BASE["identifier"],
+        unzipDirectory=FOLDER,
+        instanceName=f"base_{next(NUMBERS)}",
     )
     sys.path[:] = path  # an FMU in Python puts its own folder in front
     return base

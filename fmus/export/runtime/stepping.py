@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Any
 
-SHORTEST = 1e-7  # of the communication step; below this a step has failed
+SHORTEST = 1e-7  # of the step that is tried first; below this a step has failed
 TIME_TOLERANCE = 1e-9  # of the communication step
 SAFETY, GROWTH, CUT, ORDER = 0.9, 4.0, 0.1, 3
 
@@ -45,7 +45,7 @@ class Stepper:
                 h *= min(GROWTH, SAFETY * error ** (-1 / ORDER)) if error > 0 else 1.0
             else:
                 h *= max(CUT, SAFETY * error ** (-1 / ORDER)) if 1.0 < error < 1e300 else CUT
-                if h < SHORTEST * duration:
+                if h < SHORTEST * min(duration, self.longest):
                     self.x[:] = array("d", before)
                     return False
         return True

@@ -46,6 +46,7 @@ def sources(
     in_rows: bool = False,
     joins: bool = False,
     switched_by: Sequence[tuple[int, int]] = (),
+    alone: cs.Function | None = None,
 ) -> dict[str, str]:
     """Text of each source file by name; `fmu.c` includes the others.
 
@@ -53,7 +54,7 @@ def sources(
     equations for several rows call is a unit of its own, `lanes_object.c`. in_rows: whether it is simulated
     in rows, so that the equations of one instance are compiled without optimisation. joins: whether a step
     may go over several samples, see lanes_joined.c. switched_by: see `Model.switched`; for each state the
-    numbers of the parameters, from one to before another, that switch its law on.
+    numbers of the parameters, from one to before another, that switch its law on. alone: see `step_alone`.
     """
     code, work = _equations(table.name, made, derivatives=not working)
     wrapper = {n: (HERE / "sources" / n).read_text(encoding="utf-8") for n in (*WRAPPER, *INTERFACE[fmi])}
@@ -64,7 +65,7 @@ def sources(
         wrapper["lanes.h"] = f"#define WIDTH {widest()}\n{wrapper['lanes.h']}"
     headers = Path(fmpy.__file__).parent / "c-code"
     standard = {n: (headers / n).read_text(encoding="utf-8") for n in STANDARD[fmi]}
-    lanes = lanes_of((made.f, made.h, made.step))
+    lanes = lanes_of([made.f, made.h, made.step, *([alone] if alone else [])])
     rows = {"lanes_equations.c": lanes.functions, "lanes_called.c": lanes.called} if lanes else {}
     header = _header(
         table,
@@ -76,7 +77,7 @@ def sources(
         joins=bool(lanes) and joins,
         in_rows=bool(lanes) and in_rows and has_vectors(),
         switched_by=switched_by,
-        own_states=next((k for k, (first, end) in enumerate(switched_by) if first < end), len(switched_by)),
+        own_states=alone.size1_out(0) if alone else len(switched_by),
         runs=lanes.runs if lanes else (),
     )
     return {**wrapper, **standard, **rows, "equations.c": code, "model.h": header}
@@ -119,6 +120,7 @@ def _header(table: Table, work: Work, fmi: int, token: str, **about: object) -> 
         "settable": table.entries[: sum(table.sizes[:3])],
         "nominals": [e.nominal or 1.0 for e in table.entries[: table.sizes[0]]],
         "c": _c,
+        "quoted": quoted,
         "inf": math.inf,
     }
     template = templates.get_template("model.h.j2")
@@ -129,3 +131,9 @@ def _c(value: float | None, missing: float = math.nan) -> str:
     """A number in C, read back to the last bit."""
     number = missing if value is None else value
     return repr(float(number)) if math.isfinite(number) else ("-HUGE_VAL" if number < 0 else "HUGE_VAL")
+
+
+def quoted(words: str) -> str:
+    """A string of C; the name of a foreign variable may hold any character."""
+    plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in words.encode())
+    return f'"{"".join(plain)}"'

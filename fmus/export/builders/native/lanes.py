@@ -15,9 +15,9 @@ from fmus.effects.switch import Switch
 from fmus.export.builders.printing import Call, Load, Printer, Step, Store, digest, number
 
 ARGUMENTS = "(const Lanes *x, Lanes *y)"
-# of the equations: on[k] tells whether x[k] is other than zero in any lane, runs[i] whether one of those is
-# of which `Lanes.runs` tells
-EQUATIONS = "(const Lanes *restrict x, const bool *restrict on, const bool *restrict runs, Lanes *restrict y)"
+# of the equations, which leave x as it is: on[k] tells whether x[k] is other than zero in any lane, runs[i]
+# whether one of those is of which `Lanes.runs` tells
+EQUATIONS = "(Lanes *restrict x, const bool *restrict on, const bool *restrict runs, Lanes *restrict y)"
 UNARY = {
     cs.OP_ASSIGN: "{a}",
     cs.OP_NEG: "-{a}",
@@ -119,7 +119,7 @@ def lanes_of(functions: Sequence[cs.Function]) -> Lanes | None:
     """
     printer = _InLanes({f"wrap_{function.name()}": function for function in functions})
     try:
-        bodies = [printer.body(function) for function in functions]
+        bodies = [printer.equation(function) for function in functions]
     except NotImplementedError:
         return None
     declared = [f"CALLED {name}{ARGUMENTS};" for name in printer.functions]
@@ -195,6 +195,15 @@ class _InLanes(Printer):
         super().__init__()
         self.equations = equations
         self.runs: dict[tuple[int, ...], int] = {}  # arguments that switch on some of the calls of a run
+        self._by_calls: set[int] = set()  # results of the equation that is printed which only calls store
+        self._may_lack: dict[str, set[int]] = {}  # those of the equations so far, by the name of a call
+
+    def equation(self, function: cs.Function) -> list[str]:
+        """Lines of one of the equations."""
+        self._by_calls = set()
+        lines = self.body(function)
+        self._may_lack[f"wrap_{function.name()}"] = self._by_calls
+        return lines
 
     def element(self, array: str, i: int) -> str:
         """An element of an array."""
@@ -225,6 +234,7 @@ class _InLanes(Printer):
         lines: list[str] = []
         run: list[Step] = []
         for step in _stored_by_calls(steps):
+            self._by_calls |= {*step.stored.values()} if isinstance(step, Call) else set()
             if isinstance(step, Load) or (isinstance(step, Call) and Switch.of(step.function.name())):
                 run.append(step)
                 continue
@@ -274,15 +284,18 @@ class _InLanes(Printer):
         return left, self.called(self.name(step.function), given, wanted), amplitudes
 
     def _equation(self, step: Call) -> list[str]:
-        """Lines that call one of the equations with all that is not given to the calling one."""
-        n, name = len(step.given), self.equations[step.function.name()].name()
-        into = [f"in[{i}] = {v};" for i, v in enumerate(step.given) if step.places[i] != i]
+        """Lines that call one of the equations with the arguments of the calling one, some of them changed.
+
+        These are put in their places for the time of the call, for a copy of all would take longer than it.
+        """
+        name = self.equations[step.function.name()].name()
+        changed = [i for i in range(len(step.given)) if step.places[i] != i]
+        into = [f"kept[{k}] = x[{i}]; x[{i}] = {step.given[i]};" for k, i in enumerate(changed)]
+        back = [f"x[{i}] = kept[{k}];" for k, i in enumerate(changed)]
         out = [f"{place} = out[{i}];" for i, place in enumerate(step.wanted) if place]
-        declared = [
-            f"Lanes in[{n}], out[{len(step.wanted)}] = {{0}};",
-            f"memcpy(in, x, {n} * sizeof(Lanes));",
-        ]
-        return ["{", *declared, *into, f"lanes_{name}(in, on, runs, out);", *out, "}"]
+        lacking = any(step.wanted[i] for i in self._may_lack[step.function.name()])
+        declared = f"Lanes kept[{max(1, len(changed))}], out[{len(step.wanted)}]{' = {0}' * lacking};"
+        return ["{", declared, *into, f"lanes_{name}(x, on, runs, out);", *back, *out, "}"]
 
     def switch(self, calls: Sequence[str], n_in: int, n_out: int) -> list[str]:
         """A choice of one of several functions by the first argument: one call if all lanes agree."""

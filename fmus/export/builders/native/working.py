@@ -14,7 +14,7 @@ from fmus.export.builders.native.description2 import description2
 from fmus.export.builders.native.libraries import library
 from fmus.export.builders.native.table import Table, table
 from fmus.files import write_at_once
-from fmus.model import Model, equations, joins
+from fmus.model import Model, equations, joins, step_alone
 from fmus.variables import Parameter, State
 
 TOKEN = "token"  # a file beside the sources, which becomes what these are known by
@@ -36,10 +36,13 @@ class Working:
         command(None, [host()])  # without a compiler the work would be for nothing
         made = equations(model)
         about = table(model, made)
-        by = _switches(model) if model.switched else ()
+        by = _switches(model) if model.switched else []
+        own = next((k for k, (first, end) in enumerate(by) if first < end), len(by))
+        alone = step_alone(model, made, own) if joins(model) and 0 < own < len(by) else None
         code = sources(
-            about, made, 2, NO_TOKEN, working=True, in_rows=in_rows, joins=joins(model), switched_by=by
-        )
+            about, made, 2, NO_TOKEN,
+            working=True, in_rows=in_rows, joins=joins(model), switched_by=by, alone=alone,
+        )  # fmt: skip
         sealed = {n: text.encode() for n, text in code.items()} | {TOKEN: NO_TOKEN.encode()}
         sealed = identified(description2(about, NO_TOKEN, complete=False) | sealed)
         apart = CALLED_BY_LANES if code.get("lanes_called.c") else ()

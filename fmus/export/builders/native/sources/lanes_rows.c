@@ -1,7 +1,8 @@
 /* As many rows as there are lanes through the samples. */
 
+/* values: behind those that are set there is room for the step, an argument of the equations. */
 typedef struct {
-    Lanes values[N_SET], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
+    Lanes values[N_SET + 1], outputs[AT_LEAST_1(N_OUTPUTS)], slopes[N_STATES];
 #ifdef SWITCHES
     int moving[N_STATES], n_moving; /* states of laws that are on; slopes of the others are not computed */
     bool on[N_SET], runs[N_RUNS];   /* whether a value is other than zero in any lane, and one of a run's */
@@ -20,6 +21,12 @@ typedef struct {
         int i = (m)->moving[n_];                                                                                  \
         __VA_ARGS__                                                                                               \
     }
+
+/* One step, after whose states its error stands; where no law moves a state, of those of the model alone. */
+#if N_OWN_STATES < N_STATES
+#define LAST_STATE(m) ((m)->n_moving ? N_STATES : N_OWN_STATES)
+#define STEP(m, next) ((m)->n_moving ? lanes_step : lanes_step_alone)((m)->values, (m)->on, (m)->runs, next)
+#endif
 
 VECTORS static void find_moving(Group *m) {
     m->n_moving = 0;
@@ -43,6 +50,11 @@ VECTORS static void find_moving(Group *m) {
     for (int i = 0; i < N_STATES; i++) {                                                                          \
         __VA_ARGS__                                                                                               \
     }
+#endif
+
+#ifndef STEP
+#define LAST_STATE(m) N_STATES
+#define STEP(m, next) lanes_step((m)->values, (m)->on, (m)->runs, next)
 #endif
 
 /* What has to be known to read what is asked. */
@@ -73,7 +85,7 @@ VECTORS static inline Bits lanes_below(int active) {
 
    The arguments of the equations one after the other: states, inputs and parameters are so already. */
 VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted) {
-    Lanes given[N_SET + 1], next[N_STATES + 1];
+    Lanes next[N_STATES + 1];
     double done[WIDTH] = {0}, h_now[WIDTH];
     bool moving[WIDTH], any = false;
     double whole = duration / number_of_parts(duration * (1 - TIME_TOLERANCE), LONGEST_STEP);
@@ -86,10 +98,10 @@ VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted)
         any = false;
         Lanes h = ALL(whole);
         EACH(i) if (moving[i]) h[i] = h_now[i] = least(least(h_now[i], LONGEST_STEP), duration - done[i]);
-        memcpy(given, m->values, sizeof m->values);
-        given[N_SET] = h;
-        lanes_step(given, m->on, m->runs, next);
-        Lanes sum = next[N_STATES];
+        m->values[N_SET] = h;
+        STEP(m, next);
+        int last = LAST_STATE(m);
+        Lanes sum = next[last];
         EACH_STATE(m, k, sum = sum + next[k] * 0.0;) /* not a number where a state is not finite */
         Bits good = (Bits)(sum <= 1.0), going = ALL_BITS(0);
         EACH(i) going[i] = moving[i] ? -1 : 0;
@@ -97,7 +109,7 @@ VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted)
         EACH_STATE(m, k, m->values[k] = CHOICE(taken, next[k], m->values[k]);)
         EACH(i) {
             if (!moving[i]) continue;
-            double error = next[N_STATES][i];
+            double error = next[last][i];
             if (good[i]) {
                 done[i] += h_now[i];
                 moving[i] = duration - done[i] > TIME_TOLERANCE * duration;
@@ -105,7 +117,7 @@ VECTORS static bool advance_group(Group *m, double duration, const Bits *wanted)
             } else {
                 bool known = 1.0 < error && error < 1e300;
                 h_now[i] *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;
-                if (h_now[i] < SHORTEST * duration) return false;
+                if (h_now[i] < SHORTEST * least(duration, LONGEST_STEP)) return false;
             }
             any = any || moving[i];
         }

@@ -3,7 +3,7 @@
    Every communication step begins afresh: how the last one was divided is forgotten, so that a restart
    from the same values repeats a run to the last bit. */
 
-#define SHORTEST 1e-7       /* of the communication step; below this a step has failed */
+#define SHORTEST 1e-7       /* of the step that is tried first; below this a step has failed */
 #define TIME_TOLERANCE 1e-9 /* of the communication step */
 #define LATE_TOLERANCE 1e-3 /* of the communication step, between the importer's clock and this one */
 #define SAFETY 0.9
@@ -64,7 +64,7 @@ static bool advance(Instance *m, double duration) {
         } else {
             bool known = !failed && 1.0 < error && error < 1e300;
             h_now *= known ? most(CUT, SAFETY * pow(error, -1.0 / ORDER)) : CUT;
-            if (h_now < SHORTEST * duration) {
+            if (h_now < SHORTEST * least(duration, LONGEST_STEP)) {
                 memcpy(x, m->before, sizeof m->before);
                 memcpy(x + FIRST_INPUT, m->first, N_INPUTS * sizeof(double));
                 return false;
@@ -88,7 +88,10 @@ static Status do_step(Instance *m, const char *call, double time, double duratio
         return refuse(m, ERROR, "%s: begins at %.9g s, but the instance is at %.9g s", call, time, m->now.time);
     for (int i = 0; i < N_INPUTS; i++) {
         double end = m->now.values[FIRST_INPUT + i] + m->now.rates[i] * duration;
-        if (m->now.rates[i] != 0 && acceptable(m, call, (unsigned)(FIRST_INPUT + i), end) != OK) return DISCARD;
+        const Variable *v = &VARIABLES[FIRST_INPUT + i];
+        if (m->now.rates[i] != 0 && !within((unsigned)(FIRST_INPUT + i), end))
+            return refuse(m, DISCARD, "%s: at its rate, %s would end at %g, outside %g to %g", call, v->name, end,
+                          v->min, v->max);
     }
     if (!advance(m, duration))
         return refuse(m, DISCARD, "%s: no step is short enough after t = %g s", call, time);

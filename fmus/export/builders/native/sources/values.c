@@ -56,7 +56,7 @@ static Status settable(const Instance *m, const char *call, unsigned i) {
     if (i >= N_SET)
         return refuse(m, ERROR, "%s: the variable with reference %u is computed and cannot be set", call,
                       i + FIRST_REFERENCE);
-    if (running && i < FIRST_INPUT)
+    if (m->now.mode == STEP && i < FIRST_INPUT)
         return refuse(m, ERROR, "%s: state %s cannot be set while running; reset, set it, initialise",
                       call, VARIABLES[i].name);
     if (running && i >= FIRST_PARAMETER && VARIABLES[i].fixed)
@@ -83,7 +83,9 @@ static Status set_values(Instance *m, const char *call, const unsigned *referenc
     if (n && !(given(m, call, references) && given(m, call, values))) return ERROR;
     for (size_t k = 0; k < n; k++) {
         unsigned i = index_of(references[k]);
-        if (settable(m, call, i) != OK || acceptable(m, call, i, values[k]) != OK) return ERROR;
+        if (settable(m, call, i) != OK) return ERROR;
+        if (acceptable(m, call, i, values[k]) != OK) /* of a state, a solver may try another one */
+            return m->now.mode == CONTINUOUS && i < FIRST_INPUT ? DISCARD : ERROR;
     }
     for (size_t k = 0; k < n; k++) m->now.values[index_of(references[k])] = values[k];
     forget_results(m);
