@@ -9,6 +9,7 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 from estimator.closeloop.hypotheses.fitted import Fit
 from estimator.closeloop.screening.regressors import Batch, Calibration, Changes, batches, is_wave
@@ -23,20 +24,22 @@ def decoy_gain(base: Fit, change: Changes, outputs: int, rng: np.random.Generato
     """Reduction of the sum of squares by the best of a set of decoys, the median over the copies.
 
     base: fit of the calibrated FMU; change: candidates with their changes (m, k), outputs sample by sample.
-    A set holds one decoy for each leading effect. The result is comparable with Promise.gain. It is 0 if no
-    regressor has a broad enough spectrum, as in a record of one steady state.
+    A set holds one decoy for each leading effect, cut from one that is a little longer, whose length has
+    small factors. The result is comparable with Promise.gain. It is 0 if no regressor has a broad enough
+    spectrum, as in a record of one steady state.
     """
     calibration = Calibration.of(base)
     residual = calibration.without(base.residual)
+    length = next_fast_len(len(residual) // outputs, real=True)
     spectra = [
-        set_aside(np.fft.rfft(g.reshape(-1, outputs, g.shape[1]), axis=0))
+        set_aside(np.fft.rfft(g.reshape(-1, outputs, g.shape[1]), length, axis=0))
         for g in leading(base, change, outputs)
     ]
     if not spectra:
         return 0.0
     best = []
     for _ in range(copies):
-        made = (decoy(spectrum, len(residual) // outputs, rng) for spectrum in spectra)
+        made = (decoy(spectrum, length, rng)[: len(residual)] for spectrum in spectra)
         best.append(max(_gain(calibration, g, residual) for g in made))
     return float(np.median(best))
 

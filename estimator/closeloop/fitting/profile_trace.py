@@ -235,7 +235,7 @@ class Trace:
     @property
     def _given_up(self) -> bool:
         """Whether they do not, and new slopes would be of no use either."""
-        return self.lost and (self._renewals == 0 or self._gone < (1 + WORTH) * self._way)
+        return self.lost and (self._renewals == 0 or self._gone <= (1 + WORTH) * self._way)
 
     @property
     def _gone(self) -> float:
