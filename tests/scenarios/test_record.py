@@ -312,7 +312,7 @@ def test_a_record_of_one_row_is_refused_as_that(tmp_path):
     (tmp_path / "data.csv").write_text("\n".join(lines))
     with pytest.raises(BadInput) as refused:
         read(file)
-    assert_one_clear_line(refused, tmp_path / "data.csv", "has 1 line of numbers; a record needs more")
+    assert_one_clear_line(refused, tmp_path / "data.csv", "has 1 line of numbers; at least 2 are needed")
 
 
 EPOCHS = {
